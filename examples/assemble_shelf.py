@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from presenting import OAK, STEEL, command_line
+from presenting import OAK, STEEL, command_line, play
 
 import wholebody as wb
-from wholebody.view.filmstrip import write_filmstrip
 
 DEPTH, WIDTH, HEIGHT, THICK = 0.30, 0.80, 1.00, 0.02  # m: of the shelf, outside, and of its boards
 BOARD = (DEPTH, WIDTH - 2.0 * THICK, THICK)
@@ -147,16 +146,18 @@ def main(
 
 def draw(motion: list[NDArray[np.float64]], out: Path) -> None:
     """Write assemble_shelf.html, which plays the motion, and assemble_shelf.png: three stages."""
-    out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(build(), title="assemble_shelf") as viewer:
-        viewer.look(eye=(3.4, -2.1, 1.8), target=(0.35, -0.13, 0.4))
-        viewer.play(motion, dt=1 / 30)
-        print(f"  {viewer.save(out / 'assemble_shelf.html')}")
-        chosen = [motion[0], motion[5 * len(motion) // 12], motion[-1]]
-        try:
-            print(f"  {write_filmstrip(viewer, chosen, out / 'assemble_shelf.png', (560, 480))}")
-        except wb.MissingPackageError as error:
-            print(f"  no picture: {error}")
+    chosen = [motion[0], motion[5 * len(motion) // 12], motion[-1]]
+    play(
+        "assemble_shelf",
+        build(),
+        motion,
+        chosen,
+        out,
+        eye=(3.4, -2.1, 1.8),
+        target=(0.35, -0.13, 0.4),
+        size=(560, 480),
+        dt=1 / 30,
+    )
 
 
 if __name__ == "__main__":

@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from presenting import CARDBOARD, DARK, command_line
+from presenting import CARDBOARD, DARK, command_line, play
 
 import wholebody as wb
-from wholebody.view.filmstrip import write_filmstrip
 
 APART = 1.20  # m: between the two people, who face each other
 BOX = (0.46, 0.30, 0.22)  # m
@@ -96,15 +95,17 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Assemb
 
 def draw(made: wb.Assembly, motion: list[Array], chosen: list[Array], out: Path) -> None:
     """Write carry_together.html, which plays the motion, and carry_together.png: start, hold, above the post, end."""
-    out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(made, title="carry_together") as viewer:
-        viewer.look(eye=(2.6, -2.4, 1.7), target=(0.5 * APART, 0.0, 0.9))
-        viewer.play(motion, dt=1 / 15)
-        print(f"  {viewer.save(out / 'carry_together.html')}")
-        try:
-            print(f"  {write_filmstrip(viewer, chosen, out / 'carry_together.png', (400, 480))}")
-        except wb.MissingPackageError as error:
-            print(f"  no picture: {error}")
+    play(
+        "carry_together",
+        made,
+        motion,
+        chosen,
+        out,
+        eye=(2.6, -2.4, 1.7),
+        target=(0.5 * APART, 0.0, 0.9),
+        size=(400, 480),
+        dt=1 / 15,
+    )
 
 
 if __name__ == "__main__":

@@ -7,36 +7,20 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
-from presenting import CARDBOARD, DARK, OAK, STEEL, command_line
+from four_bar import COUPLER, CRANK, GROUND, ROCKER, Array, Y, angle_of, closed_form
+from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
-from wholebody.view.filmstrip import write_filmstrip
 
-GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker
 RADIUS = 0.012  # m: of the bars
 SLIDER = (0.08, 0.03, 0.06)  # m
 SLIDER_FACE = 0.372  # m: where its face begins
 POST, POST_RADIUS = (0.40 + 0.20 * np.cos(np.radians(140.0)), 0.20 * np.sin(np.radians(140.0))), 0.015  # m: in x and z
 AWAY = (0.0, 0.5, 0.0)  # the post's place in the first turn
 STEPS = 120  # of a turn
-Y = (0.0, 1.0, 0.0)
 PLANE = -0.03  # m: y of crank, rocker, slider and post; the coupler moves in front of them
 ALONG_X = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # a capsule's z along a bar's x
 ALONG_Y = (0.5**0.5, 0.0, 0.0, 0.5**0.5)
-
-Array = NDArray[np.float64]
-
-
-def closed_form(angle: float) -> tuple[float, float]:
-    """Angles of coupler and rocker to x at a crank angle, radians, by the law of cosines; the open branch."""
-    joint = CRANK * np.array((np.cos(angle), np.sin(angle)))
-    across = np.array((GROUND, 0.0)) - joint
-    length = float(np.linalg.norm(across))
-    inner = np.arccos((length**2 + COUPLER**2 - ROCKER**2) / (2.0 * length * COUPLER))
-    coupler = np.arctan2(across[1], across[0]) + inner
-    end = joint + COUPLER * np.array((np.cos(coupler), np.sin(coupler)))
-    return float(coupler), float(np.arctan2(end[1], end[0] - GROUND))
 
 
 def slider_end() -> float:
@@ -51,11 +35,6 @@ def rocker_at_post() -> float:
     """Angle of the rocker to x when it touches the post, radians."""
     away = np.array(POST) - (GROUND, 0.0)
     return float(np.arctan2(away[1], away[0]) - np.arcsin((RADIUS + POST_RADIUS) / np.linalg.norm(away)))
-
-
-def angle_of(place: pin.SE3) -> float:
-    """Angle of a bar to x, radians."""
-    return float(np.arctan2(place.rotation[2, 0], place.rotation[0, 0]))
 
 
 def build() -> wb.Assembly:
@@ -122,16 +101,18 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[wb.Assemb
 
 def draw(made: wb.Assembly, before: Array, states: list[Array], against: list[Array], out: Path) -> None:
     """Write four_bar_among_obstacles.html, which plays the second turn, and .png: start, after a turn, at the post."""
-    out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(made, title="four_bar_among_obstacles") as viewer:
-        viewer.look(eye=(0.2, -0.9, 0.3), target=(0.22, 0.0, 0.14))
-        viewer.play(against, dt=1 / 30)
-        print(f"  {viewer.save(out / 'four_bar_among_obstacles.html')}")
-        chosen = [before, states[-1], against[-1]]
-        try:
-            print(f"  {write_filmstrip(viewer, chosen, out / 'four_bar_among_obstacles.png', (480, 420))}")
-        except wb.MissingPackageError as error:
-            print(f"  no picture: {error}")
+    chosen = [before, states[-1], against[-1]]
+    play(
+        "four_bar_among_obstacles",
+        made,
+        against,
+        chosen,
+        out,
+        eye=(0.2, -0.9, 0.3),
+        target=(0.22, 0.0, 0.14),
+        size=(480, 420),
+        dt=1 / 30,
+    )
 
 
 if __name__ == "__main__":

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from pathlib import Path
 from typing import Any
 
 import wholebody as wb
 from wholebody.tracking import Recording, judge
+from wholebody.view.filmstrip import write_filmstrip
 
 Place = tuple[float, float, float]
 Color = tuple[float, float, float, float]
@@ -119,6 +120,42 @@ def film(
         viewer.show(recording.q[frame])
         try:
             print(f"  {viewer.picture(out / f'{name}.png')}")
+        except wb.MissingPackageError as error:
+            print(f"  no picture: {error}")
+
+
+def play(
+    name: str,
+    shown: wb.Scene | wb.Assembly,
+    motion: Any,
+    chosen: Sequence[Any],
+    out: Path,
+    *,
+    eye: Place,
+    target: Place,
+    size: tuple[int, int] | None = None,
+    dt: float | None = None,
+) -> None:
+    """Write NAME.html, which plays a motion, and NAME.png, a strip of chosen postures or states.
+
+    Args:
+        name: of the two files.
+        shown: what moves.
+        motion: postures or states, with their time step `dt`, or a recording, which has one.
+        chosen: postures or states of the strip.
+        out: folder, made if it does not exist.
+        eye: position of the camera, metres.
+        target: the middle of the picture, metres.
+        size: of each picture of the strip, pixels; None for the usual one.
+        dt: seconds from one to the next.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    with wb.Viewer(shown, title=name) as viewer:
+        viewer.look(eye=eye, target=target)
+        viewer.play(motion, **({} if dt is None else {"dt": dt}))
+        print(f"  {viewer.save(out / f'{name}.html')}")
+        try:
+            print(f"  {write_filmstrip(viewer, chosen, out / f'{name}.png', *(() if size is None else (size,)))}")
         except wb.MissingPackageError as error:
             print(f"  no picture: {error}")
 

@@ -7,11 +7,10 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from presenting import CARDBOARD, DARK, OAK, STEEL, command_line
+from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
 from wholebody.methods.newton import quaternions as quat
-from wholebody.view.filmstrip import write_filmstrip
 
 BAR, STAGES = 0.80, 2  # m: length of a bar; crossed pairs one above the other
 START = np.radians(35.0)  # rad: of the bars to the horizontal
@@ -131,15 +130,17 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> dict[float, tup
 
 def draw(made: wb.Assembly, chosen: list[Array], states: list[Array], out: Path) -> None:
     """Write scissor_lift.html, which plays both loads, and scissor_lift.png: lowest with either load, and highest."""
-    out.mkdir(parents=True, exist_ok=True)
-    with wb.Viewer(made, title="scissor_lift") as viewer:
-        viewer.look(eye=(0.9, -3.0, 1.1), target=(0.4, 0.0, 0.8))
-        viewer.play(states[::2], dt=1 / 30)
-        print(f"  {viewer.save(out / 'scissor_lift.html')}")
-        try:
-            print(f"  {write_filmstrip(viewer, chosen, out / 'scissor_lift.png', (440, 560))}")
-        except wb.MissingPackageError as error:
-            print(f"  no picture: {error}")
+    play(
+        "scissor_lift",
+        made,
+        states[::2],
+        chosen,
+        out,
+        eye=(0.9, -3.0, 1.1),
+        target=(0.4, 0.0, 0.8),
+        size=(440, 560),
+        dt=1 / 30,
+    )
 
 
 if __name__ == "__main__":

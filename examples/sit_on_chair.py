@@ -9,11 +9,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from presenting import OAK, command_line
+from presenting import OAK, command_line, play
 
 import wholebody as wb
 from wholebody.tracking import Dragged, drag_along, judge_drag, read_path, spread
-from wholebody.view.filmstrip import write_filmstrip
 
 SEAT = 0.4262  # m: its top; buttocks touch it when the hips are as high as the knees
 SEATED = (-0.41, 0.0, 0.4885)  # m: of the pelvis, a tenth of a millimetre over the seat
@@ -80,17 +79,10 @@ def main(out: Path = Path("pictures"), pictures: bool = True) -> dict[str, Dragg
 
 def draw(scene: wb.Scene, drags: dict[str, Dragged], out: Path) -> None:
     """Write a filmstrip and a page that plays the motion, for each method."""
-    out.mkdir(parents=True, exist_ok=True)
     for method, dragged in drags.items():
-        with wb.Viewer(scene, title=f"sit_on_chair, {method}") as viewer:
-            viewer.look(eye=(1.6, -3.2, 1.35), target=(-0.2, 0.0, 0.82))
-            viewer.play(dragged)
-            print(f"  {viewer.save(out / f'sit_on_chair_{method}.html')}")
-            stages = [dragged.q[round(share * (len(dragged.q) - 1))] for share in STAGES]
-            try:
-                print(f"  {write_filmstrip(viewer, stages, out / f'sit_on_chair_{method}.png')}")
-            except wb.MissingPackageError as error:
-                print(f"  no picture: {error}")
+        stages = [dragged.q[round(share * (len(dragged.q) - 1))] for share in STAGES]
+        name = f"sit_on_chair_{method}"
+        play(name, scene, dragged, stages, out, eye=(1.6, -3.2, 1.35), target=(-0.2, 0.0, 0.82))
 
 
 if __name__ == "__main__":

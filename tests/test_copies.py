@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.tracking.loop import FrameLoop
 
 
 def pickled(thing: Any) -> Any:
@@ -192,3 +193,17 @@ def test_an_assembly_and_its_copy_do_not_share_bodies(way: Callable[[wb.Assembly
     made.solve()
     assert assembly.bodies == ("crank", "bar")
     assert np.array_equal(assembly.placement("bar").homogeneous, before)
+
+
+@pytest.mark.parametrize("way", [pickled, copy.deepcopy, copy.copy], ids=["pickle", "deepcopy", "copy"])
+@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), None], ids=["qp", "newton", "world"])
+def test_what_belongs_to_a_run_is_neither_pickled_nor_copied(way: Callable[[Any], Any], method: Any) -> None:
+    scene = wb.Scene(wb.load("hand"))
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
+    if method is None:
+        held = [wb.World(scene, dt=0.01), FrameLoop(scene, scene.figure.neutral)]
+    else:
+        held = [method.tracker(problem, 0.01), wb.Drag(problem)]
+    for thing in held:
+        with pytest.raises(wb.InputError, match="cannot be pickled or copied"):
+            way(thing)

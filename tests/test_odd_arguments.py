@@ -484,6 +484,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0, "holds": "soft"}, used)
     yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask, "progress": print})
     yield "Placo.prepare", Call(wb.Placo().prepare, {"problem": ask})
+    yield "Placo.pairs", Call(wb.Placo().pairs, {"problem": ask})
     damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3, "time_limit": 1.0}
     yield "DampedLeastSquares", Call(wb.DampedLeastSquares, damped, used)
     yield "DampedLeastSquares.solve", Call(wb.DampedLeastSquares().solve, {"problem": ask, "progress": print})
@@ -722,7 +723,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
     bisection = {
         "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
-        "clearance": 0.01, "method": "qp",
+        "room": 0.01, "method": "qp",
     }  # fmt: skip
     yield "Bisection", Call(wb.Bisection, bisection)
     worn = {"name": "bag", "shape": wb.Sphere(0.1), "to": "link2", "at": at, "rests_on": ("link1",), "color": None}

@@ -171,3 +171,26 @@ def test_built_in_goals_leave_nothing_for_retarget_to_find(scene):
         problem = wb.Problem(scene, goals=[GOAL])
         with pytest.raises(wb.InputError):
             problem.retarget([make()])
+
+
+@pytest.mark.parametrize("value", [np.nan, -0.01, np.inf, 600.0])
+def test_clearances_that_none_can_keep_are_refused_by_every_run(value: float) -> None:
+    """They may be changed between runs; a value that is no number would be kept by no pair, silently."""
+    scene = wb.Scene(wb.load("hand"))
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
+    problem.clearances[3] = value
+    for run in (wb.solve, lambda asked: wb.assess(asked, asked.start), lambda asked: wb.QP().tracker(asked, 0.01)):
+        with pytest.raises(wb.InputError, match=r"clearances\[3\] is"):
+            run(problem)
+
+
+@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), wb.CCD(), wb.DampedLeastSquares()], ids=lambda one: one.name)
+@pytest.mark.parametrize("shape", [(3,), (1,), (0, 1)], ids=str)
+def test_clearances_of_another_shape_are_refused_by_every_method(method, shape):
+    scene = wb.Scene(wb.load("hand"))
+    problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
+    problem.clearances = np.zeros(shape)
+    with pytest.raises(wb.InputError, match=r"clearances have shape .*; give one for each of the \d+ pairs"):
+        method.solve(problem)
+    with pytest.raises(wb.InputError, match="clearances have shape"):
+        wb.assess(problem, problem.start)

@@ -118,9 +118,6 @@ def assess(problem: Problem, q: Array) -> Assessment:
 
 def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assessment:
     pairs.move(q)
-    if problem.clearances.shape != pairs.distance.shape:
-        count = len(pairs.distance)
-        raise InputError(f"clearances have shape {problem.clearances.shape}; give one for each of the {count} pairs")
     state = pairs.state
     distance, angle, each = _goal_errors(problem, state)
     lack = float((problem.clearances - pairs.distance).max(initial=0.0))

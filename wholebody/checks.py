@@ -11,7 +11,7 @@ from collections.abc import Collection, Iterable
 from operator import index
 from pathlib import Path
 from reprlib import Repr
-from typing import Any, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -200,6 +200,29 @@ def listed(value: object, what: str, example: str) -> list[Any]:
     raise InputError(f"{what} is {shown(value)}, not a list; give one, such as {example}")
 
 
+class Settled:
+    """Base of objects whose public attributes are decided when they are made.
+
+    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks. Methods and
+    private attributes are set as usual.
+    """
+
+    _settable: ClassVar[frozenset[str]] = frozenset()
+    _mend: ClassVar[str] = "make another one"
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        given = name in vars(self)
+        if not name.startswith("_") and (given or isinstance(getattr(type(self), name, None), property)):
+            if name not in self._settable:
+                raise InputError(f"{name} of a {type(self).__name__} cannot be set; {self._mend}")
+            value = self._checked_value(name, value)
+        object.__setattr__(self, name, value)
+
+    def _checked_value(self, name: str, value: Any) -> Any:
+        """The value in the form in which it is kept; an InputError if it does not fit."""
+        return value
+
+
 def function(value: _T, what: str) -> _T:
     """Something that can be called, or None.
 
@@ -312,3 +335,12 @@ def _real(value: object) -> float | None:
     except (TypeError, ValueError, OverflowError):
         return None
     return found if math.isfinite(found) else None
+
+
+def is_number(word: str) -> bool:
+    """Whether a text is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -34,7 +34,7 @@ class MovingScene:
         geometry: the pieces of the scene; those of things that move are carried by their joints.
         names: the things that move, in the order of the configuration.
         owners: the segment or thing that each piece is part of.
-        figure_nq, figure_nv: numbers of the figure in a configuration, and in a velocity; they come first.
+        figure_nq: numbers of the figure in a configuration; they come first.
         scene_pairs: number of pairs that the scene has itself; those after them are pairs of two things.
         centres: thing to its centre (3,) in its own frame, metres.
         joints: thing to the joint that carries it.
@@ -66,7 +66,7 @@ class MovingScene:
             known(name, built.pieces_of, "object")
         if len(set(self.names)) < len(self.names):
             raise InputError(f"a thing that moves is named twice in {list(self.names)}; name each once")
-        self.figure_nq, self.figure_nv = built.model.nq, built.model.nv
+        self.figure_nq = built.model.nq
         self.model = built.model.copy()
         with built.lock:
             self.geometry = built.geometry.copy()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
 from functools import cache
 from typing import Any
 
@@ -26,8 +27,12 @@ from wholebody.workspace import Workspace
 UNIT_TOLERANCE = 1e-3  # largest deviation of a start's quaternion from unit length; more is refused as a mistake
 LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 
+_KINDS: dict[str, tuple[type, ...]] = {
+    "goals": (Goal,), "constraints": (Constraint,), "bounds": (Bound,), "measures": (Measure,)
+}  # fmt: skip
 
-class Problem:
+
+class Problem(checks.Settled):
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
     Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
@@ -45,11 +50,17 @@ class Problem:
         defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
-        clearances: (pairs,) least distance of each collision pair of the scene; may be changed between runs.
+        clearances: (pairs,) least distance of each collision pair of the scene, metres; may be changed between runs.
+
+    `start`, `clearances` and resolved terms of another problem may be set; `retarget` takes new goals. The other
+    attributes cannot be set.
 
     Threads may solve and assess one problem at the same time; only one thread may change it. It can be pickled; a copy
     shares the scene, a deep copy has its own.
     """
+
+    _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})
+    _mend = "state another problem with wb.Problem(...)"
 
     def __init__(
         self,
@@ -106,6 +117,7 @@ class Problem:
         self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
+        self.clearances = np.zeros(len(scene.built.table.pairs))
         with self.borrow() as workspace:
             state = workspace.state.update(self.start)
             self._check_frozen(state)
@@ -122,6 +134,21 @@ class Problem:
             f"  constraints: {checks.some(map(_in_words, asked[len(self.goals) :])) or 'none'}; "
             f"measures: {checks.some(map(_in_words, self.measures)) or 'none'}"
         )
+
+    def _checked_value(self, name: str, value: Any) -> Any:
+        """What is set after the problem was stated: a posture, clearances, or terms that are resolved already."""
+        if name == "start":
+            return checks.posture(value, self.scene.model.nq, "start")
+        if name == "clearances":
+            return checks.array(value, name, "one number a collision pair, metres")
+        if name == "measures_given":
+            return checks.flag(value, name)
+        terms = _checked(value, _KINDS[name], name)
+        for number, term in enumerate(terms):
+            if is_dataclass(term) and not all(hasattr(term, field.name) for field in fields(term)):
+                mend = "give it to problem.retarget([...])" if name == "goals" else self._mend
+                raise InputError(f"{name}[{number}] is a {type(term).__name__} that is not resolved; {mend}")
+        return tuple(terms)
 
     @property
     def stated(self) -> tuple[Constraint, ...]:
@@ -199,9 +226,21 @@ class Problem:
         )
 
     def check_fresh(self) -> None:
-        """Raise InputError if objects were added or removed after the problem was made; moving them is allowed."""
+        """Raise InputError if objects were added or removed after the problem was made, or if clearances are wrong.
+
+        Things may be moved and clearances changed.
+        """
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
+        asked, count = self.clearances, len(self.scene.built.table.pairs)
+        if asked.shape != (count,):
+            raise InputError(f"clearances have shape {asked.shape}; give one for each of the {count} pairs")
+        good = (asked >= 0.0) & (asked <= LARGEST_CLEARANCE)
+        if not good.all():
+            wrong = int(np.argmin(good))
+            raise InputError(
+                f"clearances[{wrong}] is {asked[wrong]}; give numbers between 0 and {LARGEST_CLEARANCE:g} m"
+            )
 
     def _check_frozen(self, state: State) -> None:
         """Raise InputError if a bound keeps a joint out of its limits."""

@@ -36,7 +36,7 @@ FARTHEST_LIKELY = 100.0  # m: a thing farther than this from the origin is proba
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
-class Scene:
+class Scene(checks.Settled):
     """A figure among things.
 
     The geometry model is built when it is first needed, and again after objects were added or removed. Moving an object
@@ -47,6 +47,8 @@ class Scene:
 
     A scene can be pickled. A copy of it, `copy.copy` or `copy.deepcopy`, has things of its own.
     """
+
+    _mend = "make another with wb.Scene(figure), or change its things by add, move and remove"
 
     def __init__(self, figure: Figure) -> None:
         """Make a scene with the figure alone.
@@ -61,7 +63,7 @@ class Scene:
         self._excluded: dict[tuple[str, str], str] = {}
         self._built: SceneGeometry | None = None
         self._lock = RLock()  # while things are added, removed or moved, and while the geometry model is built
-        self.revision = 0
+        self._revision = 0
 
     @classmethod
     def of_parts(cls, figure: Figure, objects: Iterable[SceneObject], built: SceneGeometry) -> Scene:
@@ -74,12 +76,15 @@ class Scene:
     def __repr__(self) -> str:
         carried = [name for name, thing in self._objects.items() if thing.segment is not None]
         around = [name for name, thing in self._objects.items() if thing.segment is None]
-        lines = [f"Scene of {self.figure!r}"]
-        lines.append(f"  things around it: {checks.some(around) or 'none'}")
-        lines.append(f"  carried: {checks.some(carried) or 'nothing'}")
-        return "\n".join(lines)
+        things = f"things around it: {checks.some(around) or 'none'}\n  carried: {checks.some(carried) or 'nothing'}"
+        return f"Scene of {self.figure!r}\n  {things}"
 
     # ---- contents
+
+    @property
+    def revision(self) -> int:
+        """How often things were added or removed."""
+        return self._revision
 
     @property
     def model(self) -> pin.Model:
@@ -270,11 +275,9 @@ class Scene:
         checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
-        far = float(max(abs(place.translation)))
-        if far > FARTHEST_LIKELY:
-            warnings.warn(
-                f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000", stacklevel=3
-            )
+        if (far := float(max(abs(place.translation)))) > FARTHEST_LIKELY:
+            told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
+            warnings.warn(told, stacklevel=3)
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
@@ -284,7 +287,7 @@ class Scene:
 
     def _changed(self) -> None:
         self._built = None
-        self.revision += 1
+        self._revision += 1
 
     def _object(self, name: str) -> SceneObject:
         return self._objects[checks.known(name, self._objects, "object")]
@@ -362,12 +365,9 @@ class Scene:
     def _way(self, name: str, way: tuple[Any, Any]) -> tuple[pin.SE3, pin.SE3]:
         thing = self._object(name)
         if not isinstance(way, (tuple, list)) or len(way) != 2:
-            raise InputError(
-                f"moves: {name!r} has {checks.shown(way)}; give two placements, at the start and at the end"
-            )
-        start, end = (
-            to_placement(at, f"moves: {name!r} at the {when}") for at, when in zip(way, ("start", "end"), strict=True)
-        )
+            raise InputError(f"moves: {name!r} has {checks.shown(way)}; give two placements, at the start and the end")
+        start = to_placement(way[0], f"moves: {name!r} at the start")
+        end = to_placement(way[1], f"moves: {name!r} at the end")
         if thing.segment is None:
             return start, end
         base = self.model.frames[self.frame_id(thing.segment)].placement

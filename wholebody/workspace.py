@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.checks import a
+from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.approach import largest_approach
@@ -21,7 +23,22 @@ if TYPE_CHECKING:
     from wholebody.moving_things import Collision, FrameMotion, MovingThings
 
 
-class Workspace:
+class OfOneRun:
+    """What belongs to the run that made it, and is neither pickled nor copied."""
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(
+            f"{a(type(self))} belongs to the run that made it and cannot be pickled or copied; make another one from "
+            "its problem or scene"
+        )
+
+
+class Workspace(OfOneRun):
     """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.
 
     A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the

@@ -25,7 +25,7 @@ def test_both_methods_sit_down(tmp_path: Path, capsys: pytest.CaptureFixture[str
         assert row.depth_mm < 0.1
         assert row.between_mm <= 1.0
         assert row.feet_mm < 2.0
-        assert row.left_mm < 0.011
+        assert row.end_error_mm < 0.011
     _, frames = read_rows(tmp_path / "out" / "challenge-frames.csv", DragFrameRow)
     assert len(frames) == 120
     page = (tmp_path / "results.md").read_text()

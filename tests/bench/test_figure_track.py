@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.bench.following import followed
 from wholebody.bench.adapters import installed_tools, make_tool
 from wholebody.bench.figure_track import figure_tracks
 from wholebody.bench.step import StepRow, taking
@@ -49,14 +50,7 @@ def test_the_reaches_are_those_of_the_human_for_another_figure(arm: list[Track])
 def test_tools_follow_an_arm_whose_root_is_fixed(name: str, arm: list[Track]) -> None:
     """Its first joint turns for ever; nothing is in the way."""
     alone = arm[2]
-    tool = make_tool(name, alone)
-    assert np.allclose(tool.posture(), alone.start, atol=1e-12)
-    postures = []
-    for target in alone.targets:
-        tool.step(target)
-        postures.append(tool.posture())
-    verdict = judge(alone, np.array(postures))
-    assert tool.failures == 0
+    _, verdict = followed(name, alone)
     assert verdict.limit_violation < 1e-4
     assert verdict.fastest_root == verdict.foot_drift == 0.0
     assert verdict.error[-1] < 0.2 * np.linalg.norm(alone.targets[-1] - alone.targets[0])

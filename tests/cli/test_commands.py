@@ -16,35 +16,18 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
+from tests.task_text import figure, point, table
 from wholebody.cli import main
 from wholebody.cli.demo import packaged_tasks
 from wholebody.view import browser
 
-TASK = """\
-title = "A small reach"
-clearance = 0.002
-
-[figure]
-name = "human"
-detail = "spheres"
-
-[[object]]
-name = "ball"
-shape = "sphere"
-radius = 0.1
-at = [0.6, 0.0, 1.0]
-
-[[goal]]
-type = "point"
-frame = "right_index_tip"
-target = [0.35, -0.25, 1.0]
-
-[[goal]]
-type = "axis"
-frame = "gaze"
-axis = [1, 0, 0]
-toward = [0.35, -0.25, 1.0]
-"""
+TASK = (
+    'title = "A small reach"\nclearance = 0.002\n'
+    + figure("human", detail="spheres")
+    + table("[[object]]", name="ball", shape="sphere", radius=0.1, at=[0.6, 0.0, 1.0])
+    + point("right_index_tip", [0.35, -0.25, 1.0])
+    + table("[[goal]]", type="axis", frame="gaze", axis=[1, 0, 0], toward=[0.35, -0.25, 1.0])
+)
 
 
 @pytest.fixture

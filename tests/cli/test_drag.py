@@ -7,29 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.task_text import box, figure, point, table
 from wholebody.bench.drag import DragFrameRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 
-ARM = """\
-[figure]
-name = "avatar"
-
-[[object]]
-name = "wall"
-shape = "box"
-size = [0.1, 3.0, 3.0]
-at = [0.65, 0.0, 1.0]
-
-[[goal]]
-type = "point"
-frame = "right_palm"
-target = [0.35, -0.3, 1.2]
-
-[[constraint]]
-type = "freeze"
-joints = ["root", "left_leg", "right_leg"]
-"""
+ARM = (
+    figure("avatar")
+    + box("wall", [0.1, 3.0, 3.0], [0.65, 0.0, 1.0])
+    + point("right_palm", [0.35, -0.3, 1.2])
+    + table("[[constraint]]", type="freeze", joints=["root", "left_leg", "right_leg"])
+)
 
 
 TURNED = """

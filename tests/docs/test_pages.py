@@ -49,6 +49,17 @@ def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytes
     np.testing.assert_allclose(hand.translation, (0.54, 0.05, 0.45), atol=1e-4)
 
 
+def test_configurations_of_pink_and_mujoco_are_starts(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for package in ("pink", "mujoco"):
+        pytest.importorskip(package)
+    monkeypatch.chdir(tmp_path)
+    names = _run(root / "docs/how-to/warm-start.md")
+    assert capsys.readouterr().out.split() == ["solved", "solved"]
+    np.testing.assert_allclose(names["start"], names["configuration"].q)
+
+
 def _run(page: Path) -> dict[str, Any]:
     """The names that the blocks of a page define, run one after the other."""
     blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)

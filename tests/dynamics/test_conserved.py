@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.world.closed_forms import colliding
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
 
@@ -31,15 +32,7 @@ def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodie
 
 @pytest.mark.parametrize("seed", range(4))
 def test_free_collisions_conserve_momentum(hand: wb.Figure, seed: int) -> None:
-    rng = np.random.default_rng(seed)
-    shapes = (wb.Box((0.2, 0.3, 0.1)), wb.Sphere(0.1), wb.Capsule(0.05, 0.2), wb.Box((0.1, 0.1, 0.3)))
-    things = []
-    for k, shape in enumerate(shapes):
-        place = AWAY + 0.5 * np.array([k % 2, k // 2, 0.0])
-        speed = -2.0 * (place - AWAY - 0.25) + 0.2 * rng.normal(size=3)
-        body = wb.Body(velocity=tuple(speed), angular_velocity=tuple(rng.normal(size=3)))
-        things.append((shape, place, body))
-    engine = still(hand, *things)
+    engine = still(hand, *colliding(np.random.default_rng(seed), AWAY))
     momentum, energy, events = engine.momentum(), engine.energy(), 0
     for _ in range(22):  # until two of them stay together, and are parted by displacements
         frame = engine.advance(1 / 60)
@@ -198,6 +191,27 @@ def test_a_plate_that_is_moved_pushes_a_ball_and_a_sleeping_ball_wakes(hand: wb.
         assert frame.deepest <= 1e-4
     assert engine.placement("ball").translation[0] > 4.0 + 0.05 + 0.1 - 1e-4
     assert engine.twist("ball")[0] >= 1.0 - 1e-6
+
+
+def test_a_stack_that_wakes_does_not_sink(hand: wb.Figure) -> None:
+    """A ball rolls slowly up to a stack that sleeps: what bears the stack bears it from the first step on."""
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    boxes = [f"box {k}" for k in range(3)]
+    for k, name in enumerate(boxes):
+        scene.add(wb.Box((0.2, 0.2, 0.2)), name=name, at=(3.0, 0.0, -1.9 + 0.2 * k + SKIN * (k + 1)), body=wb.Body())
+    rolling = wb.Body(velocity=(-0.1, 0.0, 0.0), angular_velocity=(0.0, -1.0, 0.0))
+    scene.add(wb.Sphere(0.1), name="ball", at=(3.3, 0.0, -1.9 + SKIN), body=rolling)
+    engine = RigidBodies(scene)
+    before, slept = engine.energy(), False
+    for _ in range(75):
+        lay = np.array([engine.placement(name).translation[2] for name in boxes])
+        frame = engine.advance(1 / 60)
+        slept |= frame.sleeping == 3
+        assert frame.energy <= before + 1e-4
+        assert np.array([engine.placement(name).translation[2] for name in boxes]) == pytest.approx(lay, abs=5e-6)
+        before = frame.energy
+    assert slept
+    assert frame.sleeping == 0
 
 
 def test_the_same_scene_moves_the_same(hand: wb.Figure) -> None:

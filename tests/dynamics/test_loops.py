@@ -118,6 +118,48 @@ def test_the_program_goes_the_same_way_as_the_clear_version(seed: int, visits: i
     assert signorini >= np.abs(rates[contacts:] - heap.hold).max() - 1e-12
 
 
+def test_islands_do_not_reach_through_fixed_bodies() -> None:
+    bodies = np.array([(1, 2), (4, 3), (0, 1), (0, 3), (5, 4), (2, 6)])
+    root, movable = np.empty(7, dtype=np.intp), np.array([False] + 6 * [True])
+    solve_kernel._join(np.arange(5), bodies, movable, root)  # the last point bears nothing
+    assert root.tolist() == [0, 1, 1, 3, 3, 3, 6]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_islands_solved_apart_solve_the_whole_program(seed: int) -> None:
+    heaps = [Heap(seed), Heap(seed + 50, joints=0), Heap(seed + 100)]  # nothing joins one to another
+    parts = [len(heap.axes) for heap in heaps]
+    number = 5 * np.arange(3)
+
+    def of(name: str, joints: bool = True) -> np.ndarray:
+        """Arrays of all heaps: contacts first, then joints."""
+        whole = [getattr(heap, name) + (number[k] if name == "bodies" else 0) for k, heap in enumerate(heaps)]
+        ends = [part[count:] for part, count in zip(whole, parts, strict=True)] if joints else []
+        starts = [part[:count] for part, count in zip(whole, parts, strict=True)]
+        return np.concatenate([*starts, *ends]).astype(np.intp if name == "bodies" else float)
+
+    bodies, jacobian, mobility = of("bodies"), of("jacobian"), of("mobility")
+    friction, target = of("friction", False), of("target", False)
+    gram, hold = (np.concatenate([getattr(heap, name) for heap in heaps]) for name in ("gram", "hold"))
+    twist, impulse = np.concatenate([heap.twist for heap in heaps]), np.zeros((len(bodies), 3))
+    solve_kernel.solve_islands(
+        bodies, jacobian, of("answer"), mobility, friction, target, gram, hold, twist, impulse, 1e-6, 10**6, 10**6
+    )
+    signorini, coulomb = solve_kernel.residuals(bodies, jacobian, mobility, friction, target, hold, twist, impulse)
+    assert max(signorini, coulomb) < 1e-4
+    start = np.concatenate([heap.twist for heap in heaps])
+    moved = np.einsum("crsk,cr->csk", of("answer"), impulse)
+    np.add.at(start, bodies, moved)  # the velocities are those that the impulses give
+    assert twist == pytest.approx(start, abs=1e-9)
+    for k, heap in enumerate(heaps):  # each alone has the same answer
+        alone, own = heap.twist.copy(), np.zeros((len(heap.bodies), 3))
+        solve_kernel.solve(
+            np.arange(len(own)), heap.bodies, heap.jacobian, heap.answer, heap.mobility, heap.friction, heap.target,
+            heap.gram, heap.hold, alone, own, 1e-6, 10**6, 10**6,
+        )  # fmt: skip
+        assert twist[5 * k : 5 * k + 5] == pytest.approx(alone, abs=1e-3)
+
+
 @pytest.mark.parametrize("seed", range(8))
 def test_a_single_impact_is_that_of_the_clear_version(seed: int) -> None:
     rng = np.random.default_rng(seed)

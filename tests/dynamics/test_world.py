@@ -152,6 +152,10 @@ def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
     with pytest.raises(wb.InputError, match="scene"):
         wb.World(scene.figure)
+    with pytest.raises(
+        wb.InputError, match=r"scene is an Assembly, not a Scene; .*add its bodies as things with wb\.Body\(joints"
+    ):
+        wb.World(wb.Assembly().body("post"))
     with pytest.raises(wb.UnknownNameError, match="overlap"):
         wb.World(scene, overlap="pq")
     with pytest.raises(wb.InputError, match="dt"):

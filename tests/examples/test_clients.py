@@ -63,6 +63,18 @@ def test_small_pinocchio(root: Path, folder: Path, tmp_path: Path) -> None:
     assert arm.score.goal_error < 2e-3
 
 
+def test_small_mujoco_answers_as_small_pinocchio_does(root: Path, folder: Path, tmp_path: Path) -> None:
+    """The same steps by two engines: a reader of the one understands the other."""
+    pytest.importorskip("mujoco")
+    scripts = [root / "examples" / "clients" / f"small_{engine}.py" for engine in ("mujoco", "pinocchio")]
+    assert len(scripts[0].read_text().splitlines()) <= 60
+    first, second = (answered(script, folder, tmp_path).judged for script in scripts)
+    assert [one.outcome for one in first] == [one.outcome for one in second]
+    for one, other in zip(first, second, strict=True):
+        if one.outcome == "answered":
+            assert one.score.goal_error == pytest.approx(other.score.goal_error, abs=1e-6)
+
+
 def test_plain_mujoco(root: Path, folder: Path, tmp_path: Path) -> None:
     """Another engine reads the same files: what it takes for free of overlap is so for Pinocchio and coal."""
     pytest.importorskip("mujoco")

@@ -353,7 +353,7 @@ def test_effort_weights_are_the_tables_and_the_root_costs_too():
     assert not load("avatar").effort_weights[:6].any()
 
 
-@pytest.mark.parametrize(("angle", "mean"), [("flexion", 20.0), ("lateral", 20.0), ("rotation", 10.0)])
+@pytest.mark.parametrize(("angle", "mean"), [("flexion", 20.0), ("lateral", 105.0), ("rotation", 10.0)])
 def test_levels_of_the_spine_share_a_motion_as_their_ranges_do(angle: str, mean: float):
     figure = person()
     rows = {row["name"]: row for row in table("joints")}

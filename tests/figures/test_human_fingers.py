@@ -177,3 +177,20 @@ def test_wrong_hands_are_refused_in_one_sentence(options, sentence):
         wb.finger_angles("open")
     with pytest.raises(wb.InputError, match=r"give .left. or .right."):
         wb.finger_angles("flat", "up")
+
+
+def test_a_flat_hand_closes_around_a_thin_bar(figure):
+    """A relaxed hand ends with the thumb between this bar and the palm."""
+    scene = wb.Scene(figure).add(wb.Capsule(0.0125, 0.3), name="bar", at=(0.40, -0.2, 1.1))
+    flat = {"right_elbow_flexion": np.radians(80.0), **wb.finger_angles("flat", "right")}
+    start = figure.with_joints(figure.posture("standing"), flat)
+    grasp = wb.Grasp("right", "bar", "power")
+    solution = wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET), method="qp")
+    assert solution.status == "solved"
+    found = gaps(scene.model, scene.geometry, solution.q)
+    assert min(found)[0] > -1e-5
+    at_bar = {a if b.startswith("bar") else b: gap for gap, a, b in found if "bar:" in a + b}
+    assert abs(at_bar["right_hand:0"]) < 2e-5
+    for finger in TIPS:
+        outer = [f"right_{finger}_{part}" for part in ("proximal" if finger == "thumb" else "middle", "distal")]
+        assert abs(min(at_bar[part] for part in outer)) < 2e-5

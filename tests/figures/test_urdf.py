@@ -1,6 +1,8 @@
 """Any URDF: a robot arm with every kind of shape, and files that are wrong."""
 
+import copy
 import os
+import pickle
 import re
 import tempfile
 from pathlib import Path
@@ -11,6 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import wholebody as wb
 from wholebody.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.figures import load
 
@@ -353,3 +356,47 @@ def test_a_damaged_file_is_read_or_refused_by_one_sentence(data):
     if figure is not None:
         assert np.isfinite(figure.neutral).all()
         assert figure.within_limits(figure.neutral)
+
+
+def test_a_figure_without_limits_can_be_pickled_and_copied(tmp_path):
+    """Pinocchio writes an infinite limit into its archives, and cannot read it again."""
+    text = re.sub(r"<limit [^>]*/>", "", TEXT)
+    arm = load(write(tmp_path, text), package_dirs=[ARM.parents[1]])
+    assert np.isinf(arm.model.velocityLimit).any()
+    for same in (pickle.loads(pickle.dumps(arm)), copy.deepcopy(arm)):
+        for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit"):
+            assert np.array_equal(getattr(same.model, name), getattr(arm.model, name))
+        assert same.joints == arm.joints
+
+
+@pytest.mark.parametrize("zero", ["0", "0.0", "-0", "0e3"])
+def test_a_velocity_limit_of_zero_is_none_and_told(tmp_path, zero):
+    text = TEXT.replace('effort="100" velocity="2"/>', f'effort="100" velocity="{zero}"/>', 1)
+    arm = load(write(tmp_path, text), package_dirs=[ARM.parents[1]])
+    told = [note for note in arm.notes if "velocity limit is 0, which is read as none" in note]
+    assert len(told) == 1
+    name = told[0].split("'")[1]
+    assert arm.model.velocityLimit[arm.dofs([name])[0]] == np.inf
+    assert (arm.model.velocityLimit > 0.0).all()
+
+
+def test_a_joint_whose_upper_limit_is_minus_zero_is_one_that_does_not_move(tmp_path):
+    """`-0.0` is not below `0.0`, and numpy refuses to draw numbers between the two."""
+    path = tmp_path / "robot.urdf"
+    links = [
+        f'<link name="l{k}"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>'
+        for k in range(4)
+    ]
+    joints = [
+        f'<joint name="j{k}" type="revolute"><parent link="l{k}"/><child link="l{k + 1}"/><origin xyz="0 0 0.3"/>'
+        f'<axis xyz="0 1 0"/><limit lower="{low}" upper="{high}" effort="1" velocity="1"/></joint>'
+        for k, (low, high) in enumerate([("-1", "1"), ("0.0", "-0.0"), ("-2", "2")])
+    ]
+    path.write_text(f'<robot name="r">{"".join(links + joints)}</robot>')
+    robot = load(path)
+    q = np.array((0.3, 0.0, -0.5))
+    tip = tuple(robot.placement(q, "l3").translation)
+    for method in ("qp", "ccd"):
+        solution = wb.solve(wb.Problem(wb.Scene(robot), goals=[wb.Point("l3", tip)]), method=method)
+        assert solution.q[1] == 0.0
+        assert not np.signbit([robot.model.lowerPositionLimit, robot.model.upperPositionLimit])[:, 1].any()

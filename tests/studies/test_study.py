@@ -9,24 +9,15 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
 
-TASK = """
-[figure]
-name = "human"
-[[object]]
-name = "post"
-shape = "box"
-size = [0.05, 0.05, 0.5]
-at = [1.5, 0.0, 0.25]
-[[constraint]]
-type = "hold"
-frame = "pelvis"
-[[goal]]
-type = "point"
-frame = "right_index_tip"
-target = [0.4, -0.2, 1.2]
-"""
+TASK = (
+    figure("human")
+    + box("post", [0.05, 0.05, 0.5], [1.5, 0.0, 0.25])
+    + hold("pelvis")
+    + point("right_index_tip", [0.4, -0.2, 1.2])
+)
 STUDY = """
 task = "task.toml"
 [[person]]

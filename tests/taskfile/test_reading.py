@@ -7,50 +7,21 @@ from pathlib import Path
 
 import pytest
 
+from tests.task_text import box, figure, hold, point, table
 from wholebody.errors import WholebodyError
 from wholebody.taskfile import read_task
 
-GOOD = """\
-clearance = 0.01
-
-[figure]
-name = "human"
-detail = "spheres"
-
-[start]
-posture = "standing"
-joints = { left_elbow_flexion = 0.5 }
-
-[[object]]
-name = "table"
-shape = "box"
-size = [0.7, 1.2, 0.04]
-at = [0.65, 0.0, 0.74]
-
-[[attach]]
-name = "ring"
-shape = "sphere"
-radius = 0.01
-to = "right_hand"
-at = [0.0, 0.0, -0.3]
-
-[[goal]]
-type = "point"
-frame = "right_index_tip"
-target = [0.4, -0.2, 1.0]
-
-[[constraint]]
-type = "hold"
-frame = "left_foot"
-
-[[measure]]
-type = "effort"
-weight = 2.0
-
-[method]
-name = "qp"
-tolerance = 1e-6
-"""
+GOOD = (
+    "clearance = 0.01\n"
+    + figure("human", detail="spheres")
+    + '\n[start]\nposture = "standing"\njoints = { left_elbow_flexion = 0.5 }\n'
+    + box("table", [0.7, 1.2, 0.04], [0.65, 0.0, 0.74])
+    + table("[[attach]]", name="ring", shape="sphere", radius=0.01, to="right_hand", at=[0.0, 0.0, -0.3])
+    + point("right_index_tip", [0.4, -0.2, 1.0])
+    + hold("left_foot")
+    + table("[[measure]]", type="effort", weight=2.0)
+    + table("[method]", name="qp", tolerance=1e-6)
+)
 
 
 @pytest.fixture
@@ -99,7 +70,7 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ),
         ("target = [0.4, -0.2, 1.0]", "target = [0.4, -0.2]", ["task.toml:27", "write 3 numbers"]),
         ("target = [0.4, -0.2, 1.0]", "target = [0.4, inf, 1.0]", ["goal 1, key target[1]", "inf"]),
-        ("tolerance = 1e-6", "tolerance = 1.0", ["task.toml:39", "method, key tolerance"]),
+        ("tolerance = 1e-06", "tolerance = 1.0", ["task.toml:39", "method, key tolerance"]),
         ("weight = 2.0", "weight = 0", ["measure 1, key weight"]),
         # a wrong name
         ('name = "human"', 'name = "humna"', ["figure name", "did you mean human"]),

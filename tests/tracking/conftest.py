@@ -2,9 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import pytest
 
 import wholebody as wb
+
+
+@pytest.fixture
+def before_plate() -> Callable[..., wb.Problem]:
+    """Return a function: size and place of a plate of 6 mm -> a person who stands, a fingertip before the plate."""
+
+    def build(size: tuple[float, float], x: float, z: float) -> wb.Problem:
+        scene = wb.Scene(wb.load("human"))
+        scene.add(wb.Box((size[0], 0.006, size[1])), name="plate", at=(x, 0.0, z))
+        holds = [wb.Freeze("root", "left_leg", "right_leg")]
+        return wb.Problem(scene, "standing", goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.2))], constraints=holds)
+
+    return build
 
 
 @pytest.fixture(scope="session")

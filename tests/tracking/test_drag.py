@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -41,12 +42,10 @@ def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
 
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
-def test_a_hand_is_not_dragged_through_a_plate(method: str) -> None:
+def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callable[..., wb.Problem]) -> None:
     """The goal goes through a plate of 6 mm in steps of 20 mm, and the hand stays on its side."""
-    scene = wb.Scene(wb.load("human"))
-    scene.add(wb.Box((0.8, 0.006, 0.8)), name="plate", at=(0.55, 0.0, 1.2))
-    goals, holds = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))], [wb.Freeze("root", "left_leg", "right_leg")]
-    problem = wb.Problem(scene, "standing", goals=goals, constraints=holds)
+    problem = before_plate((0.8, 0.8), 0.55, 1.2)
+    scene = problem.scene
     drag = wb.Drag(problem, method)
     postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(20)]
     assert drag.to((0.4, -0.2, 1.2)).error < 2e-3

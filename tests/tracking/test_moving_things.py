@@ -6,10 +6,8 @@ asked.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -17,55 +15,28 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
+from wholebody.bench.world.throws import DT, SHAPES, Throw
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 
-DT = 1.0 / 60.0
-SHAPES = {
-    "plate": wb.Box((0.001, 0.5, 0.5)),
-    "board": wb.Box((0.02, 0.6, 0.4)),
-    "ball": wb.Sphere(0.08),
-    "rod": wb.Capsule(0.01, 0.9),
-}
+KINDS = {"plate": "plate of 1 mm", "board": "board", "ball": "ball", "rod": "rod"}
 Path = Sequence[tuple[float, np.ndarray]]
 
 
-class Throw:
-    """A thing that flies towards the body of a person with constant velocity, and turns."""
+class Thrown(Throw):
+    """Judged by fine subdivision."""
 
     def __init__(self, seed: int, kind: str, speed: float, turn: float = 0.0) -> None:
-        rng = np.random.default_rng(seed)
-        angle = rng.uniform(0.0, 2.0 * np.pi)
-        self.way = np.array([np.cos(angle), np.sin(angle), 0.0])
-        self.at = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), -0.5 * self.way + [0.0, 0.0, rng.uniform(0.7, 1.5)])
-        self.speed, self.spin = speed, turn * rng.normal(size=3)
-        self.scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-        self.scene.add(SHAPES[kind], name="thing", at=self.at)
-        self.truth = copy.copy(self.scene)
-        self.frames = int(0.7 / (speed * DT)) + 1
-
-    def next(self) -> tuple[pin.SE3, pin.SE3]:
-        before = self.at
-        rotation = before.rotation @ pin.exp3(self.spin * DT)
-        self.at = pin.SE3(rotation, before.translation + self.speed * DT * self.way)
-        self.scene.move("thing", at=self.at, over=DT)
-        return before, self.at
+        super().__init__(np.random.default_rng(seed), SHAPES[KINDS[kind]], speed, turn)
 
     def deepest(self, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int = 0) -> float:
-        """Depth of the thing in the body along a path, metres, by fine subdivision."""
-        turn = pin.log3(way[0].rotation.T @ way[1].rotation)
-        parts = parts or max(4, 120 // len(path))
-        worst = 0.0
-        for (s0, q0), (s1, q1) in pairwise(path):
-            for share in np.linspace(0.0, 1.0, parts):
-                s = s0 + share * (s1 - s0)
-                centre = (1.0 - s) * way[0].translation + s * way[1].translation
-                self.truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
-                found = self.truth.contacts(pin.interpolate(self.truth.model, q0, q1, share), 0.0)
-                owner = self.truth.piece_owner
-                own = [row for row, pair in enumerate(found.pair) if "thing" in {owner[k] for k in pair}]
-                worst = max(worst, float(-found.distance[own].min(initial=0.0)))
-        return worst
+        """Depth of the thing in the body along a path, metres."""
+        depths = [0.0]
+        for q in self.instants(path, way, parts or max(4, 120 // len(path))):
+            found, owner = self.truth.contacts(q, 0.0), self.truth.piece_owner
+            own = [row for row, (a, b) in enumerate(found.pair) if "thing" in (owner[a], owner[b])]
+            depths += [-float(distance) for distance in found.distance[own]]
+        return max(depths)
 
     def ends(self, q: np.ndarray) -> float:
         """Deepest overlap of all pairs at a posture, metres."""
@@ -78,11 +49,11 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
     return wb.Problem(scene, start, goals=[wb.Point("right_index_tip", tip)], clearance=0.001, **more)
 
 
-@pytest.mark.parametrize("kind", list(SHAPES))
+@pytest.mark.parametrize("kind", list(KINDS))
 @pytest.mark.parametrize(("speed", "turn"), [(1.0, 0.0), (2.5, 3.0)])
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
-    throw = Throw(hash_of(kind, speed), kind, speed, turn)
+    throw = Thrown(hash_of(kind, speed), kind, speed, turn)
     limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
     problem = problem_of(throw.scene, constraints=[limits])
     tracker, q, touched = wb.QP().tracker(problem, DT), problem.start, 0
@@ -107,7 +78,7 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
     aside = [4.0 * DT * sign * axis for axis in np.eye(3) for sign in (-1.0, 1.0)]
     could = 0
     for seed, kind in enumerate(("board", "plate", "rod", "board")):
-        throw = Throw(seed, kind, 20.0, 3.0)
+        throw = Thrown(seed, kind, 20.0, 3.0)
         problem = problem_of(throw.scene, constraints=[limits])
         tracker, q = wb.QP().tracker(problem, DT), problem.start
         for _ in range(throw.frames):
@@ -122,15 +93,15 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
 
 
 def hash_of(kind: str, speed: float) -> int:
-    return 10 * list(SHAPES).index(kind) + int(speed)
+    return 10 * list(KINDS).index(kind) + int(speed)
 
 
 @pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
-@pytest.mark.parametrize("kind", list(SHAPES))
+@pytest.mark.parametrize("kind", list(KINDS))
 def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -> None:
     named = free = through = 0
     for seed, speed in enumerate((4.0, 20.0, 45.0)):
-        throw = Throw(hash_of(kind, 5.0) + seed, kind, speed, turn=2.0)
+        throw = Thrown(hash_of(kind, 5.0) + seed, kind, speed, turn=2.0)
         drag = wb.Drag(problem_of(throw.scene), method)
         target, before = np.array(drag.problem.goals[0].target), drag.q
         for frame in range(throw.frames):
@@ -160,7 +131,7 @@ def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -
 def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str, kind: str) -> None:
     """A person who stands, and one who walks."""
     for seed, speed, walks in ((1, 1.5, 0.0), (2, 15.0, 0.0), (3, 12.0, 1.3)):
-        throw = Throw(seed, kind, speed)
+        throw = Thrown(seed, kind, speed)
         q = throw.scene.figure.posture("standing")
         loop = FrameLoop(throw.scene, q, overlap=overlap)
         named = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Callable
 
 import pytest
 
@@ -29,11 +30,9 @@ def test_a_pull_stops_where_the_arm_ends(scene: wb.Scene, method: str) -> None:
 
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
-def test_a_pull_stops_before_a_plate(method: str) -> None:
-    scene = wb.Scene(wb.load("human"))
-    scene.add(wb.Box((1.6, 0.006, 1.6)), name="plate", at=(0.95, 0.0, 1.1))
-    goals, holds = [wb.Point("right_index_tip", (0.4, -0.2, 1.2))], [wb.Freeze("root", "left_leg", "right_leg")]
-    problem = wb.Problem(scene, "standing", goals=goals, constraints=holds)
+def test_a_pull_stops_before_a_plate(method: str, before_plate: Callable[..., wb.Problem]) -> None:
+    problem = before_plate((1.6, 1.6), 0.95, 1.1)
+    scene = problem.scene
     solutions = wb.follow_path(problem, [(0.4, -0.2, 1.2), (0.4, 0.2, 1.2)], method, spacing=0.05)
     assert [solution.solved for solution in solutions[:-1]] == [True] * (len(solutions) - 1)
     assert not solutions[-1].solved

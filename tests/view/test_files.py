@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
+import wholebody as wb
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.view import Viewer, style
-from wholebody.view.browser import find_chromium
+from wholebody.view.browser import Browser, find_chromium
 
 browser_needed = pytest.mark.browser
 
@@ -40,7 +41,10 @@ def test_pictures_and_movies(exhibit: Any, chromium: str, tmp_path: Path) -> Non
         assert figure.min() > 3  # all of it is in the picture
 
         viewer.play([exhibit.posture(1 + seed % 3) for seed in range(7)], dt=0.1)
-        with Image.open(viewer.movie(tmp_path / "scene.gif", size=(96, 64))) as movie:
+        told: list[tuple[int, int]] = []
+        drawn = viewer.movie(tmp_path / "scene.gif", size=(96, 64), progress=lambda *counts: told.append(counts))
+        assert told == [(number, 7) for number in range(1, 8)]
+        with Image.open(drawn) as movie:
             assert (movie.size, movie.n_frames, movie.info["duration"]) == ((96, 64), 7, 100)  # type: ignore[attr-defined]
         viewer.picture(tmp_path / "still.png", size=(401, 300))  # a motion is shown at its beginning
         still = np.asarray(Image.open(tmp_path / "still.png").convert("RGB")).astype(int)
@@ -73,6 +77,38 @@ browser = Browser()
 print(browser._pid, browser._folder, flush=True)
 time.sleep(300)
 """
+
+
+@browser_needed
+@pytest.mark.usefixtures("chromium")
+def test_a_picture_does_not_depend_on_those_before(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The browser's page stays open; the picture is that of a page which has drawn nothing else."""
+    opened: list[int] = []
+    base = Browser.open_html
+    monkeypatch.setattr(Browser, "open_html", lambda self, page: (opened.append(1), base(self, page))[1])
+    scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 0.1, 0.02)), name="plate", at=(0.0, 0.0, -0.1))
+    first = scene.figure.neutral
+    names = [name for name in scene.figure.joints if "index" in name and "flexion" in name]
+    second = scene.figure.with_joints(first, dict.fromkeys(names, 0.3))
+    tip = scene.figure.placement(first, "right_index_tip").translation
+    problem = wb.Problem(scene, first, goals=[wb.Point("right_index_tip", tip)])
+    with Viewer(scene) as viewer, Viewer(scene) as fresh:
+        viewer.show(first, problem=problem)
+        viewer.picture(tmp_path / "one.png", size=(160, 120))
+        viewer.play([first, second, first], dt=0.1)
+        viewer.movie(tmp_path / "movie.gif", size=(96, 64))
+        viewer.show(second, problem=problem)
+        viewer.picture(tmp_path / "two.png", size=(200, 120))
+        assert len(opened) == 1
+        fresh.show(second, problem=problem)
+        fresh.picture(tmp_path / "fresh.png", size=(200, 120))
+        assert (tmp_path / "two.png").read_bytes() == (tmp_path / "fresh.png").read_bytes()
+        viewer.ghosts([first])
+        viewer.picture(tmp_path / "ghost.png", size=(200, 120))
+        viewer.ghosts([])  # nodes go, so the page is built anew
+        viewer.picture(tmp_path / "three.png", size=(200, 120))
+        assert (tmp_path / "three.png").read_bytes() == (tmp_path / "fresh.png").read_bytes()
+        assert (tmp_path / "ghost.png").read_bytes() != (tmp_path / "fresh.png").read_bytes()
 
 
 @browser_needed

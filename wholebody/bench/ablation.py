@@ -170,7 +170,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     """What a method can do without, by name; empty where nothing is listed."""
     if method != "qp":
         return {}
-    from wholebody.methods.qp.acceleration import Anderson
+    from wholebody.methods.acceleration import Anderson
     from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.funnel import Funnel
     from wholebody.methods.qp.multistart import Search

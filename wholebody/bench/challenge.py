@@ -23,8 +23,8 @@ FRAMES = 240
 
 
 @dataclass(frozen=True)
-class ChallengeRow:
-    """One method; milliseconds and millimetres. Depths are those of `DragRow`, distances those of the last posture.
+class ChallengeRow(DragRow):
+    """One method; distances are those of the last posture, millimetres.
 
     Attributes:
         seat_mm: from the pelvis to the seat.
@@ -32,20 +32,9 @@ class ChallengeRow:
         feet_mm: farthest that a sole is from where it stood, in any posture.
     """
 
-    method: str
-    frames: int
-    mean_ms: float
-    p95_ms: float
-    max_ms: float
-    cpu_mean_ms: float
-    iterations: float
-    depth_mm: float
-    between_mm: float
     seat_mm: float
     back_mm: float
     feet_mm: float
-    left_mm: float
-    status: str
 
 
 def measure(
@@ -79,7 +68,6 @@ def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:
         seat_mm=1e3 * _apart(problem, dragged, "pelvis", "seat"),
         back_mm=1e3 * _apart(problem, dragged, "thorax", "backrest"),
         feet_mm=1e3 * _drift(problem, dragged),
-        left_mm=row.end_error_mm,
     )
 
 

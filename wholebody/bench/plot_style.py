@@ -103,11 +103,19 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     return svg, png
 
 
+DECADES = 2.6  # beyond which the labels of 2 and 5 would overlap their neighbours
+
+
 def plain_log(axis: Any) -> None:
-    """Make the x axis logarithmic, with 1, 2, 5, 10, ... written out."""
+    """Make the x axis logarithmic, with 1, 2, 5, 10, ... written out; over many decades 1, 10, 100, ... alone."""
     from matplotlib.ticker import LogLocator, NullLocator
 
+    class Plain(LogLocator):
+        def tick_values(self, vmin: float, vmax: float) -> Any:
+            self.set_params(subs=(1.0,) if vmax > 10.0**DECADES * vmin else (1.0, 2.0, 5.0))
+            return super().tick_values(vmin, vmax)
+
     axis.set_xscale("log")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.xaxis.set_major_locator(Plain())
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_locator(NullLocator())

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any, Protocol
 
 from wholebody.errors import InputError, UnknownNameError
@@ -54,6 +55,53 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
                 raise InputError(f"--proportion is {text!r}; give NAME=METRES such as sitting_height=0.93") from None
         given["proportions"] = proportions
     return given
+
+
+def scene_parser(
+    commands: Commands, run: Callable[[argparse.Namespace], int], name: str, *, overlap: str, out: str, **texts: str
+) -> argparse.ArgumentParser:
+    """Add a command that runs scenes with a scripted tracker.
+
+    Args:
+        commands: the group.
+        run: runs it.
+        name: of the command.
+        overlap: help of `--overlap`.
+        out: folder where `--out` is left out.
+        texts: `help`, `description` and `epilog` of the command, and `scene`, the help of its first argument.
+    """
+    scene = texts.pop("scene")
+    parser = commands.add_parser(name, formatter_class=argparse.RawDescriptionHelpFormatter, **texts)
+    parser.set_defaults(run=run)
+    parser.add_argument("scene", nargs="?", metavar="SCENE", help=scene)
+    parser.add_argument("--list", action="store_true", help="list the scenes")
+    parser.add_argument("--overlap", default="qp", metavar="METHOD", help=overlap)
+    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
+    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
+    add_folders(parser, out)
+    return parser
+
+
+def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
+    """Add `--out`, with a folder where it is left out, and `--update-docs`."""
+    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})")
+    parser.add_argument(
+        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+        help="write tables and charts into the documentation too (default folder: docs)",
+    )  # fmt: skip
+
+
+def check_overlaps(chosen: Iterable[str]) -> None:
+    """Check ways to remove overlap.
+
+    Raises:
+        UnknownNameError: there is no such way.
+    """
+    from wholebody.tracking.loop import OVERLAPS
+
+    for overlap in chosen:
+        if overlap not in OVERLAPS:
+            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
 
 
 def scene_names(arguments: argparse.Namespace, scenes: Mapping[str, str], command: str, *, files: bool) -> list[str]:

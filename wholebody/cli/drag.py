@@ -132,13 +132,10 @@ def _save_posture(drag: LiveDrag, write: Callable[..., Path], title: str, path: 
 
 def followed(problem: Problem, places: Any, method: str, goal: int, label: str) -> tuple[Dragged, DragJudgement]:
     """Drag and assess, with a progress bar."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
+    from wholebody.cli.tables import progress_bar
     from wholebody.tracking.dragging import drag_along, judge_drag
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+    with progress_bar() as bar:
         work = bar.add_task(label, total=len(places))
         dragged = drag_along(
             problem, places, method, goal=goal, progress=lambda done: bar.update(work, completed=done)

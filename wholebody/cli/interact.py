@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
     from wholebody.bench.interaction import InteractionRow, WorstFrames
@@ -32,21 +32,17 @@ CHARTED = ("hand_on_table", "two_arms")
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("interact", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help="name of the scene, or all")
-    parser.add_argument("--list", action="store_true", help="list the scenes")
-    parser.add_argument("--overlap", default="qp", metavar="METHOD", help="qp, ccd or all (default: qp)")
-    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/interact"), metavar="DIR", help="folder (default: out/interact)"
+    scene_parser(
+        commands,
+        run,
+        "interact",
+        scene="name of the scene, or all",
+        overlap="qp, ccd or all (default: qp)",
+        out="out/interact",
+        help=HELP,
+        description=DESCRIPTION,
+        epilog=EPILOG,
     )
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write the tables and charts into the documentation too (default folder: docs)",
-    )  # fmt: skip
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -54,8 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.interaction import report
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
-    from wholebody.cli.arguments import scene_names
-    from wholebody.errors import UnknownNameError
+    from wholebody.files import check_writable, make_folder
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
 
@@ -63,10 +58,11 @@ def run(arguments: argparse.Namespace) -> int:
     if not names:
         return 0
     chosen = list(OVERLAPS) if arguments.overlap == "all" else [arguments.overlap]
-    for overlap in chosen:
-        if overlap not in OVERLAPS:
-            raise UnknownNameError("way to remove overlap", overlap, OVERLAPS, "--overlap")
-    _check_writable(arguments.out, arguments.update_docs)
+    check_overlaps(chosen)
+    make_folder(arguments.out)
+    check_writable(arguments.out / f"{names[0]}.csv")
+    if arguments.update_docs is not None:
+        _check_pages(arguments.update_docs)
     facts, worst = machine(), []
     for name in names:
         scene = build_scene(name, frames=arguments.frames, seed=arguments.seed)
@@ -85,20 +81,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if held else 1
 
 
-def _check_writable(out: Path, docs: Path | None) -> None:
-    """Make the folder, and check that the pages exist, before anything is computed."""
-    import os
-
+def _check_pages(docs: Path) -> None:
+    """Check that the pages exist, before anything is computed."""
     from wholebody.errors import InputError
 
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"--out {out}: the folder cannot be made ({error.strerror}); give another one") from None
-    if not os.access(out, os.W_OK | os.X_OK):
-        raise InputError(f"--out {out}: the folder cannot be written; give another one")
-    for page in ("results.md", "where-methods-fail.md") if docs is not None else ():
-        if docs is not None and not (docs / page).is_file():
+    for page in ("results.md", "where-methods-fail.md"):
+        if not (docs / page).is_file():
             raise InputError(f"--update-docs {docs}: there is no {page} in it; give the folder that holds the pages")
 
 
@@ -107,15 +95,12 @@ def _run_one(
 ) -> WorstFrames:  # fmt: skip
     import gc
 
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from wholebody.bench.interaction import frame_chart, frame_rows, summary, worst_frames
     from wholebody.bench.tables import write_rows
+    from wholebody.cli.tables import progress_bar
     from wholebody.tracking import follow, judge
 
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+    with progress_bar() as bar:
         gc.collect()
         gc.freeze()  # otherwise the garbage collector visits all objects once in a run, which delays a frame by 80 ms
         task = bar.add_task(f"{scene.name}, {overlap}", total=len(scene.track))

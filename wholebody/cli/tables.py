@@ -1,4 +1,4 @@
-"""Tables for the terminal: goals, contacts, measures, figures."""
+"""Tables for the terminal: goals, contacts, measures, figures; and progress bars."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from wholebody.figures.state import State
@@ -25,6 +26,19 @@ NEAR = 0.01
 """Metres beyond the clearance at which a pair is listed."""
 
 _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "infeasible": "red"}
+
+
+def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
+    """A bar on the terminal's error output that goes when it is done.
+
+    Args:
+        counted: whether it counts things; it shows a share in percent otherwise.
+        thread: whether a thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
+    """
+    numbers = MofNCompleteColumn() if counted else TaskProgressColumn()
+    columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, auto_refresh=thread, refresh_per_second=4)
 
 
 def table(*columns: str, title: str = "") -> Table:

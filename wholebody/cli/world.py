@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
     from wholebody.bench.world_runs import WorldRow
@@ -35,27 +35,18 @@ FILM = (460, 420)  # pixels of a moment
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("world", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument(
-        "scene",
-        nargs="?",
-        metavar="SCENE",
-        help="name of the scene, or all; or a task file whose objects have a density or a mass",
-    )
-    parser.add_argument("--list", action="store_true", help="list the scenes")
-    parser.add_argument("--overlap", default="qp", metavar="METHOD", help="qp or ccd (default: qp)")
-    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
-    parser.add_argument(
-        "--out", type=Path, default=Path("out/world"), metavar="DIR", help="folder (default: out/world)"
+    parser = scene_parser(
+        commands,
+        run,
+        "world",
+        scene="name of the scene, or all; or a task file whose objects have a density or a mass",
+        overlap="qp or ccd (default: qp)",
+        out="out/world",
+        help=HELP,
+        description=DESCRIPTION,
+        epilog=EPILOG,
     )
     parser.add_argument("--picture", action="store_true", help="draw five moments too, by a headless Chromium")
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write table and charts into the documentation too (default folder: docs)",
-    )  # fmt: skip
-    parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -63,17 +54,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
     from wholebody.bench.world_runs import report
-    from wholebody.cli.arguments import scene_names
     from wholebody.dynamics.scenes import WORLD_SCENES
-    from wholebody.errors import UnknownNameError
     from wholebody.files import check_writable, make_folder
-    from wholebody.tracking.loop import OVERLAPS
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
     if not names:
         return 0
-    if arguments.overlap not in OVERLAPS:
-        raise UnknownNameError("way to remove overlap", arguments.overlap, OVERLAPS, "--overlap")
+    check_overlaps([arguments.overlap])
     make_folder(arguments.out)
     check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
@@ -99,19 +86,16 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
 
 
 def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
     from wholebody.bench.tables import write_rows
     from wholebody.bench.world_runs import chart, frame_rows, summary
+    from wholebody.cli.tables import progress_bar
     from wholebody.dynamics.overlaps import overlaps
     from wholebody.dynamics.world import World
 
     name = scene.name
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     frames: list[WorldFrame] = []
     pushed: list[tuple[Overlap, ...]] = []
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as bar:
+    with progress_bar() as bar:
         task = bar.add_task(name, total=len(scene.track))
         world = World(
             scene.scene, scene.track.q[0], dt=scene.track.dt, overlap=arguments.overlap, seed=arguments.seed

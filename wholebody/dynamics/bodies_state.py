@@ -69,6 +69,13 @@ class BodiesState:
         """Go back to what `kept` gave."""
         self.position[:], self.rotation[:], self.twist[:] = kept
 
+    def between(self, kept: tuple[Array, Array, Array], share: float) -> None:
+        """Go to where a share of the way from what `kept` gave has been covered; the velocities stay."""
+        for number in np.flatnonzero(self.moving | self.given):
+            turn = pin.log3(self.rotation[number] @ kept[1][number].T)
+            self.rotation[number] = pin.exp3(share * turn) @ kept[1][number]
+        self.position[:] = kept[0] + share * (self.position - kept[0])
+
     def local(self, body: Indices, point: Array) -> Array:
         """Points (m, 3) in the axes of bodies (m,), from their centres of mass."""
         return np.asarray(np.einsum("cij,ci->cj", self.rotation[body], point - self.position[body]))

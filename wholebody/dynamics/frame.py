@@ -1,4 +1,4 @@
-"""What happened in a frame of the engine."""
+"""What is given to a frame of the engine, and what happened in it."""
 
 from __future__ import annotations
 
@@ -7,8 +7,12 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
+from wholebody import checks
 from wholebody.arrays import Array
+from wholebody.errors import InputError
+from wholebody.geometry.placement import placement
 
 
 class Event(NamedTuple):
@@ -86,3 +90,28 @@ class FrameRecord:
             tuple(self.events), {names[k]: self.impulse[k] for k in pushed}, self.contacts, self.deepest, energy,
             self.signorini, self.coulomb, self.steps, sleeping,
         )  # fmt: skip
+
+
+def given_ways(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+    """The placements before and after of what is moved in a frame, checked.
+
+    Raises:
+        InputError: it is no dictionary of two placements each.
+    """
+    if kinematic is None:
+        return {}
+    given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
+    return {name: _ways(ways, name) for name, ways in given.items()}
+
+
+def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
+    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
+        raise InputError(
+            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
+        )
+    before, after = (
+        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
+        for way in ways
+    )
+    return before, after

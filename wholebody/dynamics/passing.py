@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -9,11 +11,13 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.dynamics import passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 MOST_LOOKS = 64  # places of one pair on the way; what would need more is doubtful
 DOUBTS = 50  # pairs that are looked at on their way, at most
+EARLIEST = 0.1  # share of a step: of meetings before it, the points are taken there
 
 
 class Before:
@@ -25,15 +29,35 @@ class Before:
         kept: positions, rotations and velocities.
     """
 
-    def __init__(self, state: BodiesState, near: Contacts, margin: Array) -> None:
+    def __init__(self, state: BodiesState, near: Contacts, margin: Array, finder: ContactFinder) -> None:
         """Keep it."""
         self.near, self.margin, self.kept = near, margin, state.kept()
+        self._finder, self._active = finder, state.moving | state.given
+
+    def widen(self, ways: Array) -> None:
+        """Let the margins be at least the ways (n,) of the bodies, metres: a blow may have made them faster."""
+        if (ways > self.margin).any():
+            self.margin = np.maximum(self.margin, ways)
+            self.near = self._finder.near(self.kept[0], self.kept[1], self.margin, self._active)
 
 
-def passed(
+class Way(NamedTuple):
+    """What is known of the way of a step.
+
+    Attributes:
+        free: whether no pieces can have been deeper than `PASSING` in each other.
+        meetings: shares of the step at which pieces meet or may meet, at least `EARLIEST`; none where there are too
+            many doubts.
+    """
+
+    free: bool
+    meetings: tuple[float, ...] = ()
+
+
+def way_of(
     state: BodiesState, before: Before, after: Contacts, margin: Array, ways: Array, time: float, gravity: float
-) -> bool:
-    """Whether pieces can have been deeper than `PASSING` in each other on the way.
+) -> Way:
+    """Whether pieces can have been deeper than `PASSING` in each other on the way, and where.
 
     A direction that has kept a pair apart all the time settles most pairs (`passing_kernel`). Others are looked at on
     their way in the same manner, at as many places as that takes.
@@ -47,8 +71,7 @@ def passed(
         time: of the step, seconds.
         gravity: m/s2.
     """
-    if not (ways <= before.margin).all():
-        return True
+    before.widen(ways)
     pieces, near = state.pieces, before.near
     bodies = pieces.body[near.pair]
     found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
@@ -65,17 +88,22 @@ def passed(
         PASSING, *pieces.heights, doubts,
     )  # fmt: skip
     if count > DOUBTS:
-        return True
-    return any(
-        _met(state, before, int(first), int(second), near.placements, angle, fall)
+        return Way(False)
+    met = [
+        _meeting(state, before, int(first), int(second), near.placements, angle, fall)
         for first, second in near.pair[doubts]
-    )
+    ]
+    shares = tuple(sorted({max(share, EARLIEST) for share in met if share is not None}))
+    return Way(not shares, shares)
 
 
-def _met(
+def _meeting(
     state: BodiesState, before: Before, first: int, second: int, placements: Array, angle: Array, fall: float
-) -> bool:
-    """Whether two pieces can have met: the way in parts, along each of which the direction at its start parts them."""
+) -> float | None:
+    """The share of a step at which two pieces meet, or up to which they surely do not; None if they do not meet.
+
+    The way is followed in parts, along each of which the direction at its start parts the pieces.
+    """
     pieces = state.pieces
     pair = (first, second)
     a, b = (int(pieces.body[k]) for k in pair)
@@ -83,6 +111,8 @@ def _met(
     turns = [pin.log3(state.rotation[k] @ before.kept[1][k].T) for k in (a, b)]
     shapes = [pieces.table.geometry.geometryObjects[k].geometry for k in pair]
     sag = 0.125 * float(angle[a] ** 2 * pieces.levers[a] + angle[b] ** 2 * pieces.levers[b]) + fall
+    both, way = float(angle[a] + angle[b]), float(np.linalg.norm(shift[b] - shift[a]))
+    size = float(pieces.levers[a] + pieces.levers[b])
     placed = placements.copy()
 
     def place(at: float) -> None:
@@ -94,23 +124,31 @@ def _met(
     def height(piece: int, direction: Array, sign: float) -> float:
         return float(passing_kernel.highest(piece, placed, direction, sign, *pieces.heights))
 
-    request, at, looks = coal.DistanceRequest(), 0.0, 0
+    request, at, looks, part = coal.DistanceRequest(), 0.0, 0, 1.0
     while at < 1.0:
         place(at)
         result = coal.DistanceResult()
         poses = [coal.Transform3s(placed[k, :3].T, placed[k, 3]) for k in pair]
         distance = coal.distance(shapes[0], poses[0], shapes[1], poses[1], request, result)
         if distance < -PASSING:
-            return True
-        normal, part = np.array(result.normal), 1.0 - at
+            return at
+        normal, part = np.array(result.normal), min(2.0 * part, 1.0 - at)
+        # seen from a body that turns by w, a point at r with velocity v has at most the acceleration
+        # |w|^2 |r| + 2 |w| |v| beside its own; a path sags by an eighth of that
+        carried = sag + 0.125 * both**2 * (size + max(distance, 0.0) + way) + 0.25 * both * way
         while True:
             place(at + part)
-            end = -height(second, normal, -1.0) - height(first, normal, 1.0)
             looks += 1
             if looks > MOST_LOOKS:
-                return True
-            if min(distance, end) - part * part * sag > -PASSING:
+                return at
+            if any(
+                min(distance, -height(second, along, -1.0) - height(first, along, 1.0)) - part * part * bend > -PASSING
+                for along, bend in (
+                    (normal, sag),
+                    *((pin.exp3(part * turn) @ normal, carried) for turn in turns),
+                )
+            ):
                 break
             part *= 0.5
         at += part
-    return False
+    return None

@@ -30,14 +30,14 @@ from wholebody.dynamics import (
 )
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord
+from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_ways
 from wholebody.dynamics.joints import CLOSED, Joints
-from wholebody.dynamics.passing import Before, passed
+from wholebody.dynamics.passing import Before, way_of
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
 from wholebody.errors import InputError
-from wholebody.geometry.placement import FARTHEST, placement
+from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene import Scene
 
@@ -46,6 +46,7 @@ SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 LONGEST = 10.0  # s: of a frame, which is 2,400 steps
 SHORTEST = 1e-6  # s: of a step that ends with an impact
 INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again
+SHALLOW = 2e-5  # m: the same for the first try of a step; smaller = more steps made again, fewer pieces to part
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 HALVINGS = 6  # of a step, at most
 FORESEEN = 2  # times that a step is made again with the points where it led too deep, before it is halved
@@ -196,7 +197,7 @@ class RigidBodies:
             UnknownNameError: there is no such segment or thing.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
-        state, given = self.state, {self._number(name): _ways(ways, name) for name, ways in _given(kinematic).items()}
+        state, given = self.state, {self._number(name): ways for name, ways in given_ways(kinematic).items()}
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
@@ -225,7 +226,8 @@ class RigidBodies:
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
-        self._sleepers.wake(self._near)
+        if self._sleepers.wake(self._near):
+            self._look(SUBSTEP)  # what bears the woken ones was not looked at while all of it was still
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
@@ -233,7 +235,8 @@ class RigidBodies:
         program.look(falling)
         together = record.stops <= 0 or not ended
         time, stopped = self._until_impact(program, time, together)
-        before, start, weight = Before(state, self._near, self._margin), self._old, float(np.linalg.norm(self.gravity))
+        before = Before(state, self._near, self._margin, self._finder)
+        start, weight = self._old, float(np.linalg.norm(self.gravity))
         halvings, foreseen = 0, 0
         while True:
             self._move(program, time, together, start, before.kept)
@@ -242,11 +245,14 @@ class RigidBodies:
             least = self._look(SUBSTEP)
             if halvings == HALVINGS:
                 break
-            if least >= -INSIDE and not passed(state, before, self._near, self._margin, self._ways(time), time, weight):
-                break
-            start, met = program.remembered(time), least < -INSIDE and foreseen < FORESEEN
+            shares: tuple[float, ...] = (1.0,)
+            if least >= -(INSIDE if foreseen else SHALLOW):
+                free, shares = way_of(state, before, self._near, self._margin, self._ways(time), time, weight)
+                if free:
+                    break
+            start, met = program.remembered(time), bool(shares) and foreseen < FORESEEN
             if met:
-                program.meet(self._finder.points(self._near.nearer(LEAST_GAP)), time)
+                self._meet(program, before, time, shares)
                 foreseen += 1
             state.restore(before.kept)
             if met:
@@ -293,6 +299,16 @@ class RigidBodies:
             hold -= off / time
             start = program.remembered(time)
             state.restore(kept)
+
+    def _meet(self, program: StepProgram, before: Before, time: float, shares: tuple[float, ...]) -> None:
+        """Let a program know the contact points where pieces are in each other at shares of its step."""
+        state, end = self.state, self.state.kept()
+        for share in shares:
+            if share < 1.0:
+                state.between(before.kept, share)
+                self._look(SUBSTEP)
+            program.meet(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
+            state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
         points = program.points
@@ -347,25 +363,6 @@ def _bounded(value: object, most: float, what: str) -> Array:
     return numbers
 
 
-def _given(kinematic: object) -> Mapping[str, object]:
-    if kinematic is None:
-        return {}
-    return checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
-
-
-def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
-    """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
-    if not isinstance(ways, (tuple, list)) or len(ways) != 2:
-        raise InputError(
-            f"kinematic: {checks.shown(name)} has {checks.shown(ways)}; give its placements before and after"
-        )
-    before, after = (
-        way if isinstance(way, pin.SE3) and np.isfinite(way.homogeneous).all() else placement(way, f"kinematic: {name}")
-        for way in ways
-    )
-    return before, after
-
-
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back with three others: not in the middle of a frame."""
@@ -382,6 +379,7 @@ def compiled_kernel() -> Any:
     joint_kernel.place(pairs, levers, mask[:0], one, unit, levers, vectors)
     joint_kernel.lay(pairs, mask[:0], levers, mass, unit, *laid[1:], held)
     solve_kernel.solve(none, pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
+    solve_kernel.solve_islands(pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
     solve_kernel.residuals(pairs, laid[1], laid[3], some, some, hold, twist, vectors)
     contact_kernel.rates(pairs, laid[1], twist, vectors)
     contact_kernel.apply(pairs, laid[2], twist, vectors)

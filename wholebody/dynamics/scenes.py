@@ -6,28 +6,21 @@ environments" (section 6): a ball flicked off a table by a finger, and rooms wit
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.checks import known, number, posture, whole
+from wholebody.checks import known, posture, whole
 from wholebody.errors import InputError
-from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, HalfSpace, Sphere
 from wholebody.matter.body import Body
 from wholebody.matter.joints import BallJoint, Hinge
-from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
-from wholebody.tracking.scenes import FRAMES_OF_A_SCRIPT
-from wholebody.tracking.scripts import FRAME, script
+from wholebody.tracking.scripts import FRAME, Keys, Place, ScenePlan, standing_at
 from wholebody.tracking.tracks import MOST_FRAMES, Track
-
-Place = tuple[float, float, float]
-Keys = list[tuple[float, Array]]
 
 TOP = 0.75  # m: of the table
 TABLE = (0.8, 0.6, 0.04)  # m: sizes of its top; its middle is at x = y = 0
@@ -67,14 +60,9 @@ class WorldScene:
     see_through: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Plan:
-    about: str
-    figure: str
+@dataclass(frozen=True, kw_only=True)
+class _Plan(ScenePlan):
     put: Callable[[Scene], object]
-    keys: Callable[[Figure], Keys]
-    eye: Place
-    target: Place
 
 
 def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> WorldScene:
@@ -91,18 +79,11 @@ def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt
         InputError: fewer than one frame.
     """
     known(name, _PLANS, "scene")
-    if frames is not None:
-        whole(frames, "frames", 1, MOST_FRAMES)
-    SEED.check(seed, "seed")
-    dt = number(dt, "dt", *FRAMES_OF_A_SCRIPT, "s")
     plan = _PLANS[name]
-    figure = load(plan.figure)
-    track = script(figure, plan.keys(figure), dt=dt, seed=seed, name=name)
-    if frames is not None:
-        track = track.repeated(frames)
+    figure, track = plan.played(name, frames=frames, seed=seed, dt=dt)
     scene = Scene(figure).add(HalfSpace(), name="floor")
     plan.put(scene)
-    return WorldScene(name, plan.about, scene, track, plan.eye, plan.target)
+    return WorldScene(name, plan.about, scene, track, plan.eye, plan.target, plan.see_through)
 
 
 def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> WorldScene:
@@ -274,14 +255,7 @@ def _aside(figure: Figure) -> Keys:
 
 def _walking(figure: Figure, x: float, degrees: Mapping[str, float]) -> Array:
     """The avatar as it stands, with joints at some degrees, at a place along x."""
-    values = {}
-    for name, angle in degrees.items():
-        for joint in (name, f"left_{name}", f"right_{name}"):
-            if joint in figure.joints:
-                values[joint] = math.radians(angle)
-    q = figure.with_joints(figure.posture("standing"), values)
-    q[0] = x
-    return figure.clamp(q)
+    return standing_at(figure, x, 0.0, 0.0, degrees)
 
 
 HANGING = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}  # degrees: arms
@@ -311,31 +285,33 @@ def _walk_through(figure: Figure) -> Keys:
 
 _PLANS: dict[str, _Plan] = {
     "flick": _Plan(
-        "a finger flicks a ball off a table", "hand", _ball_to_flick, _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5)
+        "a finger flicks a ball off a table", "hand", _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5), put=_ball_to_flick
     ),
     "push_ball": _Plan(
-        "a fist pushes a ball along a table", "hand", _ball_to_push, _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5)
+        "a fist pushes a ball along a table", "hand", _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5), put=_ball_to_push
     ),
     "push_box": _Plan(
-        "a fist pushes a box along a table", "hand", _box_to_push, _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72)
+        "a fist pushes a box along a table", "hand", _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72), put=_box_to_push
     ),
     "dominoes": _Plan(
-        "a finger pushes the first of a row of dominoes", "hand", _dominoes, _tap, (0.5, -0.7, 1.15), (0.05, 0.0, 0.76)
+        "a finger pushes the first of a row of dominoes", "hand", _tap, (0.5, -0.7, 1.15), (0.05, 0.0, 0.76),
+        put=_dominoes,
     ),
     "stairs": _Plan(
-        "a ball rolls down stairs; the hand stays aside", "hand", _stairs, _aside, (3.6, -3.4, 1.9), (1.1, 0.0, 0.45)
+        "a ball rolls down stairs; the hand stays aside", "hand", _aside, (3.6, -3.4, 1.9), (1.1, 0.0, 0.45),
+        put=_stairs,
     ),
     "avatar_and_cartons": _Plan(
         "an avatar walks with its hands ahead into two cartons, one on the other, and a ball",
-        "avatar", _things_to_walk_into, _walk_into, (3.4, -3.4, 1.9), (0.5, 0.0, 0.85),
+        "avatar", _walk_into, (3.4, -3.4, 1.9), (0.5, 0.0, 0.85), put=_things_to_walk_into,
     ),
     "door": _Plan(
         "an avatar walks with its hands ahead against a swinging door, and through it",
-        "avatar", _door, _walk_through, (-2.6, 3.0, 2.2), (0.6, 0.0, 0.95),
+        "avatar", _walk_through, (-2.6, 3.0, 2.2), (0.6, 0.0, 0.95), put=_door,
     ),
     "bag": _Plan(
         "an avatar walks with its hands ahead into a bag that hangs from a beam, and back",
-        "avatar", _bag, _walk_into, (3.4, -3.4, 1.9), (0.4, 0.0, 1.1),
+        "avatar", _walk_into, (3.4, -3.4, 1.9), (0.4, 0.0, 1.1), put=_bag,
     ),
 }  # fmt: skip
 

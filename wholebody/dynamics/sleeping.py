@@ -52,12 +52,12 @@ class Sleepers:
         state.velocity[tired] = state.spin[tired] = 0.0
         self._island[tired] = island[tired]
 
-    def wake(self, near: Contacts) -> None:
-        """Wake what is touched by a body that moves."""
-        state = self._state
+    def wake(self, near: Contacts) -> bool:
+        """Wake what is touched by a body that moves; whether anything woke."""
+        state, woke = self._state, False
         asleep = state.pieces.dynamic & ~state.moving
         if not asleep.any():
-            return
+            return False
         body = self._touching(near)
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
         pushing = (speed > STILL) & (state.moving | state.given)
@@ -67,3 +67,5 @@ class Sleepers:
                 woken = asleep & np.isin(self._island, self._island[touched])
                 state.moving |= woken
                 self._slow_for[woken] = 0.0
+                woke = True
+        return woke

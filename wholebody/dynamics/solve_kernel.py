@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 EXACTER = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
@@ -22,6 +22,9 @@ NEARLY = 0.01  # m/s: points without impulse that are nearer to their target tha
 EVERY = 8  # sweeps over the points that bear something between sweeps over all
 ROUGH = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
 MORE = 6  # ... until they are so many times as many
+ALONE = (
+    16  # sweeps over an island between sweeps over all; more = less often whether islands met, fewer sweeps over all
+)
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
@@ -224,6 +227,132 @@ def solve(
                 for row in range(3):
                     way[place, row] = 0.0
     return most
+
+
+@compiled(error_model="numpy", fastmath=FAST)
+def solve_islands(
+    bodies: Indices,
+    jacobian: Array,
+    answer: Array,
+    mobility: Array,
+    friction: Array,
+    target: Array,
+    held: Array,
+    hold: Array,
+    twist: Array,
+    impulse: Array,
+    tolerance: float,
+    visits: int,
+    most: int,
+) -> int:
+    """Solve the program of all points, each island of bodies that bear each other apart; how many sweeps were over all.
+
+    A sweep over all points says which of them bear something, so which bodies are islands, and which islands are not
+    solved yet. Those are solved by themselves, until a sweep over all changes none by more than the tolerance.
+
+    Args:
+        bodies: (m, 2); all arrays and the tolerance are as in `solve`.
+        jacobian: (m, 3, 2, 6).
+        answer: (m, 3, 2, 6).
+        mobility: (m, 2).
+        friction: (m - j,).
+        target: (m - j,).
+        held: (j, 3, 3).
+        hold: (j, 3).
+        twist: (n, 6).
+        impulse: (m, 3).
+        tolerance: m/s.
+        visits: of all points; an island has as many sweeps as that allows them all, and `MORE` times as many where
+            impulses change much.
+        most: sweeps over an island.
+    """
+    count, joints = len(bodies), len(bodies) - len(held)
+    rows, answers = jacobian.reshape(count, 3, 12), answer.reshape(count, 3, 12)
+    across, before, everything = np.zeros((joints, 2)), np.zeros((count, 3)), np.arange(count)
+    movable = np.zeros(len(twist), dtype=np.bool_)
+    for c in range(count):
+        for side in range(2):
+            movable[bodies[c, side]] |= answers[c, 0, 6 * side] != 0.0 or answers[c, 1, 6 * side] != 0.0
+            movable[bodies[c, side]] |= answers[c, 2, 6 * side] != 0.0
+        if c < joints:
+            for k in range(12):
+                across[c, 0] += rows[c, 1, k] * answers[c, 0, k]
+                across[c, 1] += rows[c, 2, k] * answers[c, 0, k]
+    usual = min(most, visits // max(count, 1) + 1)
+    listed, points = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
+    changes, worst = np.zeros(count), np.zeros(len(twist))
+    root, first = np.empty(len(twist), dtype=np.intp), np.empty(len(twist) + 1, dtype=np.intp)
+    swept, sweeps = np.zeros(len(twist), dtype=np.intp), 0
+    while True:
+        change, bearing = 0.0, 0
+        for c in range(joints):
+            if mobility[c, 0] <= 0.0:
+                continue
+            changes[c], _, bears = _visit(
+                c, bodies, rows, answers, mobility, across, friction, target, twist, impulse
+            )  # fmt: skip
+            change = max(change, changes[c])
+            if bears:
+                listed[bearing] = c
+                bearing += 1
+        for c in range(joints, count):
+            if mobility[c, 0] <= 0.0:
+                continue
+            largest, _ = _hold(
+                c, everything[: c + 1], bodies, rows, answers, mobility, held, hold, twist, impulse, before
+            )  # fmt: skip
+            changes[c] = EXACTER * largest
+            change = max(change, changes[c])
+            listed[bearing] = c
+            bearing += 1
+        sweeps += 1
+        if change < tolerance:
+            return sweeps
+        _join(listed[:bearing], bodies, movable, root)
+        first[:] = 0
+        worst[:] = 0.0
+        for c in listed[:bearing]:
+            island = root[bodies[c, 0] if movable[bodies[c, 0]] else bodies[c, 1]]
+            first[island + 1] += 1
+            worst[island] = max(worst[island], changes[c])
+        for island in range(len(twist)):
+            first[island + 1] += first[island]
+        for c in listed[:bearing]:  # in their order within each island; `first` becomes the end of each
+            island = root[bodies[c, 0] if movable[bodies[c, 0]] else bodies[c, 1]]
+            points[first[island]] = c
+            first[island] += 1
+        solved = True
+        for island in range(len(twist)):
+            start = first[island - 1] if island > 0 else 0
+            if worst[island] < tolerance or swept[island] >= min(most, MORE * usual):
+                continue
+            if swept[island] >= usual and worst[island] < ROUGH * tolerance:
+                continue
+            solved = False
+            swept[island] += solve(
+                points[start : first[island]], bodies, jacobian, answer, mobility, friction, target, held, hold, twist,
+                impulse, 0.5 * tolerance, ALONE * count, ALONE,
+            )  # fmt: skip
+        if solved:
+            return sweeps
+
+
+@compiled()
+def _join(points: Indices, bodies: Indices, movable: Mask, root: Indices) -> None:
+    """Write the least body (n,) of the island of each, joined by points; islands do not reach through fixed bodies."""
+    for body in range(len(root)):
+        root[body] = body
+    for c in points:
+        a, b = bodies[c, 0], bodies[c, 1]
+        if not movable[a] or not movable[b]:
+            continue
+        while root[a] != a:
+            a = root[a]
+        while root[b] != b:
+            b = root[b]
+        root[max(a, b)] = min(a, b)
+    for body in range(len(root)):  # lesser bodies know theirs already
+        root[body] = root[root[body]]
 
 
 @compiled(error_model="numpy")

@@ -79,6 +79,7 @@ class StepProgram:
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
+        self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
         self._laid = self._lay(state.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
@@ -117,19 +118,22 @@ class StepProgram:
             joints.lay(state, movable, JointRows(*own))
         return laid
 
-    def meet(self, points: ContactPoints, time: float) -> None:
-        """Add contact points as they are after a step of this time, which led to overlap that no point foresaw.
+    def meet(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
+        """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
 
-        Their gaps become those that lead there with the velocities after the step.
+        Their gaps become those that lead there with the velocities after the step, of this time; they have to last for
+        the share of it only.
         """
         late = StepProgram(self.state, points, self.gravity, self.joints)
         late.look(~self.pushed())
-        gap = points.gap - time * late.speed + 0.5 * late._pull * time**2
+        until = share * time
+        gap = points.gap - until * late.speed + 0.5 * late._pull * until**2
         count, own, laid = len(self.points.gap), late._laid, self._laid
         self._local = np.concatenate([self._local, late._local])
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
         self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
+        self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
         bodies, jacobian, answer, mobility = (
@@ -141,7 +145,8 @@ class StepProgram:
         )  # fmt: skip
         axes = np.concatenate([laid.axes, own.axes])
         self._laid = _Laid(bodies.astype(np.intp), axes, jacobian, answer, mobility, laid.held)
-        self.impulse = np.zeros((len(bodies), 3))
+        # what bears a body is known to the next points that join the step
+        self.impulse = np.concatenate([self.impulse[:count], np.zeros((len(gap), 3)), self.impulse[count:]])
 
     def resolve_impacts(self) -> tuple[Array, bool]:
         """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
@@ -173,7 +178,7 @@ class StepProgram:
         """
         state, points = self.state, self.points
         state.velocity[state.moving] += time * self.gravity
-        target = np.where(points.gap > SKIN, (SKIN - points.gap) / time, 0.0)
+        target = np.where(points.gap > SKIN, (SKIN - points.gap) / np.minimum(time, self._until), 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
         if together:
@@ -202,9 +207,9 @@ class StepProgram:
             )  # fmt: skip
         self.impulse[count:] = start.held
         contact_kernel.apply(laid.bodies, laid.answer, state.twist, self.impulse)
-        solve_kernel.solve(
-            np.arange(len(laid.bodies)), laid.bodies, laid.jacobian, laid.answer, laid.mobility, self._friction, target,
-            laid.held, hold, state.twist, self.impulse, TOLERANCE, VISITS, MOST,
+        solve_kernel.solve_islands(
+            laid.bodies, laid.jacobian, laid.answer, laid.mobility, self._friction, target, laid.held, hold,
+            state.twist, self.impulse, TOLERANCE, VISITS, MOST,
         )  # fmt: skip
         self.residuals = solve_kernel.residuals(
             laid.bodies, laid.jacobian, laid.mobility, self._friction, target, hold, state.twist, self.impulse
@@ -236,10 +241,9 @@ class StepProgram:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
         points, laid = self.points, self._laid
         way = np.zeros_like(self.state.twist)
-        solve_kernel.solve(
-            np.arange(len(laid.bodies)), laid.bodies, laid.jacobian, laid.answer, laid.mobility,
-            np.zeros(len(points.gap)), gap - points.gap, laid.held, -self.joints.off(self.state), way,
-            np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
+        solve_kernel.solve_islands(
+            laid.bodies, laid.jacobian, laid.answer, laid.mobility, np.zeros(len(points.gap)), gap - points.gap,
+            laid.held, -self.joints.off(self.state), way, np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
         )  # fmt: skip
         return way
 

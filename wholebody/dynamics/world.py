@@ -26,10 +26,12 @@ from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.matter.materials import Surface, surface
+from wholebody.methods.newton.assembly_bodies import AssemblyBodies
 from wholebody.moving_things import Collision
 from wholebody.scene import Scene
+from wholebody.tracking.frame import Frame
 from wholebody.tracking.loop import FrameLoop, unreadable
-from wholebody.tracking.recording import Frame
+from wholebody.workspace import OfOneRun
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen
 
@@ -66,7 +68,7 @@ class WorldFrame(NamedTuple):
     note: str
 
 
-class World:
+class World(OfOneRun):
     """A figure that follows a tracker among things, some of which move by themselves.
 
     Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`). The
@@ -104,10 +106,7 @@ class World:
             InputError: no posture near the start is free, or two things overlap of which one moves by itself.
             UnknownNameError: another overlap.
         """
-        self.scene, self.dt = (
-            instance(scene, Scene, "World: scene", "make one with wb.Scene(figure)"),
-            time_step(dt, "dt"),
-        )
+        self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
         instance(spring, (Spring, type(None)), "World: spring", "give wb.Spring(mass=0.4), or leave it out")
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
@@ -211,3 +210,11 @@ class World:
     def _check_fresh(self) -> None:
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the world was made; make the world anew")
+
+
+def _scene_instead(given: object) -> str:
+    """What to do where no scene was given."""
+    mend = "make one with wb.Scene(figure)"
+    if isinstance(given, AssemblyBodies):
+        mend += "; an assembly has no motion of its own: add its bodies as things with wb.Body(joints=...)"
+    return mend

@@ -23,6 +23,16 @@ LARGEST = 1e6
 HEAVIEST = 1e12
 """Kilograms: greatest mass carried by one joint."""
 
+_LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
+"""Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it."""
+
+
+def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
+    """A figure that was pickled."""
+    for name, values in limits.items():
+        setattr(made_from[1], name, values)
+    return Figure(*made_from)
+
 
 def check_model(model: pin.Model, name: str) -> None:
     """Refuse a model with impossible numbers, which would lead to postures with NaN.
@@ -58,7 +68,7 @@ def check_model(model: pin.Model, name: str) -> None:
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
-class Figure:
+class Figure(checks.Settled):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
     It never changes, so any number of scenes and threads may share one. It can be pickled and copied.
@@ -86,6 +96,9 @@ class Figure:
         effort_weights: (nv,) weight of each degree of freedom in the effort.
         neutral_weights: (nv,) weight of each degree of freedom in the displacement from neutral: 1, and 0 for the root.
     """
+
+    _settable = frozenset({"loaded_as"})
+    _mend = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
         self,
@@ -143,8 +156,11 @@ class Figure:
             name: dict(part) if isinstance(part, Mapping) else part for name, part in as_dict(self._description).items()
         }
         visual = None if self.visual is self.geometry else self.visual
-        made_from = (self.name, self.model, self.geometry, self.detail, Description(**known), visual)
-        return Figure, made_from, {"loaded_as": self.loaded_as}
+        made_from = (self.name, pin.Model(self.model), self.geometry, self.detail, Description(**known), visual)
+        limits = {name: np.array(getattr(self.model, name)) for name in _LIMITS}
+        for name, values in limits.items():
+            setattr(made_from[1], name, np.nan_to_num(values))
+        return _with_limits, (made_from, limits), {"loaded_as": self.loaded_as}
 
     @property
     def joints(self) -> tuple[str, ...]:

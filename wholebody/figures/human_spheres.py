@@ -1,7 +1,8 @@
 """The 39 spheres in five groups that whole motions are tested with (Degenhardt's thesis, section 3.3.1).
 
-Layout and radii are estimates calibrated on ANSUR II; for other builds the radius grows with the square root of mass
-per stature. The detail is coarse: fingertips are up to 1 cm and palms 3 cm inside it, so use another one for reaching.
+Places and radii leave the least volume of the median man's and woman's capsules and boxes uncovered, and put the least
+outside of them; for other builds the radius grows with the square root of mass per stature. The detail is coarse:
+fingertips come up to 3 cm out of it, so use another one for reaching.
 """
 
 from __future__ import annotations

@@ -93,6 +93,7 @@ def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
             raise FileFormatError(
                 f"{path}: joint {shown(model.names[joint.id])} has a lower limit above the upper; mend it"
             )
+    model.lowerPositionLimit, model.upperPositionLimit = limits[0] + 0.0, limits[1] + 0.0  # no negative zeros
     return model, meshes
 
 

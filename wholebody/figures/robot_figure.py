@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 import pinocchio as pin
@@ -117,7 +118,12 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
 
 
 def geometry_of_links(
-    model: pin.Model, shapes: Iterable[LinkShape], concavity: Concavity, path: Path, named: bool = False
+    model: pin.Model,
+    shapes: Iterable[LinkShape],
+    concavity: Concavity,
+    path: Path,
+    named: bool = False,
+    colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
 ) -> tuple[pin.GeometryModel, tuple[str, ...]]:
     """Return the convex pieces of links, and one sentence on each change.
 
@@ -127,6 +133,7 @@ def geometry_of_links(
         concavity: see `link_pieces`.
         path: of the file, for errors.
         named: whether a piece has the name of its shape in the file, and not "<link>:<k>".
+        colors: link to red, green, blue, alpha; the pieces of other links have the colour of a robot.
 
     Raises:
         FileFormatError: a mesh that cannot be read, with the link.
@@ -150,6 +157,7 @@ def geometry_of_links(
                 frame.placement * shape.placement * placement,
                 solid,
             )
-            piece.meshColor[:] = COLOR
+            piece.meshColor[:] = colors.get(shape.link, COLOR)
+            piece.overrideMaterial = shape.link in colors  # Pinocchio's sign that a viewer shall use this colour
             made.append(piece)
     return geometry_model(made), tuple(notes)

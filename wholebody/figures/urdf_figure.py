@@ -53,7 +53,9 @@ def urdf_figure(
     model, remarks = urdf_model(urdf, root)
     check_size(model, urdf.path)
     hollows = check_concavity(concavity, urdf.links)
-    geometry, notes = geometry_of_links(model, urdf.shapes, hollows, urdf.path, named=extension is not None)
+    geometry, notes = geometry_of_links(
+        model, urdf.shapes, hollows, urdf.path, named=extension is not None, colors=urdf.colors
+    )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
     return robot_figure(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), samples, seed)

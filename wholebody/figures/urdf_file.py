@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError
+from wholebody.checks import color, shown
+from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.mesh_search import find_mesh
 from wholebody.figures.urdf_joints import UrdfJoint, read_joints
@@ -29,6 +29,7 @@ class UrdfFile(NamedTuple):
         inertials: link to its ``<inertial>`` element.
         joints: in the order of the file.
         shapes: collision shapes in the order of the file.
+        colors: link to red, green, blue, alpha of the first of its visuals that has a colour.
         extension: the element `EXTENSION`, or None.
         notes: one sentence for each missing part that was filled in.
     """
@@ -39,6 +40,7 @@ class UrdfFile(NamedTuple):
     inertials: dict[str, Element]
     joints: tuple[UrdfJoint, ...]
     shapes: tuple[LinkShape, ...]
+    colors: dict[str, tuple[float, float, float, float]]
     extension: Element | None
     notes: tuple[str, ...]
 
@@ -71,7 +73,37 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     shapes = tuple(shape for link in robot.findall("link") for shape in _shapes(link, path, tuple(package_dirs)))
     ordered = (root, *(name for name in links if name != root))
     name = robot.get("name") or path.stem
-    return UrdfFile(path, name, ordered, inertials, joints, shapes, robot.find(EXTENSION), notes)
+    colors, remarks = _colors(robot)
+    return UrdfFile(
+        path, name, ordered, inertials, joints, shapes, colors, robot.find(EXTENSION), (*notes, *remarks)
+    )  # fmt: skip
+
+
+def _colors(robot: Element) -> tuple[dict[str, tuple[float, float, float, float]], list[str]]:
+    """Colours of links, and one sentence on each material that has none; no robot is refused for one."""
+    named: dict[str, tuple[float, float, float, float]] = {}
+    notes = []
+    materials = [*robot.findall("material"), *robot.findall("link/visual/material")]
+    own = {}
+    for material in materials:
+        element = material.find("color")
+        if element is None:
+            continue
+        name, text = material.get("name") or "", element.get("rgba", "")
+        try:
+            own[material] = color(tuple(float(part) for part in text.split()), "rgba")
+        except (ValueError, InputError):
+            notes.append(f"material {shown(name)}: rgba={shown(text)} is no colour, so it is left out")
+            continue
+        named.setdefault(name, own[material])
+    colors = {}
+    for link in robot.findall("link"):
+        painted = [own.get(one, named.get(one.get("name") or "")) for one in link.findall("visual/material")]
+        # what is wholly transparent in the file is still a body that touches, so it keeps the usual colour
+        seen = [one for one in painted if one is not None and one[3] > 0.0]
+        if seen:
+            colors[str(link.get("name"))] = seen[0]
+    return colors, notes
 
 
 def _links(robot: Element, path: Path) -> tuple[str, ...]:

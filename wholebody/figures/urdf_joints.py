@@ -164,6 +164,9 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
         value = bounded(limit, what, place, 1, most=1e20)[0]
         if value < 0.0:
             raise FileFormatError(f"{place} has the {what} limit {value:g}; give a number that is not negative")
+        if what == "velocity" and value == 0.0:  # exporters write 0 where no speed was stated
+            notes.append(f"joint {shown(name)}: its velocity limit is 0, which is read as none")
+            value = np.inf
         speeds.append(value)
     return lower, upper, speeds[0], speeds[1]
 

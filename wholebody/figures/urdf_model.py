@@ -170,5 +170,6 @@ def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:
             velocity[made.idx_v], effort[made.idx_v] = joint.velocity, joint.effort
             if made.nq == 1:
                 lower[made.idx_q], upper[made.idx_q] = joint.lower, joint.upper
-    model.lowerPositionLimit, model.upperPositionLimit = lower, upper
+    # adding 0.0 makes -0.0 to 0.0: numpy draws no random number between 0.0 and -0.0
+    model.lowerPositionLimit, model.upperPositionLimit = lower + 0.0, upper + 0.0
     model.velocityLimit, model.effortLimit = velocity, effort

@@ -76,8 +76,7 @@ class Box(Shape):
     size: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        x, y, z = check_vector(self.size, "Box size")
-        object.__setattr__(self, "size", tuple(check_length(side, "Box size") for side in (x, y, z)))
+        object.__setattr__(self, "size", _lengths(self.size, "Box size"))
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Box."""
@@ -198,6 +197,11 @@ class Torus(Shape):
         return sum(piece.volume for piece in self.pieces()) / exact - 1.0
 
 
+def _lengths(value: object, what: str) -> tuple[float, ...]:
+    """Three lengths, metres."""
+    return tuple(check_length(length, what) for length in check_vector(value, what))
+
+
 def around(radius: float, sides: int) -> Array:
     """Corners (sides, 2) of the regular polygon around a circle."""
     angles = 2.0 * math.pi * np.arange(sides) / sides
@@ -215,8 +219,7 @@ class Ellipsoid(Shape):
     semi_axes: tuple[float, float, float]
 
     def __post_init__(self) -> None:
-        axes = check_vector(self.semi_axes, "Ellipsoid semi_axes")
-        object.__setattr__(self, "semi_axes", tuple(check_length(axis, "Ellipsoid semi_axes") for axis in axes))
+        object.__setattr__(self, "semi_axes", _lengths(self.semi_axes, "Ellipsoid semi_axes"))
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Ellipsoid."""

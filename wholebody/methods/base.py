@@ -20,7 +20,7 @@ from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
-from wholebody.workspace import Workspace
+from wholebody.workspace import OfOneRun, Workspace
 
 
 class Step(Protocol):
@@ -163,7 +163,7 @@ class SolvedStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class SolvingTracker:
+class SolvingTracker(OfOneRun):
     """Follows goals by solving the problem anew at every step from the present posture, without velocity bounds.
 
     Attributes:
@@ -232,6 +232,18 @@ class SolvingTracker:
         )  # fmt: skip
         asked.clearances = now.clearances
         return asked
+
+
+class SolvesAnew:
+    """Base of methods that follow goals by solving the problem anew at every step."""
+
+    def tracker(self: Method, problem: Problem, dt: float) -> SolvingTracker:
+        """A tracker that solves the problem anew at every step.
+
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
+        """
+        return SolvingTracker(self, problem, dt)
 
 
 def judged(workspace: Workspace, motion: FrameMotion, before: Array, after: Array) -> tuple[Collision, ...]:

@@ -24,7 +24,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State, Wrench
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
+from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
@@ -38,7 +38,7 @@ RANK = 1e-8  # squared singular values below this share of the largest count as 
 
 
 @dataclass(frozen=True)
-class DampedLeastSquares:
+class DampedLeastSquares(SolvesAnew):
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
@@ -103,14 +103,6 @@ class DampedLeastSquares:
             caveat="contacts are not seen by this method",
         )
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
-
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """A tracker that solves the problem anew at every step; contacts are ignored.
-
-        Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
-        """
-        return SolvingTracker(self, problem, dt)
 
 
 class _Descent:

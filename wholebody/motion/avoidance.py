@@ -60,6 +60,8 @@ class AvoidanceReport:
         before: the check of the clip as it was.
         after: the check of the answer.
         loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
+        beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
+            held at there, metres; 0 where nothing does.
     """
 
     solved: bool
@@ -76,6 +78,7 @@ class AvoidanceReport:
     before: ClipCheck
     after: ClipCheck
     loads: LoadChange | None = None
+    beside: float = 0.0
 
     def __str__(self) -> str:
         """Three lines: what is left, before and after, and what it took."""
@@ -190,7 +193,7 @@ def avoid(
         chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
     strong = getattr(chosen, "dynamics", None)
     stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
-    terms = frame_terms(scene, clip.q, clip.dt, given)
+    terms = frame_terms(scene, clip.q, clip.dt, given, getattr(chosen, "clearance", 0.0))
     began = time.perf_counter()
     result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began
@@ -250,12 +253,15 @@ def _report(
         fast = now.speeds[0] if now.speeds else None
         if fast is not None:
             message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
+    if terms.beside:
+        away = f"{1e3 * terms.beside:.3g} mm"
+        message += f"; parts held at each other are too near in the clip: they are held up to {away} beside"
     if loads is not None:
         message += f"; {loads}"
     changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
         solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
-        after.duration, times, was, now, loads,
+        after.duration, times, was, now, loads, terms.beside,
     )  # fmt: skip
 
 

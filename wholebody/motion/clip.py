@@ -15,7 +15,7 @@ from wholebody.checks import array, instance, number, shown, text, time_step
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.mirroring import mirrored
-from wholebody.tracking.tracks import LARGEST, MOST_FRAMES, UNIT_TOLERANCE, Track, check_figure
+from wholebody.tracking.tracks import MOST_FRAMES, UNIT_TOLERANCE, Track, check_figure, check_frames
 
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
@@ -55,13 +55,7 @@ class Clip:
                 f"{self.name}: q has shape {q.shape}; give 1 to {MOST_FRAMES} frames of the {wanted} values of "
                 f"{self.figure.name}"
             )
-        bad = np.argwhere(~(np.abs(q) <= LARGEST))
-        if len(bad):
-            frame, column = (int(k) for k in bad[0])
-            raise InputError(
-                f"{self.name}: frame {frame}, {column_name(self.figure, column)} is {q[frame, column]:g}; {len(bad)} "
-                f"values are not finite or beyond {LARGEST:g}; mend or cut those frames"
-            )
+        check_frames(q, self.name, lambda column: column_name(self.figure, column))
         q = self._normalised(q)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)

@@ -60,7 +60,7 @@ class Fade:
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)
-        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
+        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints, self.clearance), Watch(progress)
         q, fade, solves, programs = np.array(clip.q), max(1, round(self.fade / clip.dt)), 0, 0
         total = np.inf
         with scene.borrow() as workspace:

@@ -2,12 +2,12 @@
 
 A term that refers to the start ("as at the start") refers to the original posture of its own frame. So
 `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has, `Hold("left_foot")` keeps the foot
-where it was in that frame, and `Freeze("root")` keeps the root's motion.
+where it was in that frame, and `Freeze("root")` keeps the root's motion. A grip that overlaps itself is kept beside.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
@@ -18,6 +18,7 @@ from wholebody.arrays import Array
 from wholebody.checks import a, listed
 from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.motion.grips import grip_shifts
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
@@ -52,6 +53,8 @@ class FrameTerms:
         given: the terms as they were given, without `StanceFeet`.
         stands: for each frame, frames of the feet that stand there and are held.
         shifts: for each frame, by how much each of them is held beside where it was (3,), metres.
+        grips: for the numbers of given terms that hold a frame at another one, in each frame the shift of the grip
+            (n, 3) beside where it was, metres, in the axes of the other one; without those that are not shifted.
     """
 
     scene: Scene
@@ -60,15 +63,31 @@ class FrameTerms:
     given: tuple[Constraint | Goal | Bound, ...]
     stands: tuple[tuple[str, ...], ...]
     shifts: tuple[tuple[Array, ...], ...]
+    grips: Mapping[int, Array] = field(default_factory=dict)
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
         """Constraints and goals of a frame, resolved at its original posture."""
         if frame not in self._held:
-            terms: list[HeldTerm] = [term for term in self.given if not isinstance(term, Bound)]
+            terms: list[HeldTerm] = [term for term in self.asked(frame) if not isinstance(term, Bound)]
             resolved = [term.resolve(self.scene, self.q[frame]) for term in (*terms, *self.feet(frame))]
             self._held[frame] = tuple(resolved)
         return self._held[frame]
+
+    def asked(self, frame: int) -> tuple[Constraint | Goal | Bound, ...]:
+        """The given terms of a frame, with grips where they are kept."""
+        terms = list(self.given)
+        for number, shift in self.grips.items():
+            grip = terms[number]
+            if isinstance(grip, Hold) and shift[frame].any():
+                at = grip.resolve(self.scene, self.q[frame]).kept_at
+                terms[number] = replace(grip, at=pin.SE3(at.rotation, at.translation + shift[frame]))
+        return tuple(terms)
+
+    @property
+    def beside(self) -> float:
+        """The largest shift of a grip, metres."""
+        return max((float(np.linalg.norm(shift, axis=1).max()) for shift in self.grips.values()), default=0.0)
 
     def feet(self, frame: int) -> tuple[Hold, ...]:
         """What holds the feet that stand in a frame, where each of them is held."""
@@ -125,7 +144,12 @@ class FrameTerms:
         places = np.asarray(times) / self.dt
         nearest = np.clip(np.rint(places).astype(int), 0, len(self.q) - 1)
         stands, shifts = (tuple(each[frame] for frame in nearest) for each in (self.stands, self.shifts))
-        return replace(self, q=between(self.scene.model, self.q, places), stands=stands, shifts=shifts)
+        frames = np.arange(len(self.q))
+        grips = {
+            number: np.stack([np.interp(places, frames, axis) for axis in shift.T], axis=1)
+            for number, shift in self.grips.items()
+        }
+        return replace(self, q=between(self.scene.model, self.q, places), stands=stands, shifts=shifts, grips=grips)
 
     def missed(self, frame: int, state: State) -> float:
         """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
@@ -152,7 +176,7 @@ class FrameTerms:
         return any(not isinstance(term, Bound) for term in self.given) or any(map(bool, self.stands))
 
 
-def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given]) -> FrameTerms:
+def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given], clearance: float = 0.0) -> FrameTerms:
     """Check what is to hold, and find the feet that stand.
 
     Args:
@@ -160,6 +184,7 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given])
         q: (n, nq) original postures.
         dt: seconds from frame to frame.
         constraints: terms.
+        clearance: least distance of every pair that is asked for, metres; grips that are nearer are held beside.
 
     Raises:
         InputError: something else than a constraint, a goal, a bound or `StanceFeet`.
@@ -183,7 +208,13 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given])
             )
     plain = tuple(term for term in given if not isinstance(term, StanceFeet))
     stands = tuple(map(tuple, feet))
-    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands))
+    found = {
+        number: grip_shifts(scene, q, dt, term, clearance)
+        for number, term in enumerate(plain)
+        if isinstance(term, Hold) and term.at is None and term.relative_to is not None
+    }
+    grips = {number: shift for number, shift in found.items() if shift.any()}
+    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips)
 
 
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:

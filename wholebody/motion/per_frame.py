@@ -59,7 +59,7 @@ class PerFrame:
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)
-        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
+        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints, self.clearance), Watch(progress)
         q = np.array(clip.q)
         with scene.borrow() as workspace:
             _, wrong, gaps = faults(workspace, terms, q, self.clearance)

@@ -10,7 +10,7 @@ from wholebody.checks import shown
 from wholebody.errors import UnknownNameError
 from wholebody.files import is_file
 from wholebody.methods import METHODS
-from wholebody.taskfile.kinds import PLACEMENT, POSITION, Choice, Flag, Kind, Number, Text
+from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Kind, Number, Text
 from wholebody.taskfile.reading import read_toml
 from wholebody.taskfile.where import Where
 
@@ -36,21 +36,7 @@ class StudyFile:
     warm_start: bool
 
 
-class _Places(Kind):
-    """Placements by thing."""
-
-    @property
-    def words(self) -> str:
-        """Return how it is written."""
-        return "{ thing = [x, y, z], ... }, m"
-
-    def read(self, value: Any, where: Where) -> dict[str, Any]:
-        """Return the placements."""
-        if not isinstance(value, dict) or not value:
-            raise where.fault(f"{shown(value)} is not {self.words}; write the things that move")
-        return {name: PLACEMENT.read(at, where.at(name)) for name, at in value.items()}
-
-
+_PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _PERSON: dict[str, Kind] = {
     "sex": Choice(("male", "female")),
     "stature": Number(1.3, 2.2, "m"),
@@ -115,7 +101,7 @@ def _person(entry: dict[str, Any], where: Where) -> dict[str, Any]:
 
 
 def _layout(entry: dict[str, Any], where: Where) -> dict[str, Any]:
-    found: dict[str, Any] = _only(entry, where, "move", _Places())
+    found: dict[str, Any] = _only(entry, where, "move", _PLACES)
     return found
 
 

@@ -232,40 +232,45 @@ class Several(Kind):
 
 
 @dataclass(frozen=True)
-class Joints(Kind):
-    """Values of joints by name."""
+class ByName(Kind):
+    """Values by name, which whoever uses them looks up.
+
+    Attributes:
+        kind: of the values.
+        what: the names, such as "dimensions".
+        example: a name and a value as they are written.
+        unit: of the values.
+    """
+
+    kind: Kind
+    what: str
+    example: str
+    unit: str
 
     @property
     def words(self) -> str:
         """Return how it is written."""
-        return "{ joint = value, ... }, rad (m for sliding joints)"
+        return f"{{ {self.example}, ... }}, {self.unit}"
 
-    def read(self, value: Any, where: Where) -> dict[str, float]:
+    def read(self, value: Any, where: Where) -> dict[str, Any]:
         """Return the values by name."""
         if not isinstance(value, dict) or not value:
-            raise where.fault(f"{shown(value)} is not a table of joints; write {{ joint_name = 0.5 }}")
+            raise where.fault(f"{shown(value)} is not a table of {self.what}; write {{ {self.example} }}")
+        return {name: self.kind.read(entry, where.at(name)) for name, entry in value.items()}
+
+
+class Joints(ByName):
+    """Values of joints by name."""
+
+    def __init__(self) -> None:
+        """Radians, and metres of sliding joints."""
         number = Number(-2.0 * math.pi, 2.0 * math.pi, "rad")
-        return {name: number.read(entry, where.at(name)) for name, entry in value.items()}
+        super().__init__(number, "joints", "left_elbow_flexion = 0.5", "rad (m for sliding joints)")
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:
         """Look the joints up."""
         for name in value:
             JOINT.names(name, figure, where.at(name))
-
-
-class Proportions(Kind):
-    """Dimensions of a person by name."""
-
-    @property
-    def words(self) -> str:
-        """Return how it is written."""
-        return "{ sitting_height = 0.93, ... }, m"
-
-    def read(self, value: Any, where: Where) -> dict[str, float]:
-        """Return the dimensions by name; the figure looks the names up."""
-        if not isinstance(value, dict) or not value:
-            raise where.fault(f"{shown(value)} is not a table of dimensions; write {{ sitting_height = 0.93 }}")
-        return {name: LENGTH.read(entry, where.at(name)) for name, entry in value.items()}
 
 
 @dataclass(frozen=True)
@@ -327,5 +332,6 @@ GROUP = Name(
 FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.joints})
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
+PROPORTIONS = ByName(LENGTH, "dimensions", "sitting_height = 0.93", "m")
 CONE = Name("reach cone", lambda figure: figure.cones)
 RANGE = Name("range of motion", lambda figure: figure.ranges)

@@ -24,6 +24,14 @@ def _weight(unit: str) -> Key:
 
 
 _THING = kinds.Text()
+_MOVES = Key("frame", FRAME, "the frame that moves", True)
+_TURNS = Key("frame", FRAME, "the frame that turns", True)
+_HELD = Key("frame", FRAME, "the frame that is held", True)
+_ORIENTATION = Key("orientation", kinds.Flag(), "false leaves the frame free to turn; true if left out")
+_MARGIN = Key("margin", Number(0.0, 0.5, "m"), "distance from the edges of the polygon; 0 if left out")
+_TOLERANCE = Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out")
+_ITERATIONS = Key("iterations", _number(ITERATIONS), "most iterations")
+_TIME_LIMIT = Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer")
 
 CONTACTS = {
     "touch": Form(
@@ -78,7 +86,7 @@ GOALS = {
     "point": Form(
         "Move a point of a frame to a position.",
         (
-            Key("frame", FRAME, "the frame that moves", True),
+            _MOVES,
             Key("target", POSITION, "the position, in the world", True),
             Key("offset", POSITION, "the point in the frame's axes; its origin if left out"),
             _weight("1/m^2"),
@@ -88,7 +96,7 @@ GOALS = {
     "frame": Form(
         "Move a frame to a position and an orientation.",
         (
-            Key("frame", FRAME, "the frame that moves", True),
+            _MOVES,
             Key("target", PLACEMENT, "the placement, in the world", True),
             _weight("1/m^2, 1/rad^2"),
         ),
@@ -97,7 +105,7 @@ GOALS = {
     "orientation": Form(
         "Turn a frame to an orientation; its position is free.",
         (
-            Key("frame", FRAME, "the frame that turns", True),
+            _TURNS,
             Key("target", QUATERNION, "the orientation, in the world", True),
             _weight("1/rad^2"),
         ),
@@ -106,7 +114,7 @@ GOALS = {
     "axis": Form(
         "Turn an axis of a frame into a direction, or towards a point, such as a gaze or a palm.",
         (
-            Key("frame", FRAME, "the frame that turns", True),
+            _TURNS,
             Key("axis", DIRECTION, "in the frame's axes", True),
             Key("direction", DIRECTION, "in the world; this or toward"),
             Key("toward", POSITION, "a point in the world; this or direction"),
@@ -126,10 +134,10 @@ GOALS = {
     "relative": Form(
         "Move a frame to a placement relative to another frame, such as two hands on one box.",
         (
-            Key("frame", FRAME, "the frame that moves", True),
+            _MOVES,
             Key("to", FRAME, "the frame that it is placed relative to", True),
             Key("placement", PLACEMENT, "in the axes of `to`; as at the start if left out"),
-            Key("orientation", kinds.Flag(), "false leaves the frame free to turn; true if left out"),
+            _ORIENTATION,
             _weight("1/m^2, 1/rad^2"),
         ),
         tasks.Relative,
@@ -150,9 +158,9 @@ CONSTRAINTS = {
     "hold": Form(
         "Keep a frame at a placement, in the world or relative to another frame.",
         (
-            Key("frame", FRAME, "the frame that is held", True),
+            _HELD,
             Key("at", PLACEMENT, "its placement; as at the start if left out"),
-            Key("orientation", kinds.Flag(), "false leaves the frame free to turn; true if left out"),
+            _ORIENTATION,
             Key("relative_to", FRAME, "the frame that `at` is relative to; the world if left out"),
         ),
         tasks.Hold,
@@ -160,7 +168,7 @@ CONSTRAINTS = {
     "plane": Form(
         "Keep a frame in a plane, or on one side of it.",
         (
-            Key("frame", FRAME, "the frame that is held", True),
+            _HELD,
             Key("normal", DIRECTION, "of the plane, in the world", True),
             Key("point", POSITION, "in the plane; the frame's position at the start if left out"),
             Key("side", kinds.Choice(("on", "above")), "above lets it move along the normal; on if left out"),
@@ -171,7 +179,7 @@ CONSTRAINTS = {
         "Keep the centre of mass above the support polygon of the feet at the start; hold the feet as well.",
         (
             Key("feet", kinds.Several(kinds.SEGMENT), "segments that stand on the ground; both feet if left out"),
-            Key("margin", Number(0.0, 0.5, "m"), "distance from the edges of the polygon; 0 if left out"),
+            _MARGIN,
         ),
         tasks.Balance,
     ),
@@ -196,7 +204,7 @@ CONSTRAINTS = {
             Key("on", _THING, "what the figure stands on", True),
             Key("feet", kinds.Several(kinds.SEGMENT), "segments whose soles stand; both feet if left out"),
             Key("balance", kinds.Flag(), "false for who also sits, leans or holds on; true if left out"),
-            Key("margin", Number(0.0, 0.5, "m"), "distance from the edges of the polygon; 0 if left out"),
+            _MARGIN,
         ),
         tasks.Stand,
     ),
@@ -227,13 +235,13 @@ METHODS = {
         (
             Key("solver", kinds.Text(), 'QP solver: "osqp" if left out, "active_set", or one `wholebody doctor` lists'),
             Key("hot_start", kinds.Flag(), "whether the last active set is tried before the solver; true if left out"),
-            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
+            _TOLERANCE,
             Key("iterations", _number(ITERATIONS), "most iterations of one descent"),
             Key("budget", _number(BUDGET), "quadratic programs for further descents; 1000 if left out"),
             Key("restarts", _number(RESTARTS), "most further descents"),
             Key("seed", _number(SEED), "of the starts of further descents"),
             Key("measures", kinds.Flag(), "whether to minimise the measures; false is faster, true if left out"),
-            Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer"),
+            _TIME_LIMIT,
         ),
         _later("QP"),
     ),
@@ -244,41 +252,41 @@ METHODS = {
             Key("iterations", _number(ITERATIONS), "most sweeps from one start"),
             Key("restarts", _number(RESTARTS), "most further starts"),
             Key("seed", _number(SEED), "of those starts"),
-            Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer"),
+            _TIME_LIMIT,
         ),
         _later("CCD"),
     ),
     "newton": Form(
         "Sparse Newton in full coordinates; least effort.",
         (
-            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", _number(ITERATIONS), "most iterations"),
+            _TOLERANCE,
+            _ITERATIONS,
             Key("algebra", kinds.Text(), '"auto" (if left out), "normal", "llt", "kkt", "schur", "dense" or "svd"'),
             Key(
                 "inequalities",
                 kinds.Choice(("slack", "barrier")),
                 "treatment of limits and contacts; slack if left out",
             ),
-            Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer"),
+            _TIME_LIMIT,
         ),
         _later("Newton"),
     ),
     "placo": Form(
         "placo's differential inverse kinematics, iterated; to compare with.",
         (
-            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", _number(ITERATIONS), "most iterations"),
-            Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer"),
+            _TOLERANCE,
+            _ITERATIONS,
+            _TIME_LIMIT,
         ),
         _later("Placo"),
     ),
     "dls": Form(
         "Damped least squares, the textbook baseline; it ignores contacts.",
         (
-            Key("tolerance", _number(TOLERANCE), "metres and radians to which goals are met; 1e-5 if left out"),
-            Key("iterations", _number(ITERATIONS), "most iterations"),
+            _TOLERANCE,
+            _ITERATIONS,
             Key("damping", _number(DAMPING), "remaining damping when the goals are met; 1e-3 if left out"),
-            Key("time_limit", Number(1e-9, 1e9, "s"), "limit of time; then the best posture so far is the answer"),
+            _TIME_LIMIT,
         ),
         _later("DampedLeastSquares"),
     ),

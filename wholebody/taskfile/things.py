@@ -15,7 +15,7 @@ _PERCENTILE = Key("percentile", Number(1.0, 99.0), "of the sex in ANSUR II, for 
 _HANDS = Key("hands", kinds.Choice(("rigid", "fingers")), "one segment each, or fingers; rigid if left out")
 _BODY = (_SEX, _STATURE, _MASS, _PERCENTILE)
 _OWN = (
-    Key("proportions", kinds.Proportions(), "dimensions of ANSUR II that are met; the others follow"),
+    Key("proportions", kinds.PROPORTIONS, "dimensions of ANSUR II that are met; the others follow"),
     Key("age", Number(20.0, 69.0), "in years: from 45 on some ranges of motion are smaller"),
 )
 

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from wholebody.arrays import Array
-from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Measure, Surroundings, filled
-from wholebody.tasks.distance import SquaredDistance
+from wholebody.tasks.base import Surroundings, filled
+from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
 @dataclass(frozen=True, eq=False)
-class Displacement(Measure):
+class Displacement(DistanceMeasure):
     """Squared displacement of every joint from the neutral posture, weighted by joint [rad^2].
 
     ``sum_i w_i (q_i - q_i_neutral)^2``, the joint displacement of Abdel-Malek and Arora 2013 ("Human Motion Simulation:
@@ -34,15 +33,3 @@ class Displacement(Measure):
         """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
         return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
-
-    def value(self, state: State) -> float:
-        """The displacement [rad^2]."""
-        return self.distance.value(state)
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) derivative [rad]."""
-        return self.distance.gradient(state)
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) second derivative; exact for joints of one degree of freedom."""
-        return self.distance.curvature

@@ -1,4 +1,4 @@
-"""Weighted squared distance of a posture from another, with its derivatives."""
+"""Weighted squared distance of a posture from another, with its derivatives, and the measures that are one."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
+from wholebody.tasks.base import Measure
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
@@ -50,3 +51,25 @@ class SquaredDistance(NamedTuple):
         if self.straight:
             return np.asarray(force)
         return np.asarray(force @ pin.dDifference(state.model, self.reference, state.q, pin.ARG1))
+
+
+class DistanceMeasure(Measure):
+    """A measure that is a weighted squared distance from a posture.
+
+    Attributes:
+        distance: the posture, and the weight of every degree of freedom; once resolved.
+    """
+
+    distance: SquaredDistance
+
+    def value(self, state: State) -> float:
+        """The distance [rad^2]."""
+        return self.distance.value(state)
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative [rad]."""
+        return self.distance.gradient(state)
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) second derivative; exact for joints of one degree of freedom."""
+        return self.distance.curvature

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
@@ -40,7 +41,29 @@ class PlacementGoal(Goal):
 
 
 @dataclass(frozen=True, eq=False)
-class Frame(PlacementGoal):
+class _FrameGoal(PlacementGoal):
+    """A frame and its target in the world, checked."""
+
+    frame: str
+    target: PlacementLike
+    _: KW_ONLY
+    weight: float = 1.0
+    resolved_target: Any = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        where = f"{type(self).__name__}({shown(self.frame)})"
+        object.__setattr__(self, "resolved_target", self._placed(f"{where}: target"))
+        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+
+    @abstractmethod
+    def _placed(self, where: str) -> Any:
+        """The target as a pin.SE3; `where` begins the sentence of an error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Frame(_FrameGoal):
     """Move a frame to a position and an orientation.
 
     The error is the position of the frame minus the target [m], then the rotation vector from the target's orientation
@@ -59,18 +82,8 @@ class Frame(PlacementGoal):
         InputError: the target is none of these, or not in metres.
     """
 
-    frame: str
-    target: PlacementLike
-    _: KW_ONLY
-    weight: float = 1.0
-    resolved_target: Any = field(init=False, repr=False)
-    residual: PlacementResidual = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Frame({shown(self.frame)})"
-        object.__setattr__(self, "resolved_target", inputs.target_placement(self.target, f"{where}: target"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+    def _placed(self, where: str) -> Any:
+        return inputs.target_placement(self.target, where)
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
@@ -79,7 +92,7 @@ class Frame(PlacementGoal):
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation(PlacementGoal):
+class Orientation(_FrameGoal):
     """Turn a frame to an orientation; its position is free.
 
     The error is the rotation vector from the target to the frame, in world axes [rad].
@@ -95,18 +108,10 @@ class Orientation(PlacementGoal):
         InputError: the target is not a rotation.
     """
 
-    frame: str
     target: ArrayLike
-    _: KW_ONLY
-    weight: float = 1.0
-    resolved_target: Any = field(init=False, repr=False)
-    residual: PlacementResidual = field(init=False, repr=False)
 
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Orientation({shown(self.frame)})"
-        object.__setattr__(self, "resolved_target", inputs.target_rotation(self.target, f"{where}: target"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+    def _placed(self, where: str) -> Any:
+        return inputs.target_rotation(self.target, where)
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""

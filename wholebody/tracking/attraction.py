@@ -10,11 +10,11 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.tasks.base import Bound, Measure
-from wholebody.tasks.distance import SquaredDistance
+from wholebody.tasks.base import Bound
+from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
-class Attraction(Measure):
+class Attraction(DistanceMeasure):
     """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
 
     Its unconstrained minimum is the tracked posture itself, which one program reaches in one step without contact. In
@@ -24,29 +24,17 @@ class Attraction(Measure):
 
     def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
         """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
-        self._distance = SquaredDistance.build(model, q, weights)
-        self._weights = self._distance.weights.copy()
+        self.distance = SquaredDistance.build(model, q, weights)
+        self._weights = self.distance.weights.copy()
 
     def toward(self, q: Array) -> None:
         """Attract to another posture (nq,)."""
-        self._distance.reference[:] = q
+        self.distance.reference[:] = q
 
     def weigh(self, factors: Array) -> None:
         """Multiply the weights of the beginning by factors (nv,), which are positive."""
-        np.multiply(self._weights, factors, out=self._distance.weights)
-        np.multiply(2.0, self._distance.weights, out=self._distance.curvature)
-
-    def value(self, state: State) -> float:
-        """The squared distance."""
-        return self._distance.value(state)
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) its derivative."""
-        return self._distance.gradient(state)
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) its second derivative; exact for joints of one degree of freedom."""
-        return self._distance.curvature
+        np.multiply(self._weights, factors, out=self.distance.weights)
+        np.multiply(2.0, self.distance.weights, out=self.distance.curvature)
 
 
 class Pace(Bound):

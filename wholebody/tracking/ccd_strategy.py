@@ -8,7 +8,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene import Scene
-from wholebody.tracking.overlap_strategy import Resolution
+from wholebody.tracking.frame import Resolution
 
 NOTED = 1e-3
 """Remaining depth, metres, from which a frame's note reports it."""

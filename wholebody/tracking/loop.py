@@ -29,11 +29,12 @@ from wholebody.records import with_values
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction
-from wholebody.tracking.overlap_strategy import OverlapStrategy, Resolution
+from wholebody.tracking.frame import Frame, OverlapStrategy, Resolution
 from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
-from wholebody.tracking.recording import Frame, Recording
+from wholebody.tracking.recording import Recording
 from wholebody.tracking.scripts import FRAME
 from wholebody.tracking.tracks import UNIT_TOLERANCE, Track
+from wholebody.workspace import OfOneRun
 
 OVERLAPS = ("qp", "ccd")
 
@@ -50,7 +51,7 @@ def check_scene(scene: object, what: str) -> None:
     instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
-class FrameLoop:
+class FrameLoop(OfOneRun):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import array, number, shown, time_step, whole
+from wholebody.checks import array, is_number, number, shown, time_step, whole
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.files import read_text
@@ -66,7 +66,7 @@ def read_path(path: str | os.PathLike[str]) -> Array:
     text = read_text(path, "path")
     lines = [Line(number, said.partition("#")[0].strip()) for number, said in enumerate(text.splitlines(), start=1)]
     lines = [line for line in lines if line.text]
-    if lines and not any(_is_number(word) for word in _words(lines[0].text)):
+    if lines and not any(is_number(word) for word in _words(lines[0].text)):
         lines = lines[1:]
     places = [_place(path, line) for line in lines]
     if not places:
@@ -104,17 +104,9 @@ def _words(text: str) -> list[str]:
     return text.replace(",", " ").replace(";", " ").split()
 
 
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True
-
-
 def _place(path: Path, line: Line) -> list[float]:
     words, where = _words(line.text), f"{path}, line {line.number}"
-    if len(words) != 3 or not all(map(_is_number, words)):
+    if len(words) != 3 or not all(map(is_number, words)):
         raise FileFormatError(f"{where}: {shown(line.text)} is not a place; give x y z in metres")
     values = [float(word) for word in words]
     if not all(abs(value) <= LARGEST for value in values):

@@ -15,7 +15,7 @@ from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction, Pace
 from wholebody.tracking.entanglement import Entanglement
-from wholebody.tracking.overlap_strategy import Resolution
+from wholebody.tracking.frame import Resolution
 
 CLEARANCE = 1e-3
 """Clearance of pieces, metres. A step is exact to first order only; the clearance must exceed its error."""

@@ -4,45 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.moving_things import Collision
+from wholebody.tracking.frame import Frame
 
 Counts = NDArray[np.intp]
-
-
-class Frame(NamedTuple):
-    """One frame.
-
-    Attributes:
-        q: (nq,) the shown posture, free of overlap unless the note says otherwise.
-        seconds: wall time of the frame, without drawing.
-        cpu_seconds: the processor's time, without waiting for other work on a shared machine.
-        contact_seconds: the part of it for collision queries.
-        solve_seconds: the part of it for joint angles (or, for a rigid figure, its displacement).
-        iterations: programs solved, passes of CCD with a goal made anew, or displacements.
-        joints: number of joints adjusted for contact, counted once for each iteration that adjusted them, as the joints
-            per frame of table 2 of Schmidl and Lin; 0 if the figure is displaced as a whole.
-        pairs: number of pairs of pieces that were kept apart or separated.
-        note: "" or a report of unusual events.
-        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
-    """
-
-    q: Array
-    seconds: float
-    cpu_seconds: float
-    contact_seconds: float
-    solve_seconds: float
-    iterations: int
-    joints: int
-    pairs: int
-    note: str
-    collisions: tuple[Collision, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.geometry.penetration import global_depth
 from wholebody.scene import Scene
-from wholebody.tracking.overlap_strategy import Resolution
+from wholebody.tracking.frame import Resolution
 
 STEP = 0.01
 """Largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's top, a finger), so

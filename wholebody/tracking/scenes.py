@@ -7,25 +7,18 @@ environments" (table 2, figures 2, 5, 7 and 8), without their balls.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import known, number, whole
-from wholebody.figures import load
+from wholebody.checks import known
 from wholebody.figures.figure import Figure
-from wholebody.methods.inputs import SEED
 from wholebody.scene import Scene
 from wholebody.tracking import rooms
-from wholebody.tracking.scripts import FRAME, script
-from wholebody.tracking.tracks import MOST_FRAMES, Track
-
-Place = tuple[float, float, float]
-Keys = list[tuple[float, Array]]
-
-FRAMES_OF_A_SCRIPT = (1e-3, 1.0)  # s: least and greatest time step
+from wholebody.tracking.scripts import FRAME, Keys, Place, ScenePlan, standing_at
+from wholebody.tracking.tracks import Track
 
 
 @dataclass(frozen=True)
@@ -53,16 +46,6 @@ class InteractionScene:
     see_through: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class _Plan:
-    about: str
-    figure: str
-    keys: Callable[[Figure], Keys]
-    eye: Place
-    target: Place
-    see_through: tuple[str, ...] = ()
-
-
 def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> InteractionScene:
     """Build a scene of `SCENES`.
 
@@ -77,17 +60,11 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
         InputError: fewer than one frame.
     """
     known(name, _PLANS, "scene")
-    if frames is not None:
-        whole(frames, "frames", 1, MOST_FRAMES)
-    SEED.check(seed, "seed")
-    dt = number(dt, "dt", *FRAMES_OF_A_SCRIPT, "s")
     plan = _PLANS[name]
-    figure = load(plan.figure)
-    track = script(figure, plan.keys(figure), dt=dt, seed=seed, name=name)
-    if frames is not None:
-        track = track.repeated(frames)
+    figure, track = plan.played(name, frames=frames, seed=seed, dt=dt)
+    scene = rooms.gallery(figure)
     return InteractionScene(
-        name, plan.about, rooms.gallery(figure), track, plan.figure == "hand", plan.eye, plan.target, plan.see_through
+        name, plan.about, scene, track, plan.figure == "hand", plan.eye, plan.target, plan.see_through
     )
 
 
@@ -144,18 +121,6 @@ def _hand_in_corner(figure: Figure) -> Keys:
 # ---- the avatar: its position, and the motion of its limbs
 
 
-def _avatar(figure: Figure, x: float, y: float, yaw: float, degrees: Mapping[str, float]) -> Array:
-    """Standing at (x, y), turned by yaw, some joints at other angles; a name without a side means both sides."""
-    values = {}
-    for name, angle in degrees.items():
-        for joint in (name, f"left_{name}", f"right_{name}"):
-            if joint in figure.joints:
-                values[joint] = math.radians(angle)
-    q = figure.with_joints(figure.posture("standing"), values)
-    q[0], q[1], q[3:7] = x, y, (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
-    return figure.clamp(q)
-
-
 _READY = {"shoulder_flexion": 35.0, "elbow_flexion": 60.0, "shoulder_abduction": 14.0}
 _REACHING = {"shoulder_flexion": 85.0, "elbow_flexion": 12.0, "shoulder_abduction": 10.0, "wrist_flexion": -35.0}
 
@@ -164,7 +129,7 @@ def _two_arms(figure: Figure) -> Keys:
     wall = -rooms.LENGTH
 
     def at(distance: float, arms: Mapping[str, float], y: float = 0.2) -> Array:
-        return _avatar(figure, wall + distance, y, math.pi, arms)
+        return standing_at(figure, wall + distance, y, math.pi, arms)
 
     high = {**_REACHING, "shoulder_flexion": 105.0, "neck1_rotation": 25.0}
     low = {**_REACHING, "shoulder_flexion": 60.0, "neck1_flexion": 20.0}
@@ -187,7 +152,7 @@ def _two_arms(figure: Figure) -> Keys:
 
 def _self_collision(figure: Figure) -> Keys:
     def at(degrees: Mapping[str, float]) -> Array:
-        return _avatar(figure, -2.5, -0.3, math.pi, degrees)
+        return standing_at(figure, -2.5, -0.3, math.pi, degrees)
 
     aside = {"shoulder_flexion": 40.0, "elbow_flexion": 85.0, "shoulder_abduction": 25.0}
     hand_in = {**aside, "right_shoulder_rotation": 65.0, "right_shoulder_flexion": 15.0, "right_elbow_flexion": 95.0}
@@ -218,7 +183,7 @@ def _two_arms_and_leg(figure: Figure) -> Keys:
     wall = -rooms.LENGTH
 
     def at(distance: float, degrees: Mapping[str, float], y: float = -0.3) -> Array:
-        return _avatar(figure, wall + distance, y, math.pi, degrees)
+        return standing_at(figure, wall + distance, y, math.pi, degrees)
 
     step = {**_REACHING, "right_hip_flexion": 75.0, "right_knee_flexion": 35.0}
     kick = {**_REACHING, "shoulder_flexion": 75.0, "right_hip_flexion": 60.0, "right_knee_flexion": 5.0}
@@ -245,7 +210,7 @@ def _arm_in_corner(figure: Figure) -> Keys:
             "right_shoulder_flexion": flexion, "right_shoulder_abduction": abduction, "right_elbow_flexion": elbow,
             "right_wrist_flexion": 10.0,
         }  # fmt: skip
-        return _avatar(figure, rooms.LENGTH + x, y, 0.0, arm)
+        return standing_at(figure, rooms.LENGTH + x, y, 0.0, arm)
 
     return [
         (0.0, at(-1.20, -0.25, 30.0, 12.0, 50.0)),
@@ -263,28 +228,28 @@ def _arm_in_corner(figure: Figure) -> Keys:
     ]
 
 
-_PLANS: dict[str, _Plan] = {
-    "hand_on_table": _Plan(
+_PLANS: dict[str, ScenePlan] = {
+    "hand_on_table": ScenePlan(
         "a hand is moved along a table to and fro, pressed into it, with moving fingers",
         "hand", _hand_on_table, (-2.75, 0.25, 1.25), (-2.5, 1.1, 0.76), ("table",),
     ),
-    "hand_in_corner": _Plan(
+    "hand_in_corner": ScenePlan(
         "a hand is pressed along one wall, into the corner with another, and along that one",
         "hand", _hand_in_corner, (-3.9, 1.1, 1.9), (-4.8, 2.2, 1.35), ("west wall", "north wall"),
     ),
-    "two_arms": _Plan(
+    "two_arms": ScenePlan(
         "an avatar walks into a wall with both arms ahead, three times",
         "avatar", _two_arms, (-2.7, -2.2, 1.9), (-4.5, 0.2, 1.0), ("west wall",),
     ),
-    "self_collision": _Plan(
+    "self_collision": ScenePlan(
         "an avatar's hands are moved through its torso, and its arms through each other",
         "avatar", _self_collision, (-5.0, -1.3, 1.9), (-2.6, -0.3, 1.1), ("west wall",),
     ),
-    "two_arms_and_leg": _Plan(
+    "two_arms_and_leg": ScenePlan(
         "an avatar steps into a wall with both arms and a leg ahead",
         "avatar", _two_arms_and_leg, (-2.4, -2.2, 1.8), (-4.5, -0.3, 0.95), ("west wall",),
     ),
-    "arm_in_corner": _Plan(
+    "arm_in_corner": ScenePlan(
         "an avatar stretches an arm into the corner of two walls",
         "avatar", _arm_in_corner, (2.9, 1.3, 2.1), (4.6, -0.5, 1.1), ("east wall", "niche"),
     ),

@@ -2,22 +2,66 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.checks import number, whole
+from wholebody.figures import load
 from wholebody.figures.figure import Figure
-from wholebody.tracking.tracks import Track
+from wholebody.methods.inputs import SEED
+from wholebody.tracking.tracks import MOST_FRAMES, Track
+
+Place = tuple[float, float, float]
+Keys = list[tuple[float, Array]]
 
 FRAME = 1.0 / 60.0  # s: of a display
+TIME_STEPS = (1e-3, 1.0)  # s: least and greatest from frame to frame
 TREMOR = 2e-3  # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
 STILL = ("hip", "knee", "ankle", "toe")
 """Parts of the names of joints without tremor, because the feet stand on the floor."""
 TREMOR_BAND = (0.3, 2.0)  # Hz
 WAVES = 5
+
+
+@dataclass(frozen=True)
+class ScenePlan:
+    """What a scene with a scripted tracker is made of.
+
+    Attributes:
+        about: one sentence.
+        figure: name of the figure.
+        keys: the script of a figure; see `script`.
+        eye: position of the camera, metres.
+        target: the point in the middle of the picture, metres.
+        see_through: things to draw transparent.
+    """
+
+    about: str
+    figure: str
+    keys: Callable[[Figure], Keys]
+    eye: Place
+    target: Place
+    see_through: tuple[str, ...] = ()
+
+    def played(self, name: str, *, frames: int | None, seed: int, dt: float) -> tuple[Figure, Track]:
+        """The figure, and the script as its track; cut or repeated to a number of frames, unless that is None.
+
+        Raises:
+            InputError: fewer than one frame, or a seed or a time step out of range.
+        """
+        if frames is not None:
+            whole(frames, "frames", 1, MOST_FRAMES)
+        SEED.check(seed, "seed")
+        dt = number(dt, "dt", *TIME_STEPS, "s")
+        figure = load(self.figure)
+        track = script(figure, self.keys(figure), dt=dt, seed=seed, name=name)
+        return figure, track if frames is None else track.repeated(frames)
 
 
 def script(
@@ -41,6 +85,21 @@ def script(
         for s in np.arange(1, count + 1) / count:
             frames.append(np.asarray(pin.interpolate(figure.model, before, after, smooth(float(s)))))
     return Track.of(figure, _trembling(figure, np.array(frames), dt, np.random.default_rng(seed)), dt, name)
+
+
+def standing_at(figure: Figure, x: float, y: float, yaw: float, degrees: Mapping[str, float]) -> Array:
+    """The figure as it stands, at (x, y) and turned by yaw, some joints at other angles.
+
+    A name of a joint without a side means both sides.
+    """
+    values = {}
+    for name, angle in degrees.items():
+        for joint in (name, f"left_{name}", f"right_{name}"):
+            if joint in figure.joints:
+                values[joint] = math.radians(angle)
+    q = figure.with_joints(figure.posture("standing"), values)
+    q[0], q[1], q[3:7] = x, y, (0.0, 0.0, math.sin(0.5 * yaw), math.cos(0.5 * yaw))
+    return figure.clamp(q)
 
 
 def smooth(s: float) -> float:

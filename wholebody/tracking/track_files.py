@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.checks import instance, known, shown
+from wholebody.checks import instance, is_number, known, shown
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
@@ -74,7 +74,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         try:
             rows.append([float(value) for value in line])
         except ValueError:
-            wrong = next(value for value in line if not _is_number(value))
+            wrong = next(value for value in line if not is_number(value))
             raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
         places.append(number)
     if len(rows) < 2:
@@ -104,11 +104,3 @@ def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:
                 yield reader.line_num, line
     except csv.Error as error:
         raise FileFormatError(f"{path.name}, line {reader.line_num}: is no CSV ({error})") from None
-
-
-def _is_number(word: str) -> bool:
-    try:
-        float(word)
-    except ValueError:
-        return False
-    return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +21,26 @@ UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; mor
 ROOT_SIZE = 7
 LARGEST = 1e6  # of a value, radians or metres
 MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more would be gigabytes
+
+
+def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
+    """Check the values of frames.
+
+    Args:
+        q: (frames, columns) values.
+        what: what they are of, in the sentence.
+        place: what a column is called.
+
+    Raises:
+        InputError: a value is not finite or far too large; the frame is named.
+    """
+    bad = np.argwhere(~(np.abs(q) <= LARGEST))
+    if len(bad):
+        frame, column = (int(k) for k in bad[0])
+        raise InputError(
+            f"{what}: frame {frame}, {place(column)} is {q[frame, column]:g}; {len(bad)} values are not finite or "
+            f"beyond {LARGEST:g}; mend or cut those frames"
+        )
 
 
 def check_figure(figure: object, what: str) -> Figure:
@@ -69,13 +89,7 @@ class Track:
                 f"{self.name}: {q.shape[1]} values a frame do not fit {len(self.joints)} joints; give one value "
                 "for each joint, after seven for a free root"
             )
-        bad = np.argwhere(~(np.abs(q) <= LARGEST))
-        if len(bad):
-            frame, column = (int(k) for k in bad[0])
-            raise InputError(
-                f"{self.name}: frame {frame}, {self._place(q.shape[1], column)} is {q[frame, column]}; {len(bad)} "
-                f"values are not finite or beyond {LARGEST:g}; mend or cut those frames"
-            )
+        check_frames(q, self.name, lambda column: self._place(q.shape[1], column))
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
 

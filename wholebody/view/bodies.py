@@ -83,7 +83,7 @@ class Bodies:
         names = scene.model.names
         for piece, owner in zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True):
             thing = owner if owner in numbers else None
-            color = self._thing_color(thing, numbers[thing], piece) if thing is not None else style.FIGURE
+            color = self._thing_color(thing, numbers[thing], piece) if thing is not None else _own_color(piece)
             folder = f"{style.OBJECT_NODE}/{node(thing)}" if thing is not None else style.FIGURE_NODE
             carrier = f"{folder}/{node(names[piece.parentJoint])}"
             piece.geometry.computeLocalAABB()  # coal computes the box only on request
@@ -208,7 +208,11 @@ class Bodies:
 
     def corners(self, data: Any, *, things: bool) -> Array:
         """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no plates, no glass."""
-        solid = [index for index, body in enumerate(self.all) if not body.plate and body.color[3] == 1.0]
+        solid = [
+            index
+            for index, body in enumerate(self.all)
+            if body.thing is None or (not body.plate and body.color[3] == 1.0)
+        ]
         chosen = [index for index in solid if (self.all[index].thing is not None) == things]
         return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
 
@@ -243,6 +247,14 @@ class Bodies:
         local = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
         place = data.oMi[self.all[index].joint] * piece.placement
         return np.asarray(local @ place.rotation.T + place.translation)
+
+
+def _own_color(piece: Any) -> Color:
+    """The colour that a robot's file gives the link of a piece, and otherwise that of figures."""
+    if not piece.overrideMaterial:
+        return style.FIGURE
+    red, green, blue, alpha = (float(part) for part in piece.meshColor)
+    return red, green, blue, alpha
 
 
 def node(name: str) -> str:

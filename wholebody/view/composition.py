@@ -12,6 +12,7 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import style
 from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
@@ -91,6 +92,10 @@ class Composition:
         contacts = self.scene.contacts(q, within=self._contact_distance)
         color_contacts(keyframe, bodies, contacts)
         mark_contacts(keyframe, bodies, contacts)
+        keyframe.looked = self._contact_distance >= 0.0
+        keyframe.overlapping = int(np.sum(contacts.distance < -PENETRATION))
+        keyframe.touching = len(contacts.distance) - keyframe.overlapping
+        keyframe.overlap = max(0.0, -float(np.min(contacts.distance, initial=0.0)))
         self._goals = Goals(self.scene, problem) if problem is not None else None
         if self._goals is not None:
             self._goals.mark(keyframe, state)

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.proximity import PENETRATION
@@ -60,6 +61,16 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
         if row < LABELLED:
             text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
             keyframe.markers[f"{root}/text"] = (text, _at(origin + out * length))
+
+
+def checked_overlaps(given: object, what: str) -> list[Overlap]:
+    """Overlaps of an argument of this name.
+
+    Raises:
+        InputError: they are none.
+    """
+    found = checks.listed(given, what, "frame.overlaps")
+    return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
 
 def _at(point: Array) -> Array:

@@ -8,8 +8,9 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 from wholebody.checks import number
 from wholebody.checks import path as checked_path
@@ -55,6 +56,16 @@ def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[l
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
     fps = number(fps, "fps", SLOWEST, 100.0, "pictures per second")
     return [number / fps for number in range(math.floor((count - 1) * dt * fps + 1e-9) + 1)], fps
+
+
+def counted(
+    pictures: Iterable[bytes], total: int, progress: Callable[[int, int], Any] | None
+) -> Iterator[bytes]:  # fmt: skip
+    """The pictures, and a call with the numbers of drawn and of all ones after each."""
+    for drawn, picture in enumerate(pictures, start=1):
+        yield picture
+        if progress is not None:
+            progress(drawn, total)
 
 
 def movie(suffix: str, pictures: Iterable[bytes], fps: float) -> bytes:

@@ -3,10 +3,11 @@
 "use strict";
 (function () {
   const THREE = MeshCat.THREE;
-  const viewer = new MeshCat.Viewer(document.getElementById("meshcat-pane"));
+  const pane = document.getElementById("meshcat-pane");
+  const viewer = new MeshCat.Viewer(pane, pane.dataset.still === undefined); // a page for pictures draws when asked to
   const obey = viewer.handle_command.bind(viewer);
   const labels = new Map();
-  const page = { ready: false, seek: seek, play: play };
+  const page = { ready: false, seek: seek, play: play, bytes: bytes, resize: resize };
   window.viewer = viewer;
   window.wholebody = page;
 
@@ -87,6 +88,26 @@
     sprite.userData.text = cmd.text;
     labels.set(cmd.path, sprite);
     viewer.set_object(cmd.path.split("/").filter(x => x), sprite);
+  }
+
+  // The title, one line about the picture, and the meaning of its colours.
+  function panel(cmd) {
+    const box = document.getElementById("panel");
+    const line = (kind, text) => {
+      const made = document.createElement(kind);
+      made.textContent = text;
+      box.appendChild(made);
+      return made;
+    };
+    box.replaceChildren();
+    box.style.display = "block";
+    line("b", cmd.title);
+    line("span", cmd.status);
+    for (const [meaning, red, green, blue] of cmd.legend) {
+      const patch = document.createElement("i");
+      patch.style.background = `rgb(${red}, ${green}, ${blue})`;
+      line("span", meaning).prepend(patch);
+    }
   }
 
   // Bones follow nodes of the scene; some turn half way between two others. Bodies are bent by them.
@@ -190,11 +211,23 @@
     draw();
   };
 
+  let drawn = null; // width and height of a page for pictures
+  const fit = viewer.set_3d_pane_size.bind(viewer);
+  viewer.set_3d_pane_size = () => drawn ? fit(...drawn) : fit(); // meshcat calls it when the window changes
+  function resize(width, height) {
+    drawn = [width, height];
+    pane.style.display = "none"; // a picture is read from its canvas: nothing of it goes to a screen
+    fit(width, height);
+  }
+  function bytes(text) {
+    return Uint8Array.from(atob(text), c => c.charCodeAt(0));
+  }
+
   // Look at a target: from `eye`, or from `direction`, so far away that every one of `points` is in the picture.
   function look(cmd) {
     const target = three(cmd.target);
-    const aspect = window.innerWidth / window.innerHeight;
-    const up = Math.tan(cmd.fov * Math.PI / 360), side = up * aspect;
+    const [width, height] = drawn || [window.innerWidth, window.innerHeight];
+    const up = Math.tan(cmd.fov * Math.PI / 360), side = up * width / height;
     let eye;
     if (cmd.eye) {
       eye = three(cmd.eye);
@@ -229,6 +262,7 @@
     else if (cmd.type === "look") look(cmd);
     else if (cmd.type === "skeleton") skeleton(cmd);
     else if (cmd.type === "skin") skin(cmd);
+    else if (cmd.type === "panel") panel(cmd);
     else obey(cmd);
     if (cmd.type === "set_animation") show_bar(cmd.animations.length > 0);
     viewer.set_dirty();
@@ -308,7 +342,7 @@
   dress();
   const picture = document.getElementById("picture");
   if (picture) {
-    page.take(Uint8Array.from(atob(picture.textContent.trim()), c => c.charCodeAt(0)));
+    page.take(bytes(picture.textContent.trim()));
     page.ready = true;
   } else {
     connect();

@@ -25,10 +25,16 @@ body {{ margin: 0; background: #dfe3e7; }}
   background: rgba(255,255,255,.85); font: 13px "Helvetica Neue", Arial, sans-serif; color: #333a42; }}
 #bar button {{ width: 32px; height: 28px; border: 0; border-radius: 6px; background: #4f6f94; color: #fff; }}
 #bar input {{ flex: 1; }}
+#panel {{ display: none; position: fixed; left: 14px; top: 14px; max-width: 40vw; padding: 8px 12px;
+  border-radius: 10px; pointer-events: none; background: rgba(255,255,255,.8); color: #333a42;
+  font: 13px "Helvetica Neue", Arial, sans-serif; }}
+#panel b, #panel span {{ display: block; }}
+#panel i {{ display: inline-block; width: 10px; height: 10px; margin-right: 7px; border-radius: 3px; }}
 </style>
 </head>
 <body>
-<div id="meshcat-pane"></div>
+<div id="meshcat-pane"{still}></div>
+<div id="panel"></div>
 <div id="bar">
 <button title="play or pause"></button><input type="range" min="0" max="1000" value="0"><span></span>
 </div>
@@ -56,9 +62,16 @@ def static_page(commands: list[Command], title: str = "wholebody") -> str:
     return _page(title, f'<script id="picture" type="application/octet-stream">{data}</script>')
 
 
-def _page(title: str, picture: str) -> str:
+def picture_page() -> str:
+    """HTML of an empty page for `Screenshots`: it gets its commands from outside, and draws only when asked to."""
+    return _page("wholebody", '<script id="picture" type="application/octet-stream"></script>', " data-still")
+
+
+def _page(title: str, picture: str, still: str = "") -> str:
     script = (Path(__file__).with_name("page.js")).read_text(encoding="utf-8")
-    return _TEMPLATE.format(title=html.escape(title), picture=picture, meshcat=_meshcat_script(), page=script)
+    return _TEMPLATE.format(
+        title=html.escape(title), still=still, picture=picture, meshcat=_meshcat_script(), page=script
+    )
 
 
 @lru_cache(maxsize=1)

@@ -1,13 +1,17 @@
-"""Pictures of pages by one headless browser, which is started when it is first needed."""
+"""Pictures of the drawing by one headless browser: its page stays open, and gets only what changed since the last."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import base64
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
 from wholebody.checks import listed, shown, whole
 from wholebody.errors import InputError
+from wholebody.view import commands, style
 from wholebody.view.browser import Browser
+from wholebody.view.page import picture_page
+from wholebody.view.server import ANIMATION, CAMERA, OBJECT, Command, Store, bundle
 
 LARGEST = 8192  # pixels: limit of software renderers
 
@@ -24,37 +28,92 @@ def check_size(size: Any) -> tuple[int, int]:
     return whole(given[0], "the width of size", 16, LARGEST), whole(given[1], "the height of size", 16, LARGEST)
 
 
+def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
+    """The commands among the wanted ones that a page lacks; None where it must be built anew.
+
+    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes.
+
+    Args:
+        before: what the page shows.
+        wanted: the commands that build the wanted picture in an empty page, in order.
+    """
+    after = Store()
+    for command in wanted:
+        after.apply(command)
+    for path, node in before.nodes.items():
+        now = after.nodes.get(path)
+        if now is None or not node.properties.keys() <= now.properties.keys():
+            return None
+        body = path.startswith((style.FIGURE_NODE, style.GHOST_NODE))
+        if (node.object is not None and (now.object is None or (body and now.object != node.object))) or (
+            node.transform is not None and now.transform is None
+        ):
+            return None
+    found = [commands.stop_animation()] if before.animation not in (None, after.animation) else []
+    remade = {command.path for command in wanted if command.op == OBJECT and not before.has(command)}
+    for command in wanted:
+        if command.op == ANIMATION:
+            if command.payload != before.animation:
+                found.append(command)
+        elif command.op == CAMERA or command.path in remade or not before.has(command):
+            found.append(command)
+    return found
+
+
 class Screenshots:
-    """A headless browser that takes pictures of pages."""
+    """A headless browser that takes pictures."""
 
     def __init__(self) -> None:
         """Prepare; the first picture starts the browser."""
         self._browser: Browser | None = None
+        self._shown: Store | None = None
 
-    def picture(self, page: str, size: Any) -> bytes:
-        """PNG of a page (HTML) of this width and height.
+    def picture(self, wanted: Sequence[Command], size: Any) -> bytes:
+        """PNG of what these commands draw in an empty page, of this width and height.
 
         Raises:
             InputError: the size is out of range.
             MissingPackageError: there is no Chromium.
         """
-        return self._open(page, size).capture()
+        return self._draw(wanted, size).capture()
 
-    def pictures(self, page: str, size: Any, times: Iterable[float]) -> Iterator[bytes]:
-        """PNGs of a page at these times of its motion, seconds; raises like `picture`, before the first."""
-        browser = self._open(page, size)
+    def pictures(self, wanted: Sequence[Command], size: Any, times: Iterable[float]) -> Iterator[bytes]:
+        """PNGs at these times of a motion, seconds; raises like `picture`, before the first."""
+        browser = self._draw(wanted, size)
         return (browser.capture(f"wholebody.seek({time!r})") for time in times)
+
+    def page(self, page: str, size: Any) -> bytes:
+        """PNG of a page (HTML) that has its scene in it; raises like `picture`."""
+        browser = self._sized(size)
+        self._shown = None
+        browser.open_html(page)
+        return browser.capture()
 
     def close(self) -> None:
         """End the browser. Calling it again does nothing."""
         if self._browser is not None:
             self._browser.close()
-        self._browser = None
+        self._browser = self._shown = None
 
-    def _open(self, page: str, size: Any) -> Browser:
+    def _sized(self, size: Any) -> Browser:
         width, height = check_size(size)
         if self._browser is None:
             self._browser = Browser()
         self._browser.resize((width, height))
-        self._browser.open_html(page)
         return self._browser
+
+    def _draw(self, wanted: Sequence[Command], size: Any) -> Browser:
+        """Bring the page to what the commands draw."""
+        browser, before = self._sized(size), self._shown
+        self._shown = None  # until all is drawn: after an error the next picture begins anew
+        lacking = None if before is None else changes(before, wanted)
+        if lacking is None or before is None:
+            browser.open_html(picture_page())
+            before, lacking = Store(), list(wanted)
+        data = base64.b64encode(bundle([command.payload for command in lacking])).decode("ascii")
+        width, height = check_size(size)
+        browser.evaluate(f"wholebody.resize({width}, {height}); wholebody.take(wholebody.bytes('{data}')); 0")
+        for command in lacking:
+            before.apply(command)
+        self._shown = before
+        return browser

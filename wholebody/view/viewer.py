@@ -7,7 +7,7 @@ import math
 import os
 import sys
 import webbrowser
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -26,8 +26,10 @@ from wholebody.problem import Problem
 from wholebody.view import style
 from wholebody.view.camera import look
 from wholebody.view.composition import Composition
+from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.gltf import posture_glb
-from wholebody.view.movie import check_movie, frame_times, movie
+from wholebody.view.legend import panel
+from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
@@ -43,8 +45,8 @@ class Viewer:
     """Shows a scene: the posture, ghosts, contacts and penetrations, goals and their errors.
 
     Nothing is started until it is needed: `open` or `url` start the live page, `picture` and `movie` a headless
-    Chromium, `save` neither. In the page's controls every folder (figure, objects, contacts, goals, names, ghosts) can
-    be switched off.
+    Chromium, `save` neither. The page tells its title, what is shown, and what the colours mean. In its controls every
+    folder (figure, objects, contacts, goals, names, ghosts) can be switched off.
 
     Pieces nearer than `contact_distance` to each other are orange, and penetrating pieces red; things are tinted,
     half-spaces keep their colour. A blue arrow is a contact's normal, from the first piece to the second; a dark red
@@ -71,7 +73,7 @@ class Viewer:
 
         Args:
             scene: a `wholebody.Scene`, or an assembly whose bodies have shapes; its posture is `assembly.q`.
-            contact_distance: pieces nearer than this are shown as touching, metres.
+            contact_distance: pieces nearer than this are shown as touching, metres; negative: those deeper than it.
             see_through: names of things to draw transparent, so that they do not hide the figure.
             names: whether to write the names of things beside them.
             title: of the browser's tab.
@@ -120,13 +122,14 @@ class Viewer:
             InputError: q has the wrong shape or is not finite, or overlaps are none.
         """
         self._composition.pieces = checks.flag(pieces, "pieces")
-        marked = _overlaps(overlaps, "overlaps")
+        marked = checked_overlaps(overlaps, "overlaps")
         posture = self._composition.checked(q)
-        blockers = assess(problem, posture).blockers if isinstance(problem, Problem) else ()
-        keyframe = self._composition.keyframe(posture, problem, blockers, marked)
+        found = assess(problem, posture) if isinstance(problem, Problem) else None
+        keyframe = self._composition.keyframe(posture, problem, found.blockers if found else (), marked)
         self._seen, self._motion, self._shown = [posture], None, (posture, problem)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
+        self._graph.do(panel(self.title, [keyframe], DEFAULT_DT, found))
         self._graph.show(keyframe)
 
     def play(
@@ -161,10 +164,9 @@ class Viewer:
             raise InputError(
                 f"overlaps has {len(marked)} entries and the motion {len(postures)} postures; give as many"
             )
-        marked = [_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
-        keyframes = [
-            self._composition.keyframe(q, problem, overlaps=here) for q, here in zip(postures, marked, strict=True)
-        ]
+        marked = [checked_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
+        made = self._composition.keyframe
+        keyframes = [made(q, problem, overlaps=here) for q, here in zip(postures, marked, strict=True)]
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
             self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST)
@@ -172,6 +174,7 @@ class Viewer:
         chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
         self._seen = [postures[index] for index in chosen]
         self._graph.do(self._camera_command())
+        self._graph.do(panel(self.title, keyframes, step))
         self._graph.play(keyframes, step, repeat)
 
     def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
@@ -324,16 +327,20 @@ class Viewer:
             MissingPackageError: there is no Chromium.
         """
         place = check_writable(checks.path(path, "path"))
-        page = static_page([command for command in self._commands() if command.op != ANIMATION])
-        return write(place, self._screenshots.picture(page, size))
+        wanted = [command for command in self._commands() if command.op != ANIMATION]
+        return write(place, self._screenshots.picture(wanted, size))
 
-    def movie(self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None) -> Path:
+    def movie(
+        self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None, *,
+        progress: Callable[[int, int], Any] | None = None,
+    ) -> Path:  # fmt: skip
         """Write the last played motion as a GIF or an MP4, by the ending of the path.
 
         Args:
             path: of the file.
             size: width and height, pixels.
             fps: pictures per second; by default the motion's own, at most 25 in a GIF and 30 in an MP4.
+            progress: called after each picture with the numbers of drawn and of all pictures.
 
         Returns:
             The path.
@@ -342,13 +349,14 @@ class Viewer:
             InputError: no motion is shown, the ending is another, or a number is out of range.
             MissingPackageError: there is no Chromium, or no ffmpeg for an MP4.
         """
-        page = static_page(self._commands())
+        wanted, told = self._commands(), checks.function(progress, "movie: progress")
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
         count, dt = self._motion
         place = check_writable(check_movie(path))
         times, fps = frame_times(place, count, dt, fps)
-        return write(place, movie(place.suffix, self._screenshots.pictures(page, size, times), fps))
+        drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), told)
+        return write(place, movie(place.suffix, drawn, fps))
 
     def close(self) -> None:
         """End the live page's server and the headless browser. Calling it again does nothing."""
@@ -390,9 +398,3 @@ def _seconds(timeout: object) -> float:
     if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
         return timeout
     return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
-
-
-def _overlaps(given: object, what: str) -> list[Overlap]:
-    """Overlaps, checked."""
-    found = checks.listed(given, what, "frame.overlaps")
-    return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]

@@ -16,18 +16,10 @@ from wholebody.bench.adapters.starts import Restarted, movable, restarted, start
 
 
 @pytest.fixture(scope="module")
-def shelf() -> wb.Problem:
+def shelf(standing_before: Callable[..., wb.Problem]) -> wb.Problem:
     """Return a person whose feet are held, with a board before the chest."""
-    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.3, 0.8, 0.03)), name="board", at=(0.45, 0.0, 1.0))
-    return wb.Problem(
-        scene,
-        goals=[wb.Point("right_index_tip", (0.4, -0.1, 1.2))],
-        constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
-        clearance=0.003,
-        range_of_motion=False,
-        balance=False,
-    )
+    goal = wb.Point("right_index_tip", (0.4, -0.1, 1.2))
+    return standing_before("board", (0.3, 0.8, 0.03), (0.45, 0.0, 1.0), goal)
 
 
 def test_starts_keep_the_holds_and_are_free_of_overlap_and_differ(shelf: wb.Problem) -> None:
@@ -99,9 +91,9 @@ def test_entrants_that_differ_in_starts_are_left_out_unless_they_are_asked_for()
 def test_every_algorithm_takes_part_from_one_start_and_from_several() -> None:
     names = {adapter.name for adapter in adapters(starts=True)}
     for family in ("qp", "newton", "ccd", "dls", "placo", "pink", "mink"):
-        mine = {name for name in names if name.partition("/")[0] == family}
+        mine = {name for name in names if name.partition("/")[0] == family} - {"placo/pruned"}  # placo with fewer pairs
         assert not mine or (len(mine) == 2 and sum("start" in name for name in mine) == 1)
-    assert len(names) <= 16
+    assert len(names) <= 18
     assert [adapter.name for adapter in adapters(["newton"], starts=True)][-2:] == ["newton/one_start", "newton/starts"]
 
 

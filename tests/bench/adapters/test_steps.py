@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.bench.following import followed
 from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
@@ -24,14 +25,7 @@ LIMIT = {"pink": 1e-4}
 @pytest.mark.parametrize("name", installed_tools())
 def test_two_steps_keep_limits_and_feet(name: str, short_contact: Track) -> None:
     two = replace(short_contact, targets=short_contact.targets[[2, 4]])
-    tool = make_tool(name, two)
-    assert np.allclose(tool.posture(), two.start, atol=1e-12)
-    postures = []
-    for target in two.targets:
-        tool.step(target)
-        postures.append(tool.posture())
-    verdict = judge(two, np.array(postures))
-    assert tool.failures == 0
+    tool, verdict = followed(name, two)
     assert verdict.limit_violation <= LIMIT.get(name, 1e-9)
     assert verdict.fastest_joint <= 1.0 + 1e-6
     assert verdict.foot_drift < 1e-3

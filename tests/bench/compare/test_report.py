@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import re
 from math import inf
 from pathlib import Path
@@ -9,6 +10,7 @@ from types import ModuleType
 
 import pytest
 
+from wholebody.bench import plot_style
 from wholebody.bench.compare import report as publishing
 from wholebody.bench.compare.charts import BAND, Point, lowest
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, REFUSED, Record
@@ -182,3 +184,21 @@ def test_settings_are_checked(fakes: ModuleType) -> None:
         Settings((fakes.SET,), (fakes.adapter("solves"),), cases=0)
     with pytest.raises(InputError, match="at least one of each"):
         Settings((), (fakes.adapter("solves"),))
+
+
+@pytest.mark.parametrize("span", [(2.0, 30.0), (1.0, 900.0), (1.0, 20000.0), (0.01, 20000.0)])
+def test_labels_of_a_logarithmic_axis_do_not_overlap(span: tuple[float, float], tmp_path: Path) -> None:
+    """In the narrowest panels of the charts: two in a row of eleven inches."""
+    chart, axes = plot_style.figure(1, 2, (11.0, 4.0))
+    axes[0][0].plot(span, (0.0, 1.0))
+    plot_style.plain_log(axes[0][0])
+    chart.draw_without_rendering()
+    low, high = axes[0][0].get_xlim()
+    boxes = [
+        label.get_window_extent()
+        for label in axes[0][0].get_xticklabels()
+        if label.get_text() and low <= label.get_position()[0] <= high
+    ]
+    plot_style.save(chart, tmp_path / "chart")
+    assert len(boxes) >= 3
+    assert all(one.x1 + 2.0 < other.x0 for one, other in itertools.pairwise(boxes))

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.answers import honest
 from wholebody.errors import InputError
 from wholebody.methods.placo.robot import Robot
 
@@ -23,18 +24,6 @@ def human() -> wb.Figure:
 
 def feet() -> list[wb.Hold]:
     return [wb.Hold("left_foot"), wb.Hold("right_foot")]
-
-
-def honest(problem: wb.Problem, solution: wb.Solution, tolerance: float = 1e-5) -> wb.Assessment:
-    assert np.isfinite(solution.q).all()
-    assert problem.scene.figure.within_limits(solution.q)
-    judged = wb.assess(problem, solution.q)
-    slack = 1.1 * tolerance + 2e-6
-    if solution.status == "solved":
-        assert judged.met(slack)
-    if solution.status in ("solved", "unreachable"):
-        assert judged.holds(slack)
-    return judged
 
 
 def frame_at(figure: wb.Figure, q: Any, name: str) -> pin.SE3:
@@ -109,7 +98,7 @@ def test_its_robot_has_our_kinematics_mass_and_distances(human: wb.Figure) -> No
     tip = human.frame_id("right_index_tip")
     frame = human.model.frames[tip]
     robot = Robot(human, {"tip": (frame.parentJoint, frame.placement)})
-    robot.add_pieces(problem)
+    robot.add_pieces(problem, wb.Placo().pairs(problem))
     rng = np.random.default_rng(4)
     for _ in range(3):
         q = human.clamp(pin.integrate(human.model, human.neutral, 0.3 * rng.normal(size=human.model.nv)))

@@ -285,7 +285,7 @@ def test_a_figure_without_root_and_elbows_is_freed(planar_arm: Callable[..., Fig
         ({"evaluation": 3}, "evaluation"),
         ({"planes": [3]}, "planes"),
         ({"frozen": "root"}, "frozen"),
-        ({"clearance": 5.0}, "clearance"),
+        ({"room": 5.0}, "room"),
         ({"method": "qqp"}, "method"),
     ],
 )

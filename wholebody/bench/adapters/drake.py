@@ -5,8 +5,7 @@ Its classes are constraints: goals, holds, the least distance of all pairs and t
 
 from __future__ import annotations
 
-import time
-from typing import Any, ClassVar
+from typing import Any
 
 import coal
 import numpy as np
@@ -16,13 +15,10 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter, few
 from wholebody.bench.adapters.loop import kept_apart, pulls
+from wholebody.bench.adapters.one_call import OneCall
 from wholebody.errors import InputError
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
-from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
-from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
@@ -59,71 +55,30 @@ def drake_adapter() -> Adapter:
     )
 
 
-class Drake:
-    """drake's InverseKinematics as a method.
-
-    Attributes:
-        tolerance: metres and radians to which goals and constraints are met.
-        iterations: most major iterations of SNOPT.
-    """
+class Drake(OneCall["_Plant"]):
+    """drake's InverseKinematics as a method; its iterations are SNOPT's major ones."""
 
     name = "drake"
-    kinds: ClassVar[tuple[type, ...]] = (
+    kinds = (
         wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Hold, wb.Orientation, wb.Point, wb.Relative, wb.StepLimit,
     )  # fmt: skip
+    way = "by one nonlinear program"
+    failure = "SNOPT found no posture that meets goals and constraints"
 
-    def __init__(self, tolerance: float, iterations: int | None = None) -> None:
-        """Take a budget."""
-        if not 1e-10 <= tolerance <= 0.1:
-            raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
-        self.tolerance, self.iterations = tolerance, ITERATIONS if iterations is None else iterations
-        self._built: tuple[tuple[Any, Array], _Plant] | None = None
-
-    def accepts(self, problem: Problem) -> str | None:
-        """None where drake can express all terms; else the sentence that names those that it cannot."""
-        return refusal(self.name, self._unsupported(problem))
-
-    def prepare(self, problem: Problem) -> None:
-        """Build the plant.
-
-        Raises:
-            InputError: drake cannot express the problem, or its scene changed after it was stated.
-        """
-        problem.check_fresh()
-        refused = self._unsupported(problem)
-        if refused:
-            raise UnsupportedTermError(self.name, refused)
+    def depends_on(self, problem: Problem) -> tuple[Any, ...]:
+        """The clearances, and where the pieces are."""
         places = np.array([piece.placement.homogeneous for piece in problem.scene.geometry.geometryObjects])
-        known = self._built
-        same = known is not None and known[0][0] is problem.clearances and np.array_equal(known[0][1], places)
-        if not same:
-            self._built = ((problem.clearances, places), _Plant(problem))
+        return problem.clearances, places.tobytes()
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
+    def build(self, problem: Problem) -> _Plant:
+        """Build the plant."""
+        return _Plant(problem)
 
-        Raises:
-            InputError: drake cannot express the problem, or its scene changed after it was stated.
-        """
-        began = time.perf_counter()
-        self.prepare(problem)
-        assert self._built is not None
-        plant, tolerance = self._built[1], SHARE * self.tolerance
-        program = _Program(plant, problem, tolerance)
-        with problem.borrow(), Control(None, progress) as control:
-            q, met = program.solved(problem.scene.figure.clamp(problem.start), self.iterations)
-            q = problem.scene.figure.clamp(q)
-            control.tell(TraceEntry(0.0, 0.0, 0.0, 0.0))
-        failure = "" if met else "SNOPT found no posture that meets goals and constraints"
-        ending = Ending(q, True, 1, (TraceEntry(0.0, 0.0, 0.0, 0.0),), "by one nonlinear program", "time", failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
-
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew."""
-        return SolvingTracker(self, problem, dt)
-
-    def _unsupported(self, problem: Problem) -> list[str]:
-        return [where for where, term in named_terms(problem) if not isinstance(term, self.kinds)]
+    def found(self, built: _Plant, problem: Problem) -> tuple[Array | None, bool]:
+        """The answer of the program."""
+        program = _Program(built, problem, SHARE * self.tolerance)
+        iterations = ITERATIONS if self.iterations is None else self.iterations
+        return program.solved(problem.scene.figure.clamp(problem.start), iterations)
 
 
 class _Plant:

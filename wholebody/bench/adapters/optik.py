@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from typing import Any, ClassVar
+from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
@@ -12,14 +11,10 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
-from wholebody.errors import InputError
+from wholebody.bench.adapters.one_call import OneCall
 from wholebody.files import Scratch
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
-from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
-from wholebody.solution import Solution, TraceEntry
 
 SHARE = 0.5  # of the tolerance, whose square is optik's bound of the squared error
 LONGEST = 1.0  # s: of its restarts
@@ -43,81 +38,48 @@ def optik_adapter() -> Adapter:
     )
 
 
-class Optik:
-    """optik as a method.
-
-    Attributes:
-        tolerance: metres and radians to which the goal is met.
-    """
+class Optik(OneCall["_Chain"]):
+    """optik as a method. It has no count of iterations."""
 
     name = "optik"
-    kinds: ClassVar[tuple[type, ...]] = (wb.Displacement, wb.Effort, wb.Frame)
+    kinds = (wb.Displacement, wb.Effort, wb.Frame)
+    way = "by its restarts"
+    failure = "optik found no posture in its time"
 
-    def __init__(self, tolerance: float, iterations: int | None = None) -> None:
-        """Take a budget; optik has no count of iterations."""
-        if not 1e-10 <= tolerance <= 0.1:
-            raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
-        self.tolerance = tolerance
-        self._built: tuple[tuple[int, int], _Chain] | None = None
+    def depends_on(self, problem: Problem) -> tuple[Any, ...]:
+        """The model, and the frame at the end of the chain."""
+        return problem.scene.model, _goal(problem).residual.place.frame
 
-    def accepts(self, problem: Problem) -> str | None:
-        """None where optik can express all terms; else the sentence that names those that it cannot."""
-        return refusal(self.name, self._unsupported(problem))
+    def build(self, problem: Problem) -> _Chain:
+        """Write and read the chain."""
+        return _Chain(problem.scene.model, _goal(problem).residual.place.frame)
 
-    def prepare(self, problem: Problem) -> None:
-        """Write and read the chain.
-
-        Raises:
-            InputError: optik cannot express the problem, or its scene changed after it was stated.
-        """
-        problem.check_fresh()
-        refused = self._unsupported(problem)
-        if refused:
-            raise UnsupportedTermError(self.name, refused)
-        (goal,) = problem.goals
-        key = id(problem.scene.model), int(goal.residual.place.frame)  # type: ignore[attr-defined]
-        if self._built is None or self._built[0] != key:
-            self._built = key, _Chain(problem.scene.model, key[1])
-
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
-
-        Raises:
-            InputError: optik cannot express the problem, or its scene changed after it was stated.
-        """
-        began = time.perf_counter()
-        self.prepare(problem)
-        assert self._built is not None
+    def found(self, built: _Chain, problem: Problem) -> tuple[Array | None, bool]:
+        """The first posture of its restarts."""
         start = problem.scene.figure.clamp(problem.start)
-        (goal,) = problem.goals
-        with problem.borrow(), Control(None, progress) as control:
-            found = self._built[1].solved(start, goal.resolved_target, self.tolerance)  # type: ignore[attr-defined]
-            q = start if found is None else problem.scene.figure.clamp(found)
-            entry = TraceEntry(0.0, 0.0, 0.0, 0.0)
-            control.tell(entry)
-        failure = "optik found no posture in its time" if found is None else ""
-        ending = Ending(q, True, 1, (entry,), "by its restarts", "time", failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        q = built.solved(start, _goal(problem).resolved_target, self.tolerance)
+        return q, q is not None
 
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew."""
-        return SolvingTracker(self, problem, dt)
-
-    def _unsupported(self, problem: Problem) -> list[str]:
-        refused = [where for where, term in named_terms(problem) if not isinstance(term, self.kinds)]
+    def unsupported(self, problem: Problem) -> list[str]:
+        """Names of what optik cannot express."""
+        refused = super().unsupported(problem)
         if refused:
             return refused
         if len(problem.goals) != 1:
             return ["several goals"]
         model = problem.scene.model
-        (goal,) = problem.goals
-        chain = list(model.supports[goal.residual.place.joint])[1:]  # type: ignore[attr-defined]
+        chain = list(model.supports[_goal(problem).residual.place.joint])[1:]
         kinds = [model.joints[joint].shortname() for joint in chain]
         if not chain or not all(kind.startswith(("JointModelR", "JointModelP")) for kind in kinds):
             return ["a free root" if problem.scene.figure.root == "free" else "a joint of several axes"]
         if any(model.joints[joint].nq != 1 for joint in chain):
             return ["a joint without limits"]
         return []
+
+
+def _goal(problem: Problem) -> Any:
+    (goal,) = problem.goals
+    return goal
 
 
 class _Chain:

@@ -7,6 +7,7 @@ The objects are added to its collision model, fixed to the world; it then treats
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import ClassVar
 
@@ -14,28 +15,42 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
 from wholebody.bench.track import DT, JOINT_SPEED, WITHIN, Track
 from wholebody.methods.placo.robot import Robot
+from wholebody.problem import Problem
+from wholebody.scene_geometry import SceneGeometry
 
 SAMPLES = 2000
+OWN_SAMPLES = 10_000  # of a figure alone, as many as MoveIt's setup assistant takes by default
+OWN_WITHIN = 0.01  # m: more than clearances are; the assistant leaves out what never collides
 ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
 
 
-def placo_adapter(holds: str = "hard") -> Adapter:
-    """The adapter to placo's kinematics solver, with holds as hard tasks or as soft ones."""
+def placo_adapter(variant: str = "") -> Adapter:
+    """The adapter to placo's kinematics solver; with "soft" holds, or with the pairs of a figure "pruned"."""
+    holds = "soft" if variant == "soft" else "hard"
     said = "holds and" if holds == "hard" else "holds soft with weight 100,"
+    pruned = (
+        f" Pairs of the figure with itself that come no nearer than {100 * OWN_WITHIN:g} cm in any of {OWN_SAMPLES:,} "
+        "random postures are left out; the sampling, once for a figure, is set-up."
+    )
+    left_out = (
+        f"placo/pruned does not keep apart pairs of the figure that {OWN_SAMPLES:,} random postures never bring near"
+    )
+    kind = PrunedPlaco if variant == "pruned" else wb.Placo
     return Adapter(
-        name="placo" if holds == "hard" else f"placo/{holds}",
-        make=partial(made, partial(wb.Placo, holds=holds), {}),
+        name=f"placo/{variant}".removesuffix("/"),
+        make=partial(made, partial(kind, holds=holds), {}),
         prepare=wb.Placo.prepare,
         loose=(*few(5, 10, 20), *LADDER),
         setup=f"wb.Placo(holds={holds!r}), all else as it comes: goals as soft tasks, {said} the self-collision "
         "constraint hard, joint limits, at most 0.1 rad or m a program, joints tasks for the measures with a weight "
         "that fades; one start, at most 200 programs. The objects are added to its collision model, with the clearance "
-        "of each pair. Building its robot is set-up.",
+        "of each pair. Building its robot is set-up." + (pruned if variant == "pruned" else ""),
         differences=(
+            *((left_out,) if variant == "pruned" else ()),
             "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
             "placo minimises Effort and Displacement only",
             "placo has no reach cones, no half-spaces for frames and no axis toward a place",
@@ -43,6 +58,15 @@ def placo_adapter(holds: str = "hard") -> Adapter:
             "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
         ),
     )
+
+
+@dataclass(frozen=True)
+class PrunedPlaco(wb.Placo):
+    """placo without the pairs of a figure with itself that do not come near: what its users prune in a robot's file."""
+
+    def pairs(self, problem: Problem) -> Indices:
+        """Numbers of the scene's pairs that placo is given: those that come near, and all with things."""
+        return _kept(problem.scene.figure, problem.scene.built)
 
 
 class PlacoTool(Tool):
@@ -141,18 +165,44 @@ def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
         scene: whose pairs.
         start: (nq,) posture about which the root is sampled, as bytes.
     """
-    rng, q, model = np.random.default_rng(0), np.frombuffer(start), scene.model
+    found = _sampled(scene, np.frombuffer(start), SAMPLES, WITHIN)
+    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
+    return [pair for pair, near in zip(pairs, found, strict=True) if near]
+
+
+def _sampled(scene: wb.Scene, q: Array, samples: int, within: float) -> Mask:
+    """Which pairs (pairs,) come nearer than `within` metres in random postures, the root near its place in q (nq,)."""
+    rng, model = np.random.default_rng(0), scene.model
     limits, found = scene.figure.limits, np.zeros(len(scene.geometry.collisionPairs), dtype=bool)
     workspace = scene.workspace()
-    for _ in range(SAMPLES):
+    for _ in range(samples):
         move = np.zeros(model.nv)
         if scene.figure.root == "free":
             move[:6] = rng.normal(size=6) * ROOT_SPREAD
         posture = np.asarray(pin.integrate(model, q, move))
         posture[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
-        found[workspace.near(posture, WITHIN).number] = True
-    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
-    return [pair for pair, near in zip(pairs, found, strict=True) if near]
+        found[workspace.near(posture, within).number] = True
+    return found
+
+
+@lru_cache(maxsize=8)
+def _apart(figure: wb.Figure) -> frozenset[tuple[str, str]]:
+    """Names of the pieces of a figure that do not come near each other in random postures, in pairs."""
+    alone = wb.Scene(figure)
+    near = _sampled(alone, figure.neutral, OWN_SAMPLES, OWN_WITHIN)
+    return frozenset(name for name, found in zip(_named(alone.built), near, strict=True) if not found)
+
+
+@lru_cache(maxsize=4)
+def _kept(figure: wb.Figure, built: SceneGeometry) -> Indices:
+    """Numbers of the pairs of a scene but for those."""
+    apart = _apart(figure)
+    return np.array([number for number, pair in enumerate(_named(built)) if pair not in apart], dtype=np.intp)
+
+
+def _named(built: SceneGeometry) -> list[tuple[str, str]]:
+    pieces = built.geometry.geometryObjects
+    return [(pieces[pair.first].name, pieces[pair.second].name) for pair in built.geometry.collisionPairs]
 
 
 def _place(figure: wb.Figure, name: str) -> tuple[int, pin.SE3]:

@@ -25,14 +25,16 @@ VARIANTS = (f"/{ONE}", f"/{FAMILY}")
 ALL = "all"
 """In place of a name: every entrant that is installed."""
 
-USUAL = ("qp", "newton/slack", "ccd", "placo", "pink", "mink", "dls", "drake")
+USUAL = ("qp", "newton/slack", "ccd", "placo", "pink", "mink", "dls", "drake", "optik")
 """Entrants where none is named: one of each algorithm. Their other settings take part by name, or with `ALL`."""
 
-USUAL_STARTS = (
+USUAL_FURTHER = (
+    "placo/pruned",
     *(f"{family}/{FAMILY}" for family in ("dls", "placo", "pink", "mink", "drake")),
     *(f"{family}/{ONE}" for family in ("qp", "newton", "ccd")),
 )
-"""With those, every method takes part from one start and from several: qp, newton and ccd have several by default."""
+"""With those, placo takes part with the pairs that a careful user leaves it, and every method but optik, which draws
+its own, from one start and from several: qp, newton and ccd have several by default."""
 
 
 class _Row(NamedTuple):
@@ -59,7 +61,7 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     """
     rows = _rows()
     if names is None:
-        usual = (*USUAL, *(USUAL_STARTS if starts else ()))
+        usual = (*USUAL, *(USUAL_FURTHER if starts else ()))
         return tuple(rows[name].build() for name in usual if rows[name].installed())
     families = {name.partition("/")[0] for name in rows}
     chosen: dict[str, None] = {}
@@ -120,16 +122,18 @@ def _rows() -> dict[str, _Row]:
     rows["ccd"] = _Row(ccd_adapter)
     rows["dls"] = _Row(dls_adapter)
     rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
-    rows["placo/soft"] = _Row(partial(_outside, "placo", "soft"), ("placo",), "placo")
+    for variant in ("pruned", "soft"):
+        rows[f"placo/{variant}"] = _Row(partial(_outside, "placo", variant), ("placo",), "placo")
     rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
     mink = ("mink", "mujoco", "daqp"), "compare"
     rows["mink"] = _Row(partial(_outside, "mink"), *mink)
     rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
     rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
     rows["optik"] = _Row(partial(_outside, "optik"), ("optik",), "optik")
+    rows["embodik"] = _Row(partial(_outside, "embodik"), ("embodik",), "embodik")
     for family in ("qp", "newton", "ccd"):
         rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
-    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake"):
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
         row = rows.get(f"{family}/{ONE}", rows.get(family))
         assert row is not None
         rows[f"{family}/{FAMILY}"] = with_values(row, build=partial(_restarted, row))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
@@ -122,20 +122,12 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     """What a reader who reads nothing else should know."""
     ranked, picked = standings(results, rows), choices(results, rows)
     said = [_in_doubt(results, ranked)]
-    fast: dict[str, list[str]] = {}
-    for choice in picked:
-        if choice.fastest:
-            fast.setdefault(named(choice.fastest), []).append(f"{words(choice.set)} ({choice.fastest_ms:.3g} ms)")
+    fast = _by_method((one.fastest, f"{words(one.set)} ({one.fastest_ms:.3g} ms)") for one in picked if one.fastest)
     if fast:
-        listed = "; ".join(f"{names} in {', '.join(sets)}" for names, sets in fast.items())
-        said.append(f"**Fastest of the dependable, on the problems that both solve:** {listed}.")
-    exact: dict[str, list[str]] = {}
-    for choice in picked:
-        if choice.exact:
-            exact.setdefault(named(choice.exact), []).append(f"{words(choice.set)} ({error(choice.exact_error)})")
+        said.append(f"**Fastest of the dependable, on the problems that both solve:** {fast}.")
+    exact = _by_method((one.exact, f"{words(one.set)} ({error(one.exact_error)})") for one in picked if one.exact)
     if exact:
-        listed = "; ".join(f"{names} in {', '.join(sets)}" for names, sets in exact.items())
-        said.append(f"**Most accurate of the dependable:** {listed}. Errors below {FLOOR:g} are not told apart.")
+        said.append(f"**Most accurate of the dependable:** {exact}. Errors below {FLOOR:g} are not told apart.")
     for choice in picked:
         if not choice.fastest:
             solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
@@ -147,6 +139,14 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
         if standing.dependable == 0 and isfinite(standing.worst_share):
             said += _warning(standing, rows)
     return said
+
+
+def _by_method(found: Iterable[tuple[Sequence[str], str]]) -> str:
+    """Methods, each with what is said of it in some sets."""
+    sets: dict[str, list[str]] = {}
+    for methods, said in found:
+        sets.setdefault(named(methods), []).append(said)
+    return "; ".join(f"{names} in {', '.join(each)}" for names, each in sets.items())
 
 
 def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
@@ -213,9 +213,10 @@ def targets(rows: Sequence[Summary], wall: Sequence[Rival], dependable: Sequence
     said = [f"`{OURS}` solves at least {100 * GOOD:.0f} % of every set. {upfirst(found)}."]
     if wall:
         ahead = sorted({rival.method for rival in wall if not rival.on_front and rival.method})
+        verdict = "Missed" if ahead else "Reached"
         said.append(
-            f"No other method is both faster and as accurate in any chart. `{OURS}` is on the front of "
-            f"{sum(rival.on_front for rival in wall)} of {len(wall)} charts, and of "
+            f"In no chart is another method both faster than `{OURS}` and as accurate. {verdict}: `{OURS}` is on the "
+            f"front of {sum(rival.on_front for rival in wall)} of {len(wall)} charts, and of "
             f"{sum(rival.on_front for rival in dependable)} of {len(dependable)} by the time in which nine problems in "
             f"ten are solved"
             + (f"; ahead of it in a chart: {', '.join(f'`{name}`' for name in ahead)}." if ahead else ".")

@@ -97,7 +97,7 @@ def _dress(panel: Any, quantity: Quantity, what: str) -> None:
     panel.set_ylim(0.5 * quantity.floor, 2.0 * BAND)
     panel.axhspan(0.35 * BAND, 2.0 * BAND, color="#f4dddd", zorder=0)
     panel.axhline(COARSE, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
-    panel.set_title("shaded: more than half of the answers are none", loc="right", fontsize=8, color=GREY)
+    panel.set_title("shaded: no answer to more than half of the problems", loc="right", fontsize=8, color=GREY)
     panel.set_title(quantity.title, loc="left", fontsize=10)
     panel.set(xlabel=f"time of {what} [ms]", ylabel=quantity.label)
 
@@ -194,7 +194,7 @@ def overview(
         panel.grid(axis="y", visible=False)
     left.set(xlabel="solved [%]", xlim=(-2.0, 102.0))
     plot_style.plain_log(right)
-    right.set(xlabel="mean time of a solve, failures as the longest [ms]")
+    right.set(xlabel="mean time of a solve or frame, failures as the longest [ms]")
     chart.suptitle("Every set: solved, and how fast; bands are intervals of 95 %", x=0.01, ha="left", fontsize=13)
     _legend(chart, adapters, drawn)
     return plot_style.save(chart, path)

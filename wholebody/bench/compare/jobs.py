@@ -26,7 +26,7 @@ class Task:
     Attributes:
         family, number, seed: which case.
         solves: methods, each with its further budgets (none where only the default one is asked for).
-        cap: seconds after which a solve is ended.
+        cap: seconds of the processor's time after which a solve is ended.
         most: seconds that a sweep may be expected to take, by the solve before it; it is left out where it is more.
     """
 

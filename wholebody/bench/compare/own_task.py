@@ -18,7 +18,7 @@ from wholebody.assessment import assess
 from wholebody.bench import plot_style
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, FLOOR, OVERTIME, Record
-from wholebody.bench.compare.solving import BUILDING, Ready, solve
+from wholebody.bench.compare.solving import BUILDING, Ready, end_after, solve
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.report import render
@@ -28,7 +28,7 @@ from wholebody.runner import ONE_THREAD, Child, EndedError, allow
 from wholebody.taskfile import read_task
 
 REPEATS = 5  # warm solves, of which the median counts
-CAP = 20.0  # s: after which a solve is ended
+CAP = 20.0  # s of the processor's time: after which a solve is ended
 NAME = "task"
 GREY = "#666666"
 
@@ -83,7 +83,7 @@ def compared(
     Args:
         path: the task file.
         adapters: the methods.
-        cap: seconds after which a solve is ended.
+        cap: seconds of the processor's time after which a solve is ended.
         tell: is told the name of each method before it begins.
 
     Raises:
@@ -111,12 +111,12 @@ def _solved(path: Path, adapter: Adapter, cap: float) -> tuple[float, list[Recor
     allow(BUILDING)
     compile_all()
     made = _ready(read_task(path).problem)
-    allow(cap)
+    end_after(cap)
     began = time.perf_counter()
     records = [solve(adapter, DEFAULT, made)]
     cold = time.perf_counter() - began
     for _ in range(REPEATS if records[0].outcome == ANSWERED else 0):
-        allow(cap)
+        end_after(cap)
         records.append(solve(adapter, DEFAULT, made))
     return cold, records
 

@@ -13,6 +13,8 @@ DEFAULT: Budget = (1e-4, None)
 COARSE, FINE = 1e-3, 1e-4  # m, rad: to which an answer is called a success
 FLOOR = 1e-9  # m, rad: errors below this are not told apart
 
+FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+
 ANSWERED, REFUSED, FAILED, OVERTIME = "answered", "refused", "failed", "overtime"
 """Outcomes: a posture; the method said that it cannot take the problem; an exception or a posture that is none; the
 process was ended because it took too long."""
@@ -103,3 +105,8 @@ class Record:
     def false_claim(self) -> bool:
         """Whether the method calls solved what is judged to be off by more than it was asked for, and than 1 mm."""
         return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
+
+
+def frame_cap(cap: float, frames: float) -> float:
+    """Seconds that a frame may take on the average, where a solve may take `cap` seconds and there are so many."""
+    return max(cap / frames, FRAME_CAP)

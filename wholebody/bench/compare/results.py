@@ -135,6 +135,12 @@ class Results:
         """Whether the goals of a set move."""
         return any(record.frames for adapter in self.adapters for record in self.default(family, adapter))
 
+    def frames(self, family: str) -> float:
+        """Median count of the frames of a set's cases, as they were answered; 0 where goals do not move."""
+        counts = {record.number: record.frames for adapter in self.adapters for record in self.default(family, adapter)
+                  if record.frames}  # fmt: skip
+        return middle(list(counts.values())) if counts else 0.0
+
     def quantities(self, family: str) -> tuple[Quantity, ...]:
         """What is charted of a set; efforts are not compared while goals move."""
         return QUANTITIES[:3] if self.moving(family) else QUANTITIES

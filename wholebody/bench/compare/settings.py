@@ -27,7 +27,7 @@ class Settings:
         sweep: of these, the first so many at every budget.
         levels: most budgets beside the default one.
         seed: the first of `SEEDS` from which the problems are made in turn.
-        cap: seconds after which a solve is ended.
+        cap: seconds of the processor's time after which a solve is ended.
         minutes: of all solving; methods that are too slow for it get fewer cases.
     """
 

@@ -17,7 +17,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.adapters.base import Adapter, Budget
-from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record
+from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record, frame_cap
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.bench.tables import programs_text
 from wholebody.compiled import compile_all
@@ -28,8 +28,9 @@ from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
 from wholebody.runner import allow
 
-BUILDING = 120.0  # s: to build a case and what belongs to its scene; compiling once included
-FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
+BUILDING = 300.0  # s: to build a case and what belongs to its scene; compiling once included
+LEAST = 1e-6  # s: no call of a solver is faster; differences of two clock readings may be
+SLACK = 4.0  # times as long by the clock as of the processor's time: on a busy machine that passes slowly
 JUDGED = (
     "goal_error", "goal_angle", "penetration", "clearance_violation", "limit_violation", "constraint_violation",
     "measure", "optimality",
@@ -86,7 +87,7 @@ def warmed(which: Which, adapter: Adapter, cap: float) -> float:
     if key in _warm:
         return 0.0
     _warm.add(key)
-    allow(cap)
+    end_after(cap)
     began = time.perf_counter()
     solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
     return time.perf_counter() - began
@@ -96,8 +97,14 @@ def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
     """Solve a case; the process ends where that takes longer than it may."""
     warmed(which, adapter, cap)
     made = case_of(which)
-    allow(max(cap, FRAME_CAP * len(made.case.frames)))
+    frames = len(made.case.frames)
+    end_after(frame_cap(cap, frames) * frames if frames else cap)
     return solve(adapter, level, made)
+
+
+def end_after(cap: float) -> None:
+    """End the process after so many seconds of the processor's time, so that other work on a machine ends no solve."""
+    allow(SLACK * cap, cap)
 
 
 def case_of(which: Which) -> Ready:
@@ -164,14 +171,14 @@ def _once(method: Any, problem: Problem, empty: Record) -> Record:
         return replace(empty, said="the answer is not finite", seconds=spent, status=solution.status)
     judging = time.process_time()
     judgement = assess(problem, q)
-    worked -= time.process_time() - judging  # the same judgement as the one within the call
+    worked -= min(time.process_time() - judging, solution.assessment.seconds)  # the one within the call took as much
     filled = replace(
         empty,
         outcome=ANSWERED,
         status=solution.status,
         said=" ".join(solution.message.split())[:300],
-        seconds=max(spent, 0.0),
-        cpu_seconds=max(worked, 0.0),
+        seconds=max(spent, LEAST),
+        cpu_seconds=max(worked, LEAST),
         tool_seconds=TOOL.seconds - of_tool,
         iterations=float(solution.iterations),
         programs=programs_text(solution.programs),
@@ -213,9 +220,8 @@ def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Recor
             return replace(empty, said=f"frame {len(frames)}: the posture is not finite")
         again = time.process_time()
         judgement = assess(problem, q)
-        if judging:
-            worked -= time.process_time() - again  # the same judgement as the one within the call
-        frames.append(_Frame(q, max(seconds, 0.0), max(worked, 0.0), iterations, judgement))
+        worked -= min(time.process_time() - again, judging)  # the judgement within the call, if any, took as much
+        frames.append(_Frame(q, max(seconds, LEAST), max(worked, LEAST), iterations, judgement))
     return _summary(frames, case, empty)
 
 

@@ -48,16 +48,12 @@ NOTHING = Interval(nan, -inf, inf, 0)
 
 def wilson(count: int, of: int) -> tuple[float, float]:
     """Interval of a share `count / of`; from 0 to 1 where there is nothing."""
-    from scipy.stats import norm
+    from scipy.stats import binomtest
 
     if of == 0:
         return 0.0, 1.0
-    z = float(norm.ppf(0.5 + 0.5 * LEVEL))
-    share = count / of
-    middle = (share + z * z / (2 * of)) / (1 + z * z / of)
-    reach = z / (1 + z * z / of) * sqrt(share * (1 - share) / of + z * z / (4 * of * of))
-    low = 0.0 if count == 0 else max(0.0, middle - reach)
-    return low, 1.0 if count == of else min(1.0, middle + reach)
+    found = binomtest(count, of).proportion_ci(LEVEL, method="wilson")
+    return float(found.low), float(found.high)
 
 
 def share(flags: Sequence[bool]) -> Interval:
@@ -141,7 +137,7 @@ def ranking(found: Mapping[str, Sequence[float]]) -> Ranking | None:
         found: for each method its costs, in the same order of problems; infinite for a failure. Equal costs share the
             mean of their ranks.
     """
-    from scipy.stats import chi2, rankdata, studentized_range
+    from scipy.stats import friedmanchisquare, rankdata, studentized_range
 
     names = list(found)
     costs = np.array([found[name] for name in names], dtype=float).T
@@ -150,9 +146,8 @@ def ranking(found: Mapping[str, Sequence[float]]) -> Ranking | None:
         return None
     ranks = np.apply_along_axis(rankdata, 1, costs)
     means = ranks.mean(axis=0)
-    spread = float(((ranks - 0.5 * (methods + 1)) ** 2).sum()) / (count * (methods - 1))
-    statistic = count * float(((means - 0.5 * (methods + 1)) ** 2).sum()) / spread if spread > 0.0 else 0.0
-    p_value = float(chi2.sf(statistic, methods - 1))  # with ties: Conover 1999, eq. 5.8
+    tied = bool((ranks == ranks[:, :1]).all())
+    p_value = 1.0 if tied else float(friedmanchisquare(*costs.T).pvalue)
     width = float(studentized_range.ppf(LEVEL, methods, 1e6)) / sqrt(2.0)
     difference = width * sqrt(methods * (methods + 1) / (6.0 * count))
     order = np.argsort(means, kind="stable")

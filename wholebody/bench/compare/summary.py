@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf, nan
 from typing import NamedTuple
 
-from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED
+from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED, frame_cap
 from wholebody.bench.compare.results import Results, effort_excess, middle
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.statistics import Interval, median, share, shifted_geometric_mean
@@ -34,7 +34,7 @@ class Summary:
         median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
         median_low_ms, median_high_ms: bootstrap interval of the median.
         mean_ms, mean_low_ms, mean_high_ms: shifted geometric mean over all cases not refused, with its interval; one
-            that is not solved counts as long as a solve may take.
+            that is not solved counts as long as a solve, or on the average a frame, may take.
         kernels: the median in units of the reference kernel; NaN where that was not timed.
         cold_ms: median of the first solve in a process; NaN where no process was new.
         tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
@@ -93,7 +93,7 @@ def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = CAP) 
     Args:
         results: the records.
         chunks: what was timed beside them: the reference kernel, and first solves.
-        cap: seconds after which a solve was ended.
+        cap: seconds of the processor's time after which a solve was ended.
     """
     kernel = kernel_of(chunks).value
     return [
@@ -119,7 +119,11 @@ def _summary(
 
     solved, fine = (share([record.success(tolerance) for record in taken]) for tolerance in (COARSE, FINE))
     usual = median([record.seconds for record in answered])
-    mean = shifted_geometric_mean([record.seconds if record.success(COARSE) else cap for record in taken])
+    longest = frame_cap(cap, results.frames(family)) if results.moving(family) else cap
+    # the cap is of the processor's time: by the clock, a busy machine may take longer
+    mean = shifted_geometric_mean(
+        [min(record.seconds, longest) if record.success(COARSE) else longest for record in taken]
+    )
 
     def count(outcome: str) -> int:
         return sum(record.outcome == outcome for record in mine)

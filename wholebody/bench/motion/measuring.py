@@ -54,6 +54,7 @@ class MotionRow:
         jerk: of the answer, in parts of that before.
         sliding_mm: by how much standing feet slide more than before.
         hand_mm: by how much the hands leave their places at each other; -1 where they hold no weapon.
+        beside_mm: by how much the method holds them beside their places, because they overlap there.
         changed: frames that are others than before.
         solves, programs: posture solves, and quadratic programs.
         said: the method's own sentence.
@@ -80,6 +81,7 @@ class MotionRow:
     jerk: float = 1.0
     sliding_mm: float = 0.0
     hand_mm: float = -1.0
+    beside_mm: float = 0.0
     changed: int = 0
     solves: int = 0
     programs: int = 0
@@ -176,6 +178,7 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     began = time.process_time()
     found = check(freed.clip, scene)
     row = replace(row, check_ms=1e3 * (time.process_time() - began) / len(clip))
+    row = replace(row, beside_mm=1e3 * report.beside)
     return _judged(row, clip, freed.clip, found, report.missed)
 
 

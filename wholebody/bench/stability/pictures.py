@@ -101,7 +101,7 @@ def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Pat
             before = answer.postures[index - 1]
     if isinstance(question, Nonsense):
         before = q
-    path.write_bytes(_jpeg(screenshots.picture(_page(case, problem, q, before), SIZE)))
+    path.write_bytes(_jpeg(screenshots.page(_page(case, problem, q, before), SIZE)))
     return path
 
 

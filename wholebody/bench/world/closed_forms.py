@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.world.drops import GRAVITY
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
@@ -146,16 +147,20 @@ def _rolling() -> list[ClosedRow]:
     ]
 
 
-def _collisions() -> list[ClosedRow]:
-    rng = np.random.default_rng(0)
+def colliding(rng: np.random.Generator, at: float) -> list[tuple[wb.Shape, Array, wb.Body]]:
+    """Four things around (at, at, at) that fly towards each other, about a metre a second fast."""
     shapes = (wb.Box((0.2, 0.3, 0.1)), wb.Sphere(0.1), wb.Capsule(0.05, 0.2), wb.Box((0.1, 0.1, 0.3)))
     things = []
     for k, shape in enumerate(shapes):
-        place = FAR + 0.5 * np.array([k % 2, k // 2, 0.0])
-        speed = -2.0 * (place - FAR - 0.25) + 0.2 * rng.normal(size=3)
+        place = at + 0.5 * np.array([k % 2, k // 2, 0.0])
+        speed = -2.0 * (place - at - 0.25) + 0.2 * rng.normal(size=3)
         body = wb.Body(velocity=tuple(speed), angular_velocity=tuple(rng.normal(size=3)))
         things.append((shape, place, body))
-    engine = _engine(*things, floor=None, weight=False)
+    return things
+
+
+def _collisions() -> list[ClosedRow]:
+    engine = _engine(*colliding(np.random.default_rng(0), FAR), floor=None, weight=False)
     momentum, energy, grew = engine.momentum(), engine.energy(), 0.0
     for _ in range(22):
         frame = engine.advance(DT)

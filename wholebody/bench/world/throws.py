@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import copy
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -20,6 +20,9 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.world.free_postures import free_posture
 from wholebody.tracking.moving_goals import retarget
+
+Path = Sequence[tuple[float, Array]]
+"""Shares of a frame, and postures (nq,)."""
 
 DT = 1.0 / 60.0
 SHAPES = {
@@ -70,45 +73,59 @@ class ThrowRow:
     median_ms: float
 
 
-class _Throw:
-    """A thing that flies towards the body with constant velocity, and turns."""
+class Throw:
+    """A thing that flies towards the body of a standing person with constant velocity, and turns.
 
-    def __init__(self, rng: np.random.Generator, thing: str, speed: float) -> None:
+    Attributes:
+        scene: the person, the floor and the "thing".
+        truth: the same scene once more, for judgements; `instants` moves its thing.
+        at: where the thing is.
+        frames: until it is past.
+    """
+
+    def __init__(self, rng: np.random.Generator, shape: wb.Shape, speed: float, turn: float = SPIN) -> None:
+        """Begin half a metre before the body, from anywhere around; `speed` in m/s, `turn` in rad/s."""
         angle = rng.uniform(0.0, 2.0 * np.pi)
-        self._way = speed * DT * np.array([np.cos(angle), np.sin(angle), 0.0])
-        rotation = pin.exp3(np.array([0.0, 0.0, angle]))
-        self._at = pin.SE3(rotation, -0.5 * self._way / (speed * DT) + [0.0, 0.0, rng.uniform(0.7, 1.5)])
-        self._turn = pin.exp3(SPIN * DT * rng.normal(size=3))
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        self.at = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), -0.5 * way + [0.0, 0.0, rng.uniform(0.7, 1.5)])
+        self._way, self._turn = speed * DT * way, pin.exp3(turn * DT * rng.normal(size=3))
         self.scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
-        self.scene.add(SHAPES[thing], name="thing", at=self._at)
-        self._truth = copy.copy(self.scene)
+        self.scene.add(shape, name="thing", at=self.at)
+        self.truth = copy.copy(self.scene)
         self.frames = int(WAY / (speed * DT)) + 1
 
     def next(self) -> tuple[pin.SE3, pin.SE3]:
         """Let it fly for a frame; where it was and is."""
-        before = self._at
-        self._at = pin.SE3(before.rotation @ self._turn, before.translation + self._way)
-        self.scene.move("thing", at=self._at, over=DT)
-        return before, self._at
+        before = self.at
+        self.at = pin.SE3(before.rotation @ self._turn, before.translation + self._way)
+        self.scene.move("thing", at=self.at, over=DT)
+        return before, self.at
 
-    def deepest(self, path: Sequence[tuple[float, Array]], way: tuple[pin.SE3, pin.SE3], parts: int) -> float:
-        """Depth of the thing in the body along a path of shares and postures, metres."""
-        turn, worst = pin.log3(way[0].rotation.T @ way[1].rotation), 0.0
+    def instants(self, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int) -> Iterator[Array]:
+        """Postures (nq,) along a path of shares and postures, each with the thing of `truth` put where it is then."""
+        turn = pin.log3(way[0].rotation.T @ way[1].rotation)
         for (s0, q0), (s1, q1) in pairwise(path):
             for share in np.linspace(0.0, 1.0, parts):
                 s = s0 + share * (s1 - s0)
                 centre = (1.0 - s) * way[0].translation + s * way[1].translation
-                self._truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
-                near = self._truth.contacts(pin.interpolate(self._truth.model, q0, q1, share), 0.0)
-                owner = self._truth.piece_owner
-                rows = [row for row, pair in enumerate(near.pair) if "thing" in {owner[k] for k in pair}]
-                worst = max(worst, float(-near.distance[rows].min(initial=0.0)))
-        return worst
+                self.truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
+                yield pin.interpolate(self.truth.model, q0, q1, share)
 
-    def avoidable(self, q: Array, most: Array, rng: np.random.Generator) -> bool:
-        """Whether a posture within displacements (nv,) of another (nq,) is free of the thing where it is now."""
-        self._truth.move("thing", at=self._at)
-        return free_posture(self._truth, q, most, rng) is not None
+
+def _deepest(throw: Throw, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int) -> float:
+    """Depth of the thing in the body along a path, metres."""
+    worst, owner = 0.0, throw.truth.piece_owner
+    for q in throw.instants(path, way, parts):
+        near = throw.truth.contacts(q, 0.0)
+        rows = [row for row, pair in enumerate(near.pair) if "thing" in {owner[k] for k in pair}]
+        worst = max(worst, float(-near.distance[rows].min(initial=0.0)))
+    return worst
+
+
+def _avoidable(throw: Throw, q: Array, most: Array, rng: np.random.Generator) -> bool:
+    """Whether a posture within displacements (nv,) of another (nq,) is free of the thing where it is now."""
+    throw.truth.move("thing", at=throw.at)
+    return free_posture(throw.truth, q, most, rng) is not None
 
 
 def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed: int = 0) -> ThrowRow:
@@ -116,7 +133,7 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed:
     rng = np.random.default_rng([seed, *map(ord, thing + person), int(10.0 * speed)])
     depths, times, named, silent, avoidable = [], [], 0, 0, 0
     for _ in range(count):
-        throw = _Throw(rng, thing, speed)
+        throw = Throw(rng, SHAPES[thing], speed)
         turning, going = (max(HUMAN[0], 3.0 * speed), max(HUMAN[1], 1.6 * speed)) if swift else HUMAN
         start = throw.scene.figure.posture("standing")
         tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
@@ -133,19 +150,20 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed:
             began = time.process_time()
             step = tracker.step(q)
             times.append(time.process_time() - began)
-            end = throw.deepest(((1.0, step.q), (1.0, step.q)), way, 1)
+            end = _deepest(throw, ((1.0, step.q), (1.0, step.q)), way, 1)
             depths.append(end)
-            avoidable += end > DEEP and throw.avoidable(
+            avoidable += end > DEEP and _avoidable(
+                throw,
                 q,
                 np.repeat([going, 1.5 * going, turning], [3, 3, throw.scene.model.nv - 6]) * DT,
                 np.random.default_rng(seed),
             )
             named += bool(step.collisions)
-            began_in = throw.deepest(((0.0, q), (0.0, q)), way, 1)  # what was in before was named then
+            began_in = _deepest(throw, ((0.0, q), (0.0, q)), way, 1)  # what was in before was named then
             if not step.collisions and began_in < NAMED:
                 straight = ((0.0, q), (1.0, step.q))
                 passed = end > NAMED or (
-                    throw.deepest(straight, way, PARTS) > DIP and throw.deepest(step.path, way, 4) > DIP
+                    _deepest(throw, straight, way, PARTS) > DIP and _deepest(throw, step.path, way, 4) > DIP
                 )
                 silent += bool(passed)
             q = step.q

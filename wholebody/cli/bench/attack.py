@@ -6,8 +6,8 @@ import argparse
 from itertools import count
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_folders, check_count
+from wholebody.cli.arguments import Commands, add_folders
+from wholebody.cli.bench.publishing import check_count
 from wholebody.errors import InputError
 
 if TYPE_CHECKING:

@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import argparse
+from itertools import chain
+from typing import Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
+
+CAPTION = "Time of a frame and what is left to the goal, frame by frame"
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "challenge",
         help="a standing person dragged down onto a chair, by newton and qp",
         description="Drag a standing person down onto a chair by the pelvis, and judge every posture and way between.",
     )
     parser.add_argument("--frames", type=int, default=240, metavar="N", help="of the way (default: 240)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -25,16 +29,13 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench import challenge
     from wholebody.bench.drag import drag_chart
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import write_rows
     from wholebody.cli.demo import packaged_tasks
 
     frames = 60 if arguments.quick else arguments.frames
     check_count(frames, "--frames")
     facts = machine()
     rows, every = challenge.measure(packaged_tasks()[challenge.TASK], frames, print)
-    write_rows(arguments.out / "challenge.csv", facts, rows)
-    write_rows(arguments.out / "challenge-frames.csv", facts, [row for method in every.values() for row in method])
-    drawn = {"challenge": drag_chart(every, arguments.out / "challenge")}
-    captions = {"challenge": "Time of a frame and what is left to the goal, frame by frame"}
-    publish("challenge", challenge.report(rows, facts), drawn, captions, arguments)
+    tables: dict[str, list[Any]] = {"challenge": rows, "challenge-frames": list(chain.from_iterable(every.values()))}
+    charts = {"challenge": (drag_chart(every, arguments.out / "challenge"), CAPTION)}
+    publish("challenge", challenge.report(rows, facts), arguments, facts=facts, tables=tables, charts=charts)
     return 0

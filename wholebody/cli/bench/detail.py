@@ -5,14 +5,16 @@ from __future__ import annotations
 import argparse
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 CAPTION = "Time of a solve against what each level gets wrong, judged in the finest model"
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "detail",
         help="spheres, capsules, hulls; all joints and pairs or those that matter: time against error",
         description="The same tasks with every detail of geometry, with all joints and pairs and with those that a "
@@ -20,15 +22,12 @@ def add_to(commands: Commands) -> None:
     )
     parser.add_argument("--cases", type=int, default=8, metavar="N", help="cases of each task (default: 8)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of the cases (default: 0)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, judge, draw."""
     from wholebody.bench import detail
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import write_rows
 
     check_count(arguments.cases, "--cases")
     cases = 2 if arguments.quick else arguments.cases
@@ -40,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(row, flush=True)
         else:
             rows.append(row)
-    write_rows(arguments.out / "detail.csv", facts, rows)
-    charts = {"detail": detail.chart(rows, arguments.out / "detail")}
-    publish("detail", detail.report(rows, refused, facts), charts, {"detail": CAPTION}, arguments)
+    charts = {"detail": (detail.chart(rows, arguments.out / "detail"), CAPTION)}
+    report = detail.report(rows, refused, facts)
+    publish("detail", report, arguments, facts=facts, tables={"detail": rows}, charts=charts)
     return 0

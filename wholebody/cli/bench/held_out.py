@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 DESCRIPTION = """\
 Solve problems of distributions that no constant was tuned on: uniform witnesses, other people, other clutter, robots as
@@ -15,16 +15,18 @@ where it was when it is called again with the same settings and folder."""
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
-        "held-out", help="distributions that nothing was tuned on, beside the sets", description=DESCRIPTION
+    parser = measuring(
+        commands,
+        run,
+        "held-out",
+        help="distributions that nothing was tuned on, beside the sets",
+        description=DESCRIPTION,
     )
     parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: qp and three peers)")
     parser.add_argument("--cases", type=int, metavar="N", help="problems of each set (default: 40; with --quick 4)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="of all problems (default: 0)")
     parser.add_argument("--minutes", type=float, metavar="N", help="of solving in all (default: 20)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases beside each other (default: 1)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -34,7 +36,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.adapters import adapters, installed
     from wholebody.bench.compare import held_out
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import write_rows
 
     check_count(arguments.jobs, "--jobs")
     cases = (4 if arguments.quick else held_out.CASES) if arguments.cases is None else arguments.cases
@@ -47,6 +48,6 @@ def run(arguments: argparse.Namespace) -> int:
     folder = arguments.out / "held-out"
     rows = held_out.measured(asked, folder, arguments.jobs, lambda progress: print(progress.said, flush=True))
     facts = machine() | {"date": date.today().isoformat(), "cases beside each other": f"{arguments.jobs}"}
-    write_rows(folder / "held_out.csv", facts, rows)
-    publish("held-out", held_out.report(rows, asked, left_out, facts), {}, {}, arguments)
+    report = held_out.report(rows, asked, left_out, facts)
+    publish("held-out", report, arguments, facts=facts, tables={"held-out/held_out": rows})
     return 0

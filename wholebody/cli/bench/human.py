@@ -6,20 +6,20 @@ import argparse
 import shutil
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common
+from wholebody.cli.bench.publishing import measuring
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    measuring(
+        commands,
+        run,
         "human",
         help="compare the person with people: sizes, ranges, self-contacts, everyday tasks",
         description="Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
         "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
         "docs/human.md, with a picture of each task.",
     )
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -6,12 +6,14 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, publish
+from wholebody.cli.bench.publishing import measuring, publish
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "loads",
         help="torques and balance of clips before and after they are freed, with and without dynamics",
         description="Free clips of collisions without and with regard to strength and balance, and say what each does "
@@ -23,8 +25,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("--only", nargs="+", metavar="CLIP", help="names of clips (default: all)")
     parser.add_argument("--equipment", nargs="+", metavar="NAME", help="what is worn (default: nothing)")
     parser.add_argument("--longest", type=float, default=4.0, metavar="S", help="cut clips to so long (default: 4 s)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -47,5 +47,5 @@ def run(arguments: argparse.Namespace) -> int:
         rows.append(row)
         write_rows(arguments.out / "loads.csv", facts, rows)
         print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
-    publish("loads", loads.report(rows, facts), {}, {}, arguments)
+    publish("loads", loads.report(rows, facts), arguments)
     return 0

@@ -6,17 +6,17 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
-CAPTIONS = {
-    "motion": "Deviation, jerk and sliding against seconds for each second of motion; hollow: not free; dotted: asked",
-    "motion-check": "CPU time of a check of each clip with each piece of equipment; black: as it is, coloured: freed",
-}
+CAPTION = "Deviation, jerk and sliding against seconds for each second of motion; hollow: not free; dotted: asked"
+CAPTION_OF_CHECKS = "CPU time of a check of each clip with each piece of equipment; black: as it is, coloured: freed"
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "motion",
         help="clips freed of collisions by each method, with each piece of equipment",
         description="Free clips of collisions by each method, with each piece of equipment, and judge every frame and "
@@ -33,8 +33,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument(
         "--figures", action="store_true", help="redraw figures 4.1 to 4.7 of Degenhardt's thesis instead; needs --clips"
     )
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -59,10 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     charts = {}
     if any(row.measured and row.method != measuring.CHECKED for row in rows):
-        charts["motion"] = report.chart(rows, arguments.out / "motion")
+        charts["motion"] = report.chart(rows, arguments.out / "motion"), CAPTION
     if any(row.measured for row in rows):
-        charts["motion-check"] = report.check_chart(rows, arguments.out / "motion-check")
-    publish("motion", report.report(rows, facts), charts, CAPTIONS, arguments)
+        charts["motion-check"] = report.check_chart(rows, arguments.out / "motion-check"), CAPTION_OF_CHECKS
+    publish("motion", report.report(rows, facts), arguments, charts=charts)
     return 0
 
 
@@ -81,7 +79,7 @@ def _figures(arguments: argparse.Namespace) -> int:
         if drawing.number in names:
             drawn.append(figures.redraw(drawing, recordings, figure, folder, arguments.jobs))
             print(f"figure {drawing.number}: {drawn[-1].strip}, {drawn[-1].curves}", flush=True)
-    publish("motion-figures", render("motion_figures.md", figures=drawn), {}, {}, arguments)
+    publish("motion-figures", render("motion_figures.md", figures=drawn), arguments)
     if arguments.update_docs is not None:
         place = arguments.update_docs / "assets" / "motion"
         make_folder(place)

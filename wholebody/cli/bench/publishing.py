@@ -5,49 +5,60 @@ from __future__ import annotations
 import argparse
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from wholebody.cli.arguments import Commands, add_folders
 from wholebody.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Callable, Mapping, Sequence
 
 
-def add_common(parser: argparse.ArgumentParser) -> None:
-    """Add `--quick`, `--out` and `--update-docs`."""
+def measuring(
+    commands: Commands, run: Callable[[argparse.Namespace], int], name: str, *, help: str, description: str
+) -> argparse.ArgumentParser:
+    """Add a command that measures, with `--quick`, `--out` and `--update-docs`; its own options are added to it."""
+    parser = commands.add_parser(name, help=help, description=description)
+    parser.set_defaults(run=run)
     parser.add_argument("--quick", action="store_true", help="a short run that shows whether all works")
     add_folders(parser, "out/bench")
-
-
-def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add `--out`, with a folder where it is left out, and `--update-docs`."""
-    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})")
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write tables and charts into the documentation too (default folder: docs)",
-    )  # fmt: skip
+    return parser
 
 
 def publish(
     name: str,
     report: str,
-    charts: dict[str, tuple[Path, Path]],
-    captions: dict[str, str],
     arguments: argparse.Namespace,
+    *,
+    facts: Mapping[str, str] | None = None,
+    tables: Mapping[str, Sequence[Any]] | None = None,
+    charts: Mapping[str, tuple[tuple[Path, Path], str]] | None = None,
 ) -> None:
-    """Write the tables beside the numbers, and with the charts into the documentation where that is asked for."""
-    from wholebody.bench.tables import replace_section, write_text
+    """Write tables and report, and into the documentation the report with its charts where that is asked for.
 
+    Args:
+        name: of the report's file, and of its section of results.md.
+        report: Markdown.
+        arguments: of the command.
+        facts: of the machine, for the tables.
+        tables: rows by the name of their CSV file.
+        charts: files of each chart (SVG and PNG), and its caption.
+    """
+    from wholebody.bench.tables import replace_section, write_rows, write_text
+
+    for table, rows in (tables or {}).items():
+        write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
     write_text(arguments.out / f"{name}.md", report + "\n")
     print(report)
     print(f"wrote {arguments.out}")
     if arguments.update_docs is None:
         return
-    pictures: Sequence[str] = [f"![{captions[chart]}](assets/bench/{chart}.svg)" for chart in charts]
+    drawn = dict(charts or {})
+    pictures = [f"![{caption}](assets/bench/{chart}.svg)" for chart, (_, caption) in drawn.items()]
     replace_section(arguments.update_docs / "results.md", name, "\n\n".join([*pictures, report]))
     folder = arguments.update_docs / "assets" / "bench"
     folder.mkdir(parents=True, exist_ok=True)
-    for svg, _ in charts.values():
+    for (svg, _), _ in drawn.values():
         shutil.copyfile(svg, folder / svg.name)
     print(f"wrote {arguments.update_docs / 'results.md'}")
 

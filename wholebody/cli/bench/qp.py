@@ -6,14 +6,16 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 QUICK = 45  # programs
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "qp",
         help="the quadratic programs of all problem sets by every solver alone",
         description="Record the programs that the QP method poses on the problem sets, keep them as files that "
@@ -24,8 +26,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("--solvers", nargs="+", metavar="NAME", help="QP solvers (default: all that are installed)")
     parser.add_argument("--sets", nargs="+", metavar="NAME", help="problem sets (default: all)")
     parser.add_argument("--programs", type=Path, metavar="DIR", help="files of an earlier run, instead of recording")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -35,7 +35,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.qp_programs import files
     from wholebody.bench.qp_programs.measuring import measure, qp_report, summaries
     from wholebody.bench.qp_programs.recording import record
-    from wholebody.bench.tables import write_rows
     from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 
     sets = [problem_set(name).name for name in arguments.sets or SETS]
@@ -52,7 +51,6 @@ def run(arguments: argparse.Namespace) -> int:
     facts = machine() | {"seed": str(arguments.seed)}
     rows = measure(programs, solvers, print)
     totals = summaries(rows, solvers, arguments.seed)
-    write_rows(arguments.out / "qp-programs.csv", facts, rows)
-    write_rows(arguments.out / "qp.csv", facts, totals)
-    publish("qp", qp_report(rows, totals, facts), {}, {}, arguments)
+    report = qp_report(rows, totals, facts)
+    publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
     return 0

@@ -5,12 +5,14 @@ from __future__ import annotations
 import argparse
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "reaches",
         help="random reaches whose answer is known to exist",
         description="Solve random reaches from standing; list everything that was not solved.",
@@ -21,8 +23,6 @@ def add_to(commands: Commands) -> None:
         "--methods", nargs="+", default=["qp"], metavar="NAME", help="such as qp, qp/osqp, newton (default: qp)"
     )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1, for steady times)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -30,7 +30,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
     from wholebody.bench.reaches import reach_times, reaches_report, run
-    from wholebody.bench.tables import write_rows
 
     count = 10 if arguments.quick else arguments.count
     check_count(count, "--count")
@@ -44,7 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
             if row.status != "solved":
                 print(f"seed {row.seed}, {method}: {row.status}; {row.how}")
     report = reaches_report(rows, facts, arguments.jobs)
-    write_rows(arguments.out / "reaches.csv", facts, rows)
-    drawn = {"reaches": reach_times(rows, arguments.out / "reaches")}
-    publish("reaches", report, drawn, {"reaches": "Share of the reaches solved within a time"}, arguments)
+    charts = {"reaches": (reach_times(rows, arguments.out / "reaches"), "Share of the reaches solved within a time")}
+    publish("reaches", report, arguments, facts=facts, tables={"reaches": rows}, charts=charts)
     return 0

@@ -6,12 +6,14 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common
+from wholebody.cli.bench.publishing import measuring
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "robots",
         help="load every robot description of a folder, and reach with its tips",
         description="Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
@@ -19,8 +21,6 @@ def add_to(commands: Commands) -> None:
         "docs/robots.md.",
     )
     parser.add_argument("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 from wholebody.errors import UnknownNameError
 
 CAPTION = "Time of a solve, of a step, of the judgement and of the building of the geometry, as one size grows"
@@ -13,7 +13,9 @@ CAPTION = "Time of a solve, of a step, of the judgement and of the building of t
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "scaling",
         help="time of a step and a solve against joints, pieces and things, with exponents",
         description="Chains of 5 to 200 joints (500 bodies without a model of joints), 1 to 32 pieces a segment, 10 to "
@@ -21,15 +23,12 @@ def add_to(commands: Commands) -> None:
     )
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="timed solves each (default: 5)")
     parser.add_argument("--methods", nargs="+", metavar="NAME", help="methods (default: qp newton ccd placo)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Measure, fit, draw."""
     from wholebody.bench import scaling
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import write_rows
 
     check_count(arguments.repeats, "--repeats")
     methods = tuple(arguments.methods or scaling.METHODS)
@@ -49,8 +48,8 @@ def run(arguments: argparse.Namespace) -> int:
     if "newton" in methods:
         bodies = sizes["joints"] if arguments.quick else scaling.ASSEMBLIES
         rows += scaling.assembly_rows(bodies, repeats)
-    write_rows(arguments.out / "scaling.csv", facts, rows)
-    charts = {"scaling": scaling.chart(rows, arguments.out / "scaling")}
+    charts = {"scaling": (scaling.chart(rows, arguments.out / "scaling"), CAPTION)}
     left_out = [line for line in lines if "left out" in line]
-    publish("scaling", scaling.report(rows, left_out, facts), charts, {"scaling": CAPTION}, arguments)
+    report = scaling.report(rows, left_out, facts)
+    publish("scaling", report, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
     return 0

@@ -6,14 +6,16 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 METHODS = ("qp", "qp/osqp")
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "solve",
         help="whole solves of the shelf task, and memory",
         description="Solve a task with new and with used workspaces, and measure the memory of `wholebody pose`.",
@@ -23,8 +25,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument(
         "--methods", nargs="+", default=list(METHODS), metavar="NAME", help="such as qp, qp/osqp (default: these two)"
     )
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -32,7 +32,6 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.bench import solve
     from wholebody.bench.adapters import adapters
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import write_rows
     from wholebody.cli.demo import packaged_tasks
 
     task = arguments.task or packaged_tasks()["shelf"]
@@ -41,7 +40,6 @@ def run(arguments: argparse.Namespace) -> int:
     facts = machine()
     rows = solve.measured(task, adapters(arguments.methods), count, print)
     peak = solve.memory(task)
-    write_rows(arguments.out / "solve.csv", facts, rows)
-    write_rows(arguments.out / "memory.csv", facts, [peak])
-    publish("solve", solve.solve_report(rows, peak, facts), {}, {}, arguments)
+    report = solve.solve_report(rows, peak, facts)
+    publish("solve", report, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
     return 0

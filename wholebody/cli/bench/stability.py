@@ -8,13 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count
+from wholebody.cli.bench.publishing import check_count, measuring
 from wholebody.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
-
-    from rich.progress import Progress
 
     from wholebody.bench.adapters import Adapter
     from wholebody.bench.stability.case import HardCase
@@ -27,7 +25,9 @@ ASSETS = "assets/stability"
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "stability",
         help="hard cases by methods: where each fails, and how",
         description="Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
@@ -38,8 +38,6 @@ def add_to(commands: Commands) -> None:
     )
     parser.add_argument("--cases", nargs="+", metavar="NAME", help="cases (default: all; with --quick a few)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -82,9 +80,10 @@ def _check_page(arguments: argparse.Namespace) -> None:
 def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) -> Result:
     from wholebody.bench.stability.asking import run as ask_all
     from wholebody.bench.stability.verdict import result
+    from wholebody.cli.tables import progress_bar
 
     cells = []
-    with _bar() as bar:
+    with progress_bar(thread=False) as bar:
         work = bar.add_task("asking", total=len(cases) * len(adapters))
         for cell in ask_all(cases, adapters, jobs):
             cells.append(cell)
@@ -94,19 +93,11 @@ def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) ->
 
 def _drawn(result: Result, docs: Path) -> Drawn:
     from wholebody.bench.stability.pictures import draw
+    from wholebody.cli.tables import progress_bar
 
-    with _bar() as bar:
+    with progress_bar(thread=False) as bar:
         work = bar.add_task("drawing", total=len(result.cases))
         return draw(result, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
-
-
-def _bar() -> Progress:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    # no thread that refreshes it: cells are forked, and a fork may catch a thread with a lock
-    return Progress(*columns, console=Console(stderr=True), transient=True, auto_refresh=False)
 
 
 def _print(result: Result) -> None:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Sequence
+from typing import Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, check_count, publish
+from wholebody.cli.bench.publishing import check_count, measuring, publish
 
 PAIRS_OF_RUNS = 15  # with a person's defaults and without: their ratio then has an interval of some 3 %
 
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "step",
         help="one step of tracking by every tool",
         description="The same 200-step reach by every tool that is installed, interleaved, judged independently. With "
@@ -22,8 +26,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("--repeats", type=int, default=5, metavar="N", help="timed runs of every tool (default: 5)")
     parser.add_argument("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)")
     parser.add_argument("--tools", nargs="+", metavar="NAME", help="only these (default: all that are installed)")
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -41,7 +43,6 @@ def run(arguments: argparse.Namespace) -> int:
         step_times,
         taking,
     )
-    from wholebody.bench.tables import write_rows
     from wholebody.bench.track import VARIANTS, track
     from wholebody.cli.demo import packaged_tasks
 
@@ -68,17 +69,15 @@ def run(arguments: argparse.Namespace) -> int:
     if not figures:
         humans = [track(name, steps) for name in VARIANTS]
         costs = person_costs(humans, packaged_tasks()["shelf"], PAIRS_OF_RUNS if repeats > 1 else 2)
-        write_rows(arguments.out / "step-person.csv", facts, costs)
     report = step_report(rows, facts, stated, shares, refusals if figures else None, costs)
     name = "step-figures" if figures else "step"
-    write_rows(arguments.out / f"{name}.csv", facts, rows)
-    write_rows(arguments.out / f"{name}-times.csv", facts, times)
-    drawn = {f"{name}-times": step_times(times, arguments.out / f"{name}-times")}
-    captions = {f"{name}-times": "Time of a step of every tool"}
+    tables: dict[str, Sequence[Any]] = {name: rows, f"{name}-times": times}
+    charts = {f"{name}-times": (step_times(times, arguments.out / f"{name}-times"), "Time of a step of every tool")}
     if not figures:
-        drawn["step-distances"] = least_distances(times, arguments.out / "step-distances")
-        captions["step-distances"] = "Least distance of any pair after every step"
-    publish(name, report, drawn, captions, arguments)
+        tables["step-person"] = costs
+        drawn = least_distances(times, arguments.out / "step-distances")
+        charts["step-distances"] = drawn, "Least distance of any pair after every step"
+    publish(name, report, arguments, facts=facts, tables=tables, charts=charts)
     if not figures:
         print("\n".join(goal_lines(rows)))
     return 0

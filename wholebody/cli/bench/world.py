@@ -6,7 +6,7 @@ import argparse
 from typing import TYPE_CHECKING, Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import add_common, publish
+from wholebody.cli.bench.publishing import measuring, publish
 
 if TYPE_CHECKING:
     from wholebody.bench.world.closed_forms import ClosedRow
@@ -22,7 +22,9 @@ PARTS = ("closed", "throws", "drops", "long")
 
 def add_to(commands: Commands) -> None:
     """Add the command."""
-    parser = commands.add_parser(
+    parser = measuring(
+        commands,
+        run,
         "world",
         help="things that move by themselves: closed forms, throws at a person, drops beside MuJoCo and Rapier",
         description="Measure motions whose outcome is known by formula; throw things at a person who stands, walks or "
@@ -35,8 +37,6 @@ def add_to(commands: Commands) -> None:
     parser.add_argument(
         "--minutes", type=float, default=10.0, metavar="N", help="simulated minutes of the long run (default: 10)"
     )
-    parser.set_defaults(run=run)
-    add_common(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> int:
     if "long" in parts:
         found["long"] = [_long(minutes)]
         write_rows(arguments.out / "world-long.csv", facts, found["long"])
-    publish("world", render("world.md", **found, facts=facts), {}, {}, arguments)
+    publish("world", render("world.md", **found, facts=facts), arguments)
     return 0 if all(row.held for row in found["closed"]) and not any(row.silent for row in found["throws"]) else 1
 
 

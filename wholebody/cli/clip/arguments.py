@@ -68,20 +68,11 @@ def jobs_of(arguments: argparse.Namespace) -> int:
 @contextmanager
 def bar(what: str, count: float = 1.0) -> Iterator[Callable[[float, str], object]]:
     """Show how far something is; the function takes what is done, and says what it is."""
-    from rich.console import Console
     from rich.markup import escape
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TaskProgressColumn,
-        TextColumn,
-        TimeRemainingColumn,
-    )
 
-    numbers = MofNCompleteColumn() if count != 1.0 else TaskProgressColumn()
-    columns = TextColumn("{task.description}"), BarColumn(), numbers, TimeRemainingColumn()
-    with Progress(*columns, console=Console(stderr=True), transient=True, refresh_per_second=4) as shown:
+    from wholebody.cli.tables import progress_bar
+
+    with progress_bar(counted=count != 1.0) as shown:
         task = shown.add_task(escape(what), total=count)
         yield lambda done, said: shown.update(task, completed=done, total=count, description=escape(said))
 

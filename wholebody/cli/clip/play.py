@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, clip_of
+from wholebody.cli.clip.arguments import add_command, bar, clip_of
 
 DESCRIPTION = """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
@@ -70,6 +70,12 @@ def run(arguments: argparse.Namespace) -> int:
         if out is None:
             viewer.open()
             viewer.wait_until_closed()
+        elif out.suffix.lower() == ".html":
+            print(f"wrote {viewer.save(out)}")
         else:
-            print(f"wrote {viewer.save(out) if out.suffix.lower() == '.html' else viewer.movie(out)}")
+            with bar(f"drawing {out.name}") as show:  # a share: a movie may have fewer pictures than the clip frames
+                written = viewer.movie(
+                    out, progress=lambda drawn, total: show(drawn / total, f"picture {drawn} of {total}")
+                )
+            print(f"wrote {written}")
     return 0

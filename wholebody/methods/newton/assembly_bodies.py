@@ -75,7 +75,7 @@ class AssemblyBodies:
         *,
         shape: ShapeLike | None = None,
         size: float | None = None,
-        color: Sequence[float] | None = None,
+        color: Sequence[float] | str | None = None,
     ) -> Self:
         """Add a body.
 
@@ -88,7 +88,7 @@ class AssemblyBodies:
                 body that touches nothing.
             size: metres from its origin to its rim, 0.3 by default for a body without shape and otherwise read from it;
                 a rotation of the body counts as the motion of the rim.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
 
         Raises:
             InputError: the name exists already, the size is not positive, the placement or the color cannot be read,
@@ -118,7 +118,7 @@ class AssemblyBodies:
         start: Any = None,
         *,
         constraints: Iterable[Constraint | Bound] = (),
-        color: Sequence[float] | None = None,
+        color: Sequence[float] | str | None = None,
     ) -> Self:
         """Add a figure: its joints become bodies, with its joint limits, its shapes and the pairs that it tests.
 
@@ -227,7 +227,12 @@ class AssemblyBodies:
     # ---- things around
 
     def add(
-        self, shape: Shape, *, name: str, at: PlacementLike = (0.0, 0.0, 0.0), color: Sequence[float] | None = None
+        self,
+        shape: Shape,
+        *,
+        name: str,
+        at: PlacementLike = (0.0, 0.0, 0.0),
+        color: Sequence[float] | str | None = None,
     ) -> Self:
         """Add a thing to the world: it stands still, and no body penetrates it.
 
@@ -235,7 +240,7 @@ class AssemblyBodies:
             shape: a `wholebody.geometry.shapes.Shape`.
             name: one that nothing else has.
             at: its placement.
-            color: red, green, blue and, if wanted, alpha, each from 0 to 1.
+            color: red, green, blue and, if wanted, alpha, each from 0 to 1; a name such as "steelblue", or "#rrggbb".
 
         Raises:
             InputError: the name exists already, or the shape, placement or color is invalid.

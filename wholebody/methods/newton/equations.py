@@ -47,13 +47,13 @@ class EquationSet:
         self, a: int, b: int, label: str, first: Array, second: Array, *, goal: bool = False, weight: float = 1.0
     ) -> None:
         """A point (3,) of one body coincides with a point of the other."""
-        self._add("coincide", a, b, label, first, second, goal=goal, weight=weight)
+        self._add(Key("coincide", goal, False, weight), a, b, label, first, second)
 
     def turn(
         self, a: int, b: int, label: str, first: Any, second: Any, size: int, *, goal: bool = False, weight: float = 1.0
     ) -> None:
         """Axes (pin.Quaternion) of two bodies agree: in z (size 2) or in all axes (size 3)."""
-        self._add(f"turn{size}", a, b, label, first.coeffs(), second.coeffs(), goal=goal, weight=weight)
+        self._add(Key(f"turn{size}", goal, False, weight), a, b, label, first.coeffs(), second.coeffs())
 
     def slide(
         self,
@@ -69,7 +69,7 @@ class EquationSet:
         weight: float = 1.0,
     ) -> None:
         """A point (3,) of the second body in a plane of the first, or above it."""
-        self._add("slide", a, b, label, normal, place, height, one_sided=above, goal=goal, weight=weight)
+        self._add(Key("slide", goal, above, weight), a, b, label, normal, place, height)
 
     def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
         """The angle about z of two axes (pin.Quaternion) stays between bounds, which may be infinite."""
@@ -77,14 +77,14 @@ class EquationSet:
         for bound, sign in ((low, 1.0), (high, -1.0)):
             if np.isfinite(bound):
                 parts = (first.coeffs(), second.coeffs(), center, bound, sign)
-                self._add("angle", a, b, label, *parts, one_sided=True)
+                self._add(Key("angle", False, True, 1.0), a, b, label, *parts)
 
     def angle(
         self, a: int, b: int, label: str, first: Any, second: Any, center: float, value: float, weight: float
     ) -> None:
         """A goal: the angle about z of two axes (pin.Quaternion), chosen nearest to the center, has a value."""
         parts = (first.coeffs(), second.coeffs(), center, value, 1.0)
-        self._add("angle", a, b, label, *parts, goal=True, weight=weight)
+        self._add(Key("angle", True, False, weight), a, b, label, *parts)
 
     def yielding(self) -> EquationSet:
         """A copy whose equalities are goals."""
@@ -99,18 +99,8 @@ class EquationSet:
         listed = [(_batch(key.kind, rows, count), key) for key, rows in self.rows.items()]
         return [*listed, *((make(count), key) for make, key in self.made)]
 
-    def _add(
-        self,
-        kind: str,
-        a: int,
-        b: int,
-        label: str,
-        *numbers: Any,
-        goal: bool = False,
-        one_sided: bool = False,
-        weight: float = 1.0,
-    ) -> None:
-        self.rows.setdefault(Key(kind, goal, one_sided, weight), []).append(Row(a, b, label, numbers))
+    def _add(self, key: Key, a: int, b: int, label: str, *numbers: Any) -> None:
+        self.rows.setdefault(key, []).append(Row(a, b, label, numbers))
 
 
 def unit_lengths(names: list[str]) -> tuple[Batch, Key]:

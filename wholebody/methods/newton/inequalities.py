@@ -61,18 +61,19 @@ class SquaredSlacks:
     stays one whatever the sign of its multiplier. So slacks at zero are tested after each linear solution: if the
     multiplier is negative, the slack is released. A slack that the step would take through zero is set to zero; the
     step is shortened to that point, and the remainder is solved again. Away from zero the multiplier of a slack
-    vanishes (2 y Y = 0) and so does its row. The objective of the step decreases from system to system, so no active
-    set repeats (Nocedal and Wright 2006, "Numerical Optimization", section 16.5).
+    vanishes (2 y Y = 0) and so does its row. The first solution of a step that crosses no inequality releases all
+    slacks whose multipliers are negative, later ones release the most negative one. The objective of the step decreases
+    from system to system then, so no active set repeats (Nocedal and Wright 2006, "Numerical Optimization", 16.5).
     """
 
     def __init__(self, phi: Array) -> None:
         """Begin with the slacks of the values phi (k,); violated inequalities begin at zero."""
         self.slack = np.sqrt(np.maximum(phi, 0.0))
-        self._at = phi
+        self.begin(phi)
 
     def begin(self, phi: Array) -> None:
         """A new step begins at values phi."""
-        self._at = phi
+        self._at, self._releases_all = phi, True
         self.slack[phi <= 0.0] = 0.0
 
     def rows(self, phi: Array) -> tuple[Array, Array]:
@@ -93,11 +94,14 @@ class SquaredSlacks:
             self._at = self._at + first * (predicted - self._at)
             return first, True
         self._at = predicted
-        if not (active & (multiplier < -RELEASE)).any():
+        leave = np.flatnonzero(active & (multiplier < -RELEASE))
+        if not len(leave):
             return 1.0, False
-        leave = int(np.where(active, multiplier, 0.0).argmin())
+        if not self._releases_all:
+            leave = leave[multiplier[leave].argmin()][None]
+        self._releases_all = False
         self.slack[leave] = 1.0
-        self._at[leave] = max(self._at[leave], 0.0)
+        self._at[leave] = np.maximum(self._at[leave], 0.0)
         return 1.0, True
 
     def share(self) -> float:

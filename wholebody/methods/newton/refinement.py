@@ -2,7 +2,8 @@
 
 Each round makes one step in which the motion has little weight against the measures, and returns to the equations by
 Newton steps. It is kept if the measures decreased; otherwise the next round is half as long. With the Jacobians alone,
-convergence is linear.
+convergence is linear, so the steps are accelerated; a round whose accelerated step does not lower the measures is
+repeated with the step itself.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.methods.acceleration import Anderson
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
 from wholebody.methods.newton.system import ActiveSystem
@@ -43,31 +45,49 @@ def refine(
     run.iterate(BACK, goals=True, measures="keep")
     if not run.met:
         return x, 0
-    best, least, share = run.x, measure(run.x), 1.0
+    best, least, share, system = run.x, measure(run.x), 1.0, run.system
+    memory = Anderson()
+    step: Array | None = None  # of the model at the best state, once it is known
     for _ in range(ROUNDS):
-        try:
-            step = run.step(0.0, 1.0, 1.0, True, "lower", MOTION)
-        except SingularSystemError:
-            break
-        length = share * run.length(step)
-        trial = active_system.retract(run.x + length * step)
+        fast: Array | None = None
+        if step is None:
+            try:
+                step = run.step(0.0, 1.0, 1.0, True, "lower", MOTION)
+            except SingularSystemError:
+                break
+            fast = memory.propose(step)
+        way = step if fast is None else fast
+        length = (share if fast is None else 1.0) * run.length(way)
+        trial = active_system.retract(run.x + length * way)
         if active_system.runs_into():
             run.begin(best)
+            step = None
+            memory.reset()
             continue
-        trial, length, free = run.shorten(trial, step, length)
+        trial, length, free = run.shorten(trial, way, length)
         if free:
             run.advance(trial, length)
             run.iterate(BACK, goals=True, measures="keep")
         value = measure(run.x)
         change = least - value
         if free and run.met and change > ROUNDING * abs(least):
+            memory.went(run.x - best)
             moved = float(np.abs(run.x - best).max())
-            best, least, share = run.x, value, min(1.0, LONGER * share)
+            best, least, step = run.x, value, None
+            if run.system is not system:  # other contacts: what was remembered is of other equations
+                system = run.system
+                memory.reset()
+            if fast is None:
+                share = min(1.0, LONGER * share)
             if moved < tolerance:
                 break
-        else:
+            continue
+        memory.reset()
+        run.begin(best)
+        if run.system is not system:
+            system, step = run.system, None
+        if fast is None:
             if share < SHORTEST or (free and run.met and change > -ROUNDING * abs(least)):
                 break
             share *= SHORTER
-            run.begin(best)
     return best, len(run.residuals) - 1

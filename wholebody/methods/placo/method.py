@@ -6,9 +6,11 @@ import time
 from dataclasses import dataclass
 from typing import Any
 
-from wholebody.arrays import Array
+import numpy as np
+
+from wholebody.arrays import Array, Indices
 from wholebody.checks import choice
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError, refusal
+from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.differential import COMFORT, REGULAR, TOOL, Iteration, Settings, StepError
@@ -28,7 +30,7 @@ DECAY = 0.75  # of the measures' weight from one iteration to the next; less end
 
 
 @dataclass(frozen=True)
-class Placo:
+class Placo(SolvesAnew):
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
     Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
@@ -82,7 +84,12 @@ class Placo:
         """
         check_problem(problem, "Placo.prepare: problem")
         with problem.borrow() as workspace, problem.scene.built.pool(_Room, _Room).borrow() as room:
-            room.robot(problem, workspace)
+            room.robot(problem, workspace, self.pairs(problem))
+
+    def pairs(self, problem: Problem) -> Indices:
+        """Numbers (pairs,) of the scene's pairs that placo is given: all of them."""
+        check_problem(problem, "Placo.pairs: problem")
+        return np.arange(len(problem.clearances))
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
@@ -102,21 +109,14 @@ class Placo:
             problem.scene.built.pool(_Room, _Room).borrow() as room,
             Control(self.time_limit, progress) as control,
         ):
-            stepper = _Programs(problem, room.robot(problem, workspace), self.tolerance, HOLDS[self.holds])
+            robot = room.robot(problem, workspace, self.pairs(problem))
+            stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])
             settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
         ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
-
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """A tracker that solves the problem anew at every step.
-
-        Raises:
-            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
-        """
-        return SolvingTracker(self, problem, dt)
 
 
 class _Room:
@@ -125,15 +125,15 @@ class _Room:
     def __init__(self) -> None:
         self._robot: Robot | None = None
 
-    def robot(self, problem: Problem, workspace: Workspace) -> Robot:
-        """The robot for a problem, with the placements of things in the workspace."""
+    def robot(self, problem: Problem, workspace: Workspace, pairs: Indices) -> Robot:
+        """The robot for some pairs of a problem, with the placements of things in the workspace."""
         refused = unsupported(problem)
         if refused:
             raise UnsupportedTermError("placo", refused)
         frames = named_frames(problem)
-        if self._robot is None or not self._robot.serves(problem, frames):
+        if self._robot is None or not self._robot.serves(problem, frames, pairs):
             self._robot = Robot(problem.scene.figure, frames)
-            self._robot.add_pieces(problem)
+            self._robot.add_pieces(problem, pairs)
         self._robot.place_objects(workspace.geometry)
         return self._robot
 

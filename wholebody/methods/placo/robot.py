@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Indices
 from wholebody.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
@@ -64,6 +64,7 @@ class Robot:
             ) from None
         self.frames, self._root = dict(frames), figure.root
         self._clearances = np.zeros(0)
+        self._pairs = np.zeros(0, dtype=np.intp)
         text = ElementTree.tostring(_skeleton(figure, self.frames), encoding="unicode")
         self.wrapper = placo.RobotWrapper("", placo.Flags.ignore_collisions, text)
         self._copy_model(figure)
@@ -95,9 +96,10 @@ class Robot:
             gear.set_gear(*(self.joint_name(self._ids[joint]) for joint in (name, law.joint)), law.slope)
             gear.configure(f"gear {name}", "hard", 1.0)
 
-    def serves(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]]) -> bool:
-        """Whether it fits another problem of the same scene: the same clearances, and these frames or more."""
-        return set(frames) <= set(self.frames) and np.array_equal(self._clearances, problem.clearances)
+    def serves(self, problem: Problem, frames: Mapping[str, tuple[int, pin.SE3]], pairs: Indices) -> bool:
+        """Whether it fits another problem of the same scene: the same clearances and pairs, these frames or more."""
+        same = np.array_equal(self._clearances, problem.clearances) and np.array_equal(self._pairs, pairs)
+        return same and set(frames) <= set(self.frames)
 
     def place_objects(self, ours: pin.GeometryModel) -> None:
         """Copy the placements of the pieces from a geometry model like the scene's."""
@@ -143,14 +145,14 @@ class Robot:
         for name, (_, placement) in self.frames.items():
             theirs.frames[theirs.getFrameId(name)].placement = placement
 
-    def add_pieces(self, problem: Problem) -> None:
-        """Add the pieces of all pairs of a problem.
+    def add_pieces(self, problem: Problem, pairs: Indices) -> None:
+        """Add the pieces of pairs of a problem, by their numbers (pairs,) in the scene.
 
         placo has one margin for all pairs, but a problem has a clearance for each. So the first piece of a pair is
         enlarged by the clearance, once for every clearance that it has.
         """
         scene, model = problem.scene.geometry, self.wrapper.collision_model
-        self._clearances = problem.clearances.copy()
+        self._clearances, self._pairs = problem.clearances.copy(), pairs.copy()
         made: dict[tuple[int, float], int] = {}
 
         def piece(number: int, radius: float) -> int:
@@ -164,7 +166,8 @@ class Robot:
                 self._pieces.append(number)
             return made[number, radius]
 
-        for pair, clearance in zip(scene.collisionPairs, problem.clearances.tolist(), strict=True):
+        for number in pairs.tolist():
+            pair, clearance = scene.collisionPairs[number], float(problem.clearances[number])
             first, second = piece(pair.first, clearance + SWELL), piece(pair.second, 0.0)
             model.addCollisionPair(pin.CollisionPair(first, second))
 

@@ -19,8 +19,8 @@ from wholebody.arrays import Array
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
+from wholebody.methods.acceleration import Anderson
 from wholebody.methods.control import Control
-from wholebody.methods.qp.acceleration import Anderson
 from wholebody.methods.qp.funnel import Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver

@@ -26,6 +26,7 @@ from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
+from wholebody.workspace import OfOneRun
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
@@ -86,7 +87,7 @@ class FrameStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class QPTracker:
+class QPTracker(OfOneRun):
     """Follows the goals of one problem, step by step.
 
     No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,

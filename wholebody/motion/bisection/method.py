@@ -33,7 +33,7 @@ more closely and predicts more postures."""
 
 MOST_FRAMES = 1_000_000
 MOST_BUFFER = 1000.0  # percent
-MOST_CLEARANCE = 0.1  # m
+MOST_ROOM = 0.1  # m
 NAMED = 6  # runs of frames that a message lists
 
 
@@ -56,7 +56,7 @@ class Bisection:
             posture is predicted; None for elbows and ankles, where the figure has them.
         frozen: joints and groups that stay as they are; None for a free root. ("root", "lower_body") moves the upper
             body alone.
-        clearance: least distance in predicted postures of what overlapped, metres.
+        room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`.
     """
 
@@ -66,7 +66,7 @@ class Bisection:
     interpolation: Kind = "linear"
     planes: tuple[str, ...] | None = None
     frozen: tuple[str, ...] | None = None
-    clearance: float = 0.005
+    room: float = 0.005
     method: str | Method = "qp"
 
     def __post_init__(self) -> None:
@@ -88,7 +88,7 @@ class Bisection:
             if given is not None:
                 names = listed(given, f"Bisection: {name}", "['left_elbow']")
                 object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
-        number(self.clearance, "Bisection: clearance", 0.0, MOST_CLEARANCE, "m")
+        number(self.room, "Bisection: room", 0.0, MOST_ROOM, "m")
         method_for_motions(self.method)
 
     @property
@@ -97,13 +97,7 @@ class Bisection:
         return "bisection"
 
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
-        """Free a clip.
-
-        Args:
-            clip: original postures; they stay as they are.
-            scene: its figure with equipment, and the things around.
-            constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
-            progress: called with the share done; where it returns True, the method ends with what it has.
+        """Free a clip; see `wholebody.motion.avoider.Avoider`.
 
         Raises:
             InputError: an evaluation point beyond the clip's frames, or a constraint that is none.
@@ -123,7 +117,7 @@ class Bisection:
         stays = Stays(scene, original, terms, frozen)
         method = method_for_motions(self.method)
         with scene.borrow() as workspace:
-            predictor = Predictor(scene, original, terms, frozen, method, self.clearance, OVERLAP, workspace)
+            predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
             recursion = Recursion(
                 scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
             )

@@ -9,42 +9,27 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Effort, Freeze, Plane
-from wholebody.tasks.base import Goal, Measure, Surroundings, filled
-from wholebody.tasks.distance import SquaredDistance
+from wholebody.tasks.base import Goal, Surroundings, filled
+from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 from wholebody.workspace import Workspace
 
 HELD = 2e-4  # m, rad: by which what is held may be missed in a frame; a fifth of the millimetre that is visible
 ROOT_WEIGHT = 100.0  # of the root in the effort [1/m^2, 1/rad^2]: as the spine's, since moving it moves the whole body
 
 
-class RootEffort(Measure):
+class RootEffort(DistanceMeasure):
     """Squared displacement of the root from the start, which `Effort` leaves out."""
-
-    distance: SquaredDistance
 
     def resolve(self, scene: Surroundings, start: Array) -> RootEffort:
         """Store the start."""
         weights = np.zeros(scene.model.nv)
         weights[:6] = ROOT_WEIGHT
         return filled(self, distance=SquaredDistance.build(scene.model, start, weights))
-
-    def value(self, state: State) -> float:
-        """The squared displacement, weighted."""
-        return self.distance.value(state)
-
-    def gradient(self, state: State) -> Array:
-        """(nv,) its derivative."""
-        return self.distance.gradient(state)
-
-    def curvature(self, state: State) -> Array:
-        """(nv,) the diagonal of its second derivative."""
-        return self.distance.curvature
 
 
 class Prediction(NamedTuple):
@@ -110,8 +95,9 @@ class Predictor:
             planes: further constraints.
             effort_from: (nq,) posture from which the effort is counted instead.
         """
-        goals = [term for term in self.terms.given if isinstance(term, Goal)]
-        others = [term for term in self.terms.given if not isinstance(term, Goal)]
+        asked = self.terms.asked(frame)
+        goals = [term for term in asked if isinstance(term, Goal)]
+        others = [term for term in asked if not isinstance(term, Goal)]
         problem = Problem(
             self.scene,
             self.original[frame],

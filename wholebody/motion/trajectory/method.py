@@ -41,7 +41,7 @@ class Trajectory:
         time: seconds: how far a push at one frame spreads to its neighbours; larger = smoother, farther off.
         margin: seconds before and after a collision in which frames may be changed.
         solver: "piqp", "osqp", or None for piqp where it is installed, else osqp.
-        iterations: most quadratic programs of one attempt at a window.
+        iterations: most steps of one run of a window; a step takes one to three quadratic programs.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
             timing; joints that the clip moves faster than their limits then stay as fast.
@@ -82,7 +82,7 @@ class Trajectory:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)
         constraints = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
-        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints), Watch(progress)
+        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints, self.clearance), Watch(progress)
         _, solve = banded_solver(self.solver)
         with scene.borrow() as workspace:
             loads = None

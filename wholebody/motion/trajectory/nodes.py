@@ -19,6 +19,8 @@ from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.tasks.base import Constraint, Goal
 from wholebody.workspace import Workspace
 
+ROOM = 1e-4  # m: asked of pairs between frames; what is beside a place then dips by less than is told, once for all
+
 Terms = Sequence[Constraint | Goal]
 
 
@@ -44,6 +46,11 @@ class Node(NamedTuple):
     def soft(self) -> bool:
         """Whether its rows are missed where they must be, for contacts come first."""
         return self.loaded >= 0
+
+    @property
+    def room(self) -> float:
+        """Metres that programs ask of its rows beyond what must be met."""
+        return ROOM if self.share else 0.0
 
 
 class Rows(NamedTuple):

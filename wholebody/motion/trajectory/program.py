@@ -24,6 +24,7 @@ SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits o
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
 SMALL_EXCESS = 0.1  # of the radius: speeds that exceed their bound by less are brought back by one step
 NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
+CLOSE, NEAR_SHARE = 3e-3, 0.3  # m, and m for each rad of the radius: rows nearer than the larger begin a program
 TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
 
 
@@ -70,7 +71,7 @@ class Layout(NamedTuple):
 
 def lay_out(
     objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, limits: Limits, radius: float, penalty: float,
-    multipliers: Sequence[Array], stiffness: float,
+    multipliers: Sequence[Array], stiffness: float, kept: Sequence[Mask],
 ) -> Layout:  # fmt: skip
     """The program of a step from the deviations x (n, nv).
 
@@ -84,9 +85,9 @@ def lay_out(
         penalty: of a metre or radian of shortfall.
         multipliers: of the equalities of each node.
         stiffness: quadratic penalty of equalities.
+        kept: for each node which of its rows the program gets.
     """
     frames, count = len(x), len(dofs)
-    kept = [_kept(one, dofs, radius) for one in rows]
     slacks = [_slacks(one, keep) for one, keep in zip(rows, kept, strict=True)]
     per_frame = np.zeros(frames, dtype=np.intp)
     for one, (_, number) in zip(rows, slacks, strict=True):
@@ -143,16 +144,22 @@ def foreseen(one: Rows, step: Array) -> Array:
 
 def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
     """For each node which rows are tight or missed after a step (n, nv)."""
-    return [foreseen(one, step) <= TIGHT for one in rows]
+    return [foreseen(one, step) <= one.node.room + TIGHT for one in rows]
 
 
-def _kept(one: Rows, dofs: Indices, radius: float) -> Mask:
-    """Rows that a step within the radius could miss."""
+def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
+    """(r,) rows of a node that a step within the radius could miss."""
     reach = np.zeros(len(one.gap))
     for part in one.parts:
         reach += np.abs(part[:, dofs]).sum(axis=1)
-    kept: Mask = (one.gap < radius * reach) & (reach > 0.0)
-    return kept
+    found: Mask = (one.gap < one.node.room + radius * reach) & (reach > 0.0)
+    return found
+
+
+def likely(one: Rows, radius: float) -> Mask:
+    """(r,) rows of a node that a program is begun with: a step of the radius hardly ever misses others."""
+    near: Mask = one.gap < one.node.room + max(CLOSE, NEAR_SHARE * radius)
+    return np.ones_like(near) if one.node.soft else near
 
 
 def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
@@ -202,7 +209,7 @@ def _contact_part(
         if not many:
             continue
         index = np.arange(number, number + many)
-        bound = np.minimum(-one.gap[keep], ONE_STEP)
+        bound = np.minimum(one.node.room - one.gap[keep], ONE_STEP)
         for offset, part in enumerate(one.parts):
             own = part[np.ix_(keep, dofs)]
             values.append(own.ravel())

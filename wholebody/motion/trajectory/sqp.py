@@ -21,21 +21,34 @@ from wholebody.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.nodes import Looking, Node, Rows
 from wholebody.motion.trajectory.objective import Objective
-from wholebody.motion.trajectory.program import SOFT, Limits, active, lay_out, touched
+from wholebody.motion.trajectory.program import (
+    SOFT,
+    Limits,
+    active,
+    foreseen,
+    lay_out,
+    likely,
+    touched,
+    within_reach,
+)
 
 RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear ways, more that are refused
 LARGEST, SMALLEST = 0.5, 1e-4
 WITHIN = 0.1  # m: pairs nearer than this have rows; it is what a radius moves the end of a limb by
-MET = 1e-5  # m, rad: a row missed by no more is met
+MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
 STILL = 2e-3  # rad, m: a step no larger ends the iterations where everything is met; larger = rougher optima, faster
 GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
 PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
 RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
+EARLY = 10  # steps after which a hasty run ends; more = longer where normals mislead, fewer = more other starts
+SHRUNK = 0.5 * RADIUS  # a hasty run also ends once its trust region is smaller
+FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
+ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
 MARGIN = 1e-2  # of a shortfall: by how much a step must be better than the filter
 Cancel = Callable[[int, float], bool]
-"""Told the number of programs and the worst shortfall; true ends the iterations."""
+"""Told the number of steps and the worst shortfall; true ends the iterations."""
 
 
 class Found(NamedTuple):
@@ -90,7 +103,7 @@ class WindowProgram:
             objective: of the window.
             limits: of its deviations.
             solve: solves one program.
-            iterations: most programs of one run.
+            iterations: most steps of one run; a step takes one to three programs.
         """
         self._looking, self._objective, self._limits = looking, objective, limits
         self._solve, self._iterations = solve, iterations
@@ -101,26 +114,34 @@ class WindowProgram:
         """More places to look at."""
         self.nodes = sorted({*self.nodes, *nodes})
 
-    def run(self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST) -> Found:
-        """Iterate from deviations x (n, nv), with a first trust region of a radius, and a largest one."""
+    def run(
+        self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST, hasty: bool = False
+    ) -> Found:
+        """Iterate from deviations x (n, nv).
+
+        Args:
+            x: (n, nv) deviations.
+            cancel: told how far it is.
+            radius: first trust region.
+            largest: largest trust region.
+            hasty: end early where much is missed still, for there are other deviations to begin with.
+        """
         here = self._at(x)
         penalty = PENALTY
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)
         programs = 0
-        while programs < self._iterations:
-            if cancel(programs, here.worst):
+        for number in range(self._iterations):
+            if hasty and here.worst > FAR and (number >= EARLY or radius < SHRUNK):
+                break
+            if cancel(number, here.worst):
                 return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
             if not counts.any():
                 break
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
-            layout = lay_out(
-                self._objective, here.rows, here.x, dofs, self._limits, radius, penalty, multipliers, STIFFNESS
-            )
-            answer = self._solve(layout.program)
-            programs += 1
-            there_x = layout.deviations(answer.z, here.x)
+            there_x, solved = self._step(here, dofs, radius, penalty, multipliers)
+            programs += solved
             step = there_x - here.x
             longest = float(np.abs(step).max(initial=0.0))
             more = self._joined(here, step, counts)
@@ -145,6 +166,32 @@ class WindowProgram:
                     penalty, radius = min(RAISE * penalty, HIGHEST), 0.1 * RADIUS
                     entries.clear()
         return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, False)
+
+    def _step(
+        self, here: _At, dofs: Indices, radius: float, penalty: float, multipliers: Sequence[Array]
+    ) -> tuple[Array, int]:
+        """Deviations (n, nv) after the step of a program, and how many programs were solved for it.
+
+        Most rows within reach stay far from being missed. So a program begins with the near ones. Those that its step
+        would miss are added, and it is solved again; the last time it gets all that are within reach.
+        """
+        possible = [within_reach(one, dofs, radius) for one in here.rows]
+        kept = [mask & likely(one, radius) for one, mask in zip(here.rows, possible, strict=True)]
+        solved = 0
+        while True:
+            layout = lay_out(
+                self._objective, here.rows, here.x, dofs, self._limits, radius, penalty, multipliers, STIFFNESS, kept
+            )
+            x, solved = layout.deviations(self._solve(layout.program).z, here.x), solved + 1
+            left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
+            missed = [
+                mask & (foreseen(one, x - here.x) < one.node.room - MET) if mask.any() else mask
+                for one, mask in zip(here.rows, left, strict=True)
+            ]
+            if not any(mask.any() for mask in missed):
+                return x, solved
+            more = left if solved == ADDED else missed
+            kept = [keep | mask for keep, mask in zip(kept, more, strict=True)]
 
     def _at(self, x: Array) -> _At:
         rows = [self._looking.at(node, x, WITHIN) for node in self.nodes]

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from enum import Enum
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from wholebody.arrays import Array, Mask
-from wholebody.motion.dips import dipping, dips, sampled_dips
+from wholebody.motion.dips import FEW, dipping, dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
@@ -54,6 +55,14 @@ class Freed(NamedTuple):
 
     q: Array
     missed: str
+
+
+class _Way(Enum):
+    """How an attempt goes: from deviations that are free but for dips, from usual ones, or with others left to try."""
+
+    CAREFUL = "careful"
+    USUAL = "usual"
+    HASTY = "hasty"
 
 
 class _Attempt(NamedTuple):
@@ -158,8 +167,9 @@ class ClipRun:
             starts = self._starts(window, chart, limits, depths, always)
         else:
             starts = [_deviations(chart, begun, limits)]
-        for start in starts:
-            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, begun is not None)
+        for number, start in enumerate(starts):
+            way = _Way.CAREFUL if begun is not None else _Way.USUAL if number else _Way.HASTY
+            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
             if attempt is None:
                 return Freed(chart.original, "")
             best = attempt if best is None or attempt.rank < best.rank else best
@@ -179,9 +189,10 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends.
+        and both ends; none once more, for the first attempt is ended early.
         """
-        yield np.zeros((len(window), self._workspace.model.nv))
+        none = np.zeros((len(window), self._workspace.model.nv))
+        yield none
         if not (limits.lower < limits.upper).any():
             return  # nothing can move
         if always:
@@ -192,16 +203,19 @@ class ClipRun:
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             yield _deviations(chart, self._carried.outwards(window, middle), limits)
+        yield none
 
     def _attempt(
         self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
-        cancel: Callable[[float], bool], careful: bool,
+        cancel: Callable[[float], bool], way: _Way,
     ) -> _Attempt | None:  # fmt: skip
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
+        careful, hasty = way is _Way.CAREFUL, way is _Way.HASTY
         found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
+        most, dipped = self._settings.iterations, set[int]()
         for _ in range(ROUNDS):
-            found = program.run(x, lambda count, worst: cancel(count / self._settings.iterations), radius, largest)
-            radius = NEARLY
+            found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, hasty)
+            radius, hasty = NEARLY, False
             self._programs += found.programs
             if found.cancelled:
                 return None
@@ -210,6 +224,8 @@ class ClipRun:
             gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
             swept = dips(self._workspace, q, gaps)
             near = [(gap, share + side) for gap, share in swept.items() for side in SIDES]
+            near += [(gap, share) for gap in swept if gap in dipped for share in FEW]  # what dips again, everywhere
+            dipped |= swept.keys()
             if near and found.met:
                 near += sampled_dips(self._workspace, q, gaps)
             if not near or not found.met:

@@ -174,7 +174,7 @@ class PersonShape:
         points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
         low, high = bounds(points, 0.085 * scale + 0.05)
         claims = self._claims([name for name in segments if name != "neck"])
-        return Garment("shirt", SHIRT, cut, low, high, 0.010, claims)
+        return Garment("shirt", SHIRT, cut, low, high, 0.020, claims)
 
     def _trousers(self) -> Garment:
         scale = self.size.stature / 1.75
@@ -202,7 +202,7 @@ class PersonShape:
         segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
         low, high = bounds([*points, np.array([0.0, 0.0, self._belt()])], 0.13 * scale + 0.04)
-        return Garment("trousers", TROUSERS, body, low, high, 0.012, self._claims(segments))
+        return Garment("trousers", TROUSERS, body, low, high, 0.024, self._claims(segments))
 
     def _calf(self, side: str, sign: float) -> Field:
         """The muscle behind the shank."""
@@ -229,9 +229,9 @@ class PersonShape:
             Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
         ]
         rigid = [Claim("head", lambda points: np.zeros(len(points)))]
-        yield Garment("head", SKIN, skin, low, high, 0.0058, claims)
+        yield Garment("head", SKIN, skin, low, high, 0.0093, claims)
         low[2] = self.at("head", (0.0, 0.0, self.size.head_bottom))[2] - 0.06
-        yield Garment("hair", HAIR, placed(shape.hair, frame), low, high, 0.006, rigid)
+        yield Garment("hair", HAIR, placed(shape.hair, frame), low, high, 0.012, rigid)
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
         yield Garment("eyes", WHITE, placed(shape.eyes, frame), *around, 0.0035, rigid)
@@ -245,7 +245,7 @@ class PersonShape:
         corners = [self.at(f"{side}_hand", corner) for corner in shape.corners]
         low, high = bounds(corners, 0.035)
         claims = [Claim(claim.bone, placed(claim.field, frame), claim.softness) for claim in shape.claims]
-        return Garment(f"{side}_hand", SKIN, placed(shape.field, frame), low, high, 0.0034, claims)
+        return Garment(f"{side}_hand", SKIN, placed(shape.field, frame), low, high, 0.0054, claims)
 
     def _shoe(self, side: str, sign: float) -> Garment:
         size, scale = self.size, self.size.stature / 1.75
@@ -292,7 +292,7 @@ class PersonShape:
             ),
             Claim(f"{side}_toes", placed(half_space((toe, 0.0, 0.0), (-1.0, 0.0, 0.0)), frame), 0.010),
         ]
-        return Garment(f"{side}_shoe", SHOES, placed(body, frame), low, high, 0.006, claims)
+        return Garment(f"{side}_shoe", SHOES, placed(body, frame), low, high, 0.012, claims)
 
     # ---- places
 

@@ -99,9 +99,13 @@ class ChainResolver:
         inside = [guard.keep() for guard in self._guards]
         return all(inside)
 
-    def find(self, overlaps: Sequence[Overlap], deepest_first: bool = False) -> Link | None:
-        """The overlapping link to be moved; see `LinkFinder.find`."""
-        return self._finder.find(overlaps, deepest_first)
+    def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The overlapping link nearest to the root; see `LinkFinder.nearest_root`."""
+        return self._finder.nearest_root(overlaps)
+
+    def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The link that is deepest inside; see `LinkFinder.deepest`."""
+        return self._finder.deepest(overlaps)
 
     def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
         """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first."""

@@ -31,9 +31,7 @@ SMALL_STEP_BUDGET = 15  # queries and goals for small steps, if larger ones foun
 OVERRUN = 16  # further queries and goals after which no chain is processed any more
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
-APART = 0.02  # m: motion of a tip between two queries of the direct motion from one shown posture to the next
-MOST_QUERIES = 5
-DIP = 4e-4  # m: allowed depth of that motion
+DIP = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
 PASSED = (
     2e-3  # m: allowed overlap of the motion of a single step; the motion between shown postures is swept more closely
 )
@@ -52,7 +50,6 @@ class OverlapResult:
         pairs: number of different pairs of pieces that overlapped during the search.
         contact_seconds: time of contact queries.
         ik_seconds: time of cyclic coordinate descent.
-        fell_back: whether interpolation with the last posture without overlap was needed.
         deepest: deepest remaining overlap, metres.
         swept: whether the direct motion from the posture shown before was swept and is free.
     """
@@ -63,7 +60,6 @@ class OverlapResult:
     pairs: int
     contact_seconds: float
     ik_seconds: float
-    fell_back: bool
     deepest: float
     swept: bool
 
@@ -112,7 +108,7 @@ class FrameResolver:
         resolver = self._resolver
         resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
-        self._fell_back = self._swept = False
+        self._swept = False
         q, overlaps = resolver.resolve(q_free, rng, OVERRUN)
         pushed = resolver.counts.iterations > 0
         for size in PERTURBATIONS if overlaps else ():
@@ -186,14 +182,7 @@ class FrameResolver:
         return None
 
     def _clear(self, q0: Array, q1: Array) -> bool:
-        """Whether the direct motion between two shown postures is free; queries are cheap, the sweep is exact."""
-        way = np.abs(np.asarray(pin.difference(self._model, q0, q1)))
-        length = max(float(way[dofs] @ reach) for dofs, reach in self._parts)
-        queries = min(int(length / APART), MOST_QUERIES)
-        for k in range(queries):
-            self._resolver.query(np.asarray(pin.interpolate(self._model, q0, q1, (k + 1) / (queries + 1))))
-            if self._resolver.deepest > DIP:
-                return False
+        """Whether the direct motion between two shown postures is free."""
         return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * DIP) is None
 
     def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
@@ -204,7 +193,6 @@ class FrameResolver:
 
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture between a free one and q, by bisection."""
-        self._fell_back = True
         result = last_free(self._model, free, q, self._resolver.query, HALVINGS)
         self._resolver.query(result)
         return result
@@ -226,7 +214,6 @@ class FrameResolver:
             pairs=len(counts.pairs),
             contact_seconds=counts.contact_seconds,
             ik_seconds=counts.ik_seconds,
-            fell_back=self._fell_back,
             deepest=self._resolver.deepest,
             swept=self._swept,
         )

@@ -54,6 +54,15 @@ class Link(NamedTuple):
     depth: float
 
 
+class _Side(NamedTuple):
+    """The side of an overlap that moves: its node, whether it is piece a, and the nodes that move it."""
+
+    overlap: Overlap
+    node: int
+    is_a: bool
+    nodes: tuple[int, ...]
+
+
 class LinkFinder:
     """Finds the overlapping link of one chain."""
 
@@ -76,30 +85,44 @@ class LinkFinder:
         self._paths = [frozenset(path) for path in limbs.paths]
         self._masks: dict[tuple[tuple[int, ...], str], tuple[list[int], NDArray[np.bool_]]] = {}
 
-    def find(self, overlaps: Sequence[Overlap], deepest_first: bool = False) -> Link | None:
-        """The overlapping link nearest to the root, or the one deepest inside; None if no joint can change an overlap.
+    def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The overlapping link nearest to the root; None if no joint can change an overlap.
 
         Args:
             overlaps: of the figure, at the placements of the last query.
-            deepest_first: whether the depth decides.
         """
-        links: dict[int, list[tuple[Overlap, bool, tuple[int, ...]]]] = {}
+        links = self._links(overlaps)
+        return self._link(links[min(links)]) if links else None
+
+    def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The link that is deepest inside; None if no joint can change an overlap.
+
+        Args:
+            overlaps: of the figure, at the placements of the last query.
+        """
+        links = self._links(overlaps).values()
+        return self._link(max(links, key=lambda found: max(item.overlap.depth for item in found))) if links else None
+
+    def _links(self, overlaps: Sequence[Overlap]) -> dict[int, list[_Side]]:
+        """The overlaps that a joint can change, by the node of their link."""
+        links: dict[int, list[_Side]] = {}
         for overlap in overlaps:
             found = self._side(overlap)
             if found is not None:
-                links.setdefault(found[0], []).append((overlap, found[1], found[2]))
-        if not links:
-            return None
-        node = max(links, key=lambda k: max(item[0].depth for item in links[k])) if deepest_first else min(links)
-        deepest = max(links[node], key=lambda item: item[0].depth)
-        same = [(overlap, is_a) for overlap, is_a, nodes in links[node] if nodes == deepest[2]]
+                links.setdefault(found.node, []).append(found)
+        return links
+
+    def _link(self, sides: list[_Side]) -> Link:
+        """The link of these overlaps, moved by the nodes that change the deepest of them."""
+        deepest = max(sides, key=lambda item: item.overlap.depth)
+        same = [(item.overlap, item.is_a) for item in sides if item.nodes == deepest.nodes]
         points = [overlap.point_a if is_a else overlap.point_b for overlap, is_a in same]
         count = len(points)
         x, y, z = (sum(point[k] for point in points) / count for k in range(3))
-        return Link(node, deepest[2], (x, y, z), self._push(same), deepest[0].depth)
+        return Link(deepest.node, deepest.nodes, (x, y, z), self._push(same), deepest.overlap.depth)
 
-    def _side(self, overlap: Overlap) -> tuple[int, bool, tuple[int, ...]] | None:
-        """The node of the link, whether it is piece a, and the nodes that move it against the other piece."""
+    def _side(self, overlap: Overlap) -> _Side | None:
+        """The side of an overlap that a joint moves against the other, or None."""
         for is_a in (True, False) if self._own[overlap.joint_a] >= self._own[overlap.joint_b] else (False, True):
             mine, other = (overlap.joint_a, overlap.joint_b) if is_a else (overlap.joint_b, overlap.joint_a)
             node, under = self._own[mine], self._carrier[other]
@@ -107,7 +130,7 @@ class LinkFinder:
                 common = self._paths[under] if under >= 0 else frozenset()
                 nodes = tuple(k for k in self._limbs.paths[node] if k not in common)
                 if nodes:
-                    return node, is_a, nodes
+                    return _Side(overlap, node, is_a, nodes)
         return None
 
     def _push(self, overlaps: Sequence[tuple[Overlap, bool]]) -> Vector:

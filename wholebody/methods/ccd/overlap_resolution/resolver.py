@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -16,10 +16,13 @@ from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
-from wholebody.methods.ccd.overlap_resolution.links import Overlap
+from wholebody.methods.ccd.overlap_resolution.links import Link, Overlap
 from wholebody.methods.control import Control
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
+
+Find = Callable[[ChainResolver, Sequence[Overlap]], "Link | None"]
+"""What chooses the link to be moved."""
 
 TOLERANCE = 1e-4  # m: largest overlap that is ignored; coal's own accuracy is a hundredth of it
 GOALS = 8  # most goals for one chain in one pass
@@ -147,7 +150,7 @@ class OverlapResolver:
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)
-        deepest_first = False
+        find = ChainResolver.nearest_root
         for _ in range(PASSES):
             if not overlaps:
                 break
@@ -155,18 +158,18 @@ class OverlapResolver:
             for k in rng.permutation(len(names)).tolist():
                 if self.counts.work > most_work or self.control.over:
                     break
-                overlaps = self._leave(self.chains[names[k]], q, overlaps, deepest_first)
+                overlaps = self._leave(self.chains[names[k]], q, overlaps, find)
             if overlaps and self.deepest > GAIN * before:
-                if deepest_first or not self.exact:
+                if find is ChainResolver.deepest or not self.exact:
                     break
-                deepest_first = True  # a forearm that cannot leave keeps the hand from its turn
+                find = ChainResolver.deepest  # a forearm that cannot leave keeps the hand from its turn
         return q, overlaps
 
-    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], deepest_first: bool) -> list[Overlap]:
+    def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], find: Find) -> list[Overlap]:
         """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
         for _ in range(GOALS):
-            link = chain.find(overlaps, deepest_first)
+            link = find(chain, overlaps)
             if link is None or (link.node == node and link.depth > SLOW * worst):
                 break
             worst, node = link.depth, link.node

@@ -1,6 +1,6 @@
 """Anderson acceleration of the last part of a descent, where steps shrink by the same factor again and again.
 
-The programs know the measures' curvature but not that of the constraints, so the steps f_k near an optimum form a
+The steps know the measures' curvature but not that of the constraints, so the steps f_k near an optimum form a
 linear sequence. From the last few, the combination that would have made the step vanish tells where the sequence leads
 (Walker and Ni 2011, "Anderson acceleration for fixed-point iterations", type II):
 
@@ -30,7 +30,7 @@ class Anderson:
         self._ways: list[Array] = []
 
     def propose(self, step: Array) -> Array | None:
-        """The accelerated step for the plain one, shape (nv,), or None while too little is known."""
+        """The accelerated step for the plain one (k,), or None while too little is known."""
         self._steps.append(step)
         if len(self._steps) < 3:
             return None

@@ -1,0 +1,132 @@
+"""Where a hand is held whose place at the other one overlaps it: beside that place, as near and as smooth as can be.
+
+`Hold("left_palm", relative_to="right_palm")` keeps the grip of each frame. No joint lies between two things that are
+held at each other, so where the recording has them in each other, contact and grip contradict. Recordings that were
+brought onto larger hands do. There the grip is shifted, by the shift s_t (3,) of each frame t for which
+
+    1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2)    is least, and    n . s_t >= depth + room
+
+for every near pair of pieces with its normal n, where the room includes the clearance. Normals turn with the shift, so
+the program is solved a few times.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import coal
+import numpy as np
+import pinocchio as pin
+import scipy.sparse as sp
+
+from wholebody.arrays import Array
+from wholebody.motion.trajectory.banded_qp import BandedQP, banded_solver
+from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.windows import Window, windows
+from wholebody.scene import Scene
+from wholebody.tasks import Hold
+
+OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
+ROOM = (
+    3e-4  # m: that shifted things are apart beyond what is asked: what moves on an arc from frame to frame dips by less
+)
+NEAR = 0.02  # m: pairs nearer than this have rows
+SPREAD = 0.1  # s: how far a shift at one frame spreads to its neighbours
+MARGIN = 0.5  # s, before and after an overlap: in which grips are shifted
+FARTHEST = 0.05  # m: of a shift along any axis; what needs more is no grip, and stays as it is
+ROUNDS = 8  # of normals
+
+
+class _Row(NamedTuple):
+    """A near pair in one frame: its distance (m), and the normal (3,) along which a shift parts it."""
+
+    frame: int
+    distance: float
+    normal: Array
+
+
+class _Grip:
+    """Pieces that are rigid with a frame, and those with the frame that it is held at."""
+
+    def __init__(self, scene: Scene, term: Hold) -> None:
+        model, table = scene.model, scene.pair_table
+        self._model, self._data = model, model.createData()
+        self._own, self._other = (model.frames[scene.frame_id(name)] for name in (term.frame, str(term.relative_to)))
+        joints = self._own.parentJoint, self._other.parentJoint
+        pieces = scene.geometry.geometryObjects
+        self._pairs = []
+        for first, second in table.pairs.tolist():
+            for a, b in ((first, second), (second, first)):
+                if (pieces[a].parentJoint, pieces[b].parentJoint) == joints and joints[0] != joints[1]:
+                    self._pairs.append((pieces[a], pieces[b]))
+        self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+
+    def rows(self, frame: int, q: Array, shift: Array, clearance: float) -> list[_Row]:
+        """Near pairs at a posture (nq,) with a shift (3,) in the axes of the other frame.
+
+        Their distances are less the clearance, metres.
+        """
+        if not self._pairs:
+            return []
+        pin.forwardKinematics(self._model, self._data, q)
+        base = self._data.oMi[self._other.parentJoint] * self._other.placement
+        at = base.actInv(self._data.oMi[self._own.parentJoint])
+        at.translation += shift
+        back, found = self._other.placement.inverse(), []
+        for own, other in self._pairs:
+            place, fixed = at * own.placement, back * other.placement
+            self._result.clear()
+            distance = -clearance + coal.distance(
+                other.geometry, coal.Transform3s(fixed.rotation, fixed.translation),
+                own.geometry, coal.Transform3s(place.rotation, place.translation), self._request, self._result,
+            )  # fmt: skip
+            normal = np.array(self._result.normal)
+            if distance < NEAR and np.isfinite(normal).all() and normal.any():
+                found.append(_Row(frame, float(distance), normal))
+        return found
+
+
+def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float = 0.0) -> Array:
+    """(n, 3) shifts of a grip in the axes of the frame that it is relative to, metres; zero where nothing is too near.
+
+    Args:
+        scene: figure and things.
+        q: (n, nq) original postures.
+        dt: seconds from frame to frame.
+        term: holds a frame where it is at another one of the figure in each posture.
+        clearance: least distance of every pair, metres.
+    """
+    grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
+    depths = [_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)]
+    wrong = np.array(depths) > OVERLAP
+    for window in windows(wrong, max(3, round(MARGIN / dt))):
+        found = _window(grip, window, q, dt, clearance)
+        if found is not None:
+            shifts[window.first : window.end] = found
+    return shifts
+
+
+def _deepest(rows: list[_Row]) -> float:
+    return max((-row.distance for row in rows), default=0.0)
+
+
+def _window(grip: _Grip, window: Window, q: Array, dt: float, clearance: float) -> Array | None:
+    """(frames, 3) shifts of a window; None where none is found that parts everything."""
+    count = len(window)
+    seams = window.first > 0, window.end < len(q)
+    bands = Objective(count, np.ones(3), SPREAD, dt, seams).bands
+    P, shifts = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3))), np.zeros((count, 3))
+    _, solve = banded_solver(None)
+    for _ in range(ROUNDS):
+        rows = [row for k in range(count) for row in grip.rows(k, q[window.first + k], shifts[k], clearance)]
+        if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
+            return shifts
+        at = np.repeat(np.arange(len(rows)), 3), np.concatenate([3 * row.frame + np.arange(3) for row in rows])
+        G = sp.csc_matrix((np.concatenate([row.normal for row in rows]), at), shape=(len(rows), 3 * count))
+        lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
+        most = np.full(3 * count, FARTHEST)
+        answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
+        if not answer.solved:
+            return None
+        shifts = answer.z.reshape(count, 3)
+    return None

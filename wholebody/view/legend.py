@@ -1,0 +1,72 @@
+"""The panel of the page: the title, what the picture says in one line, and the meaning of the colours that occur."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import degrees
+from typing import Any
+
+from wholebody.assessment import Assessment
+from wholebody.geometry.proximity import PENETRATION
+from wholebody.view import style
+from wholebody.view.commands import pack
+from wholebody.view.scene_graph import Keyframe
+from wholebody.view.server import OBJECT, Command
+
+NODE = "/panel"
+"""Node under which the page keeps it; nothing is drawn there."""
+
+SMALLEST_ANGLE = 1e-3
+"""Radians: smaller angles are not told."""
+
+_MARKED = (
+    ("/normal", style.CONTACT_NODE, style.NORMAL, "normal of a contact"),
+    ("/depth", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
+    ("/first", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
+    ("/target", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
+    ("/wanted", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
+    ("/ball", style.BLOCKER_NODE, style.BLOCKER, "in the way"),
+)
+"""End of a marker's node, its folder, its colour and its meaning."""
+
+
+def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
+    """Meanings and colours (red, green, blue) of what occurs in any of the keyframes."""
+    found: dict[str, Any] = {}
+    if any(keyframe.touching for keyframe in keyframes):
+        found["touches"] = style.CONTACT[:3]
+    if any(keyframe.overlapping for keyframe in keyframes):
+        found["overlaps"] = style.PENETRATION[:3]
+    paths = {path for keyframe in keyframes for path in keyframe.markers}
+    for end, folder, shade, meaning in _MARKED:
+        if any(path.startswith(folder) and path.endswith(end) for path in paths):
+            found[meaning] = shade
+    return list(found.items())
+
+
+def status(keyframes: Sequence[Keyframe], dt: float, found: Assessment | None) -> str:
+    """One line about what is shown.
+
+    Args:
+        keyframes: of the postures that are shown.
+        dt: seconds from one to the next.
+        found: assessment of the only posture, where a problem is shown.
+    """
+    said = [f"{len(keyframes)} postures, {(len(keyframes) - 1) * dt:.2f} s"] if len(keyframes) > 1 else []
+    if found is not None and found.goal_errors:
+        angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > SMALLEST_ANGLE else ""
+        said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
+    if not all(keyframe.looked for keyframe in keyframes):
+        return "; ".join(said)
+    touching = max(keyframe.touching + keyframe.overlapping for keyframe in keyframes)
+    said.append(f"{'at most ' if len(keyframes) > 1 else ''}{touching} contact{'' if touching == 1 else 's'}")
+    deepest = max(keyframe.overlap for keyframe in keyframes)
+    said.append(f"deepest overlap {1e3 * deepest:.1f} mm" if deepest > PENETRATION else "no overlap")
+    return "; ".join(said)
+
+
+def panel(title: str, keyframes: Sequence[Keyframe], dt: float, found: Assessment | None = None) -> Command:
+    """The command that puts the panel on the page; the arguments are those of `status`, and the page's title."""
+    rows = [[meaning, *(round(255 * float(part)) for part in color)] for meaning, color in legend(keyframes)]
+    message = {"type": "panel", "title": title, "status": status(keyframes, dt, found), "legend": rows}
+    return Command(OBJECT, NODE, "", pack(message))
