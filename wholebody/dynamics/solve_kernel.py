@@ -22,9 +22,7 @@ NEARLY = 0.01  # m/s: points without impulse that are nearer to their target tha
 EVERY = 8  # sweeps over the points that bear something between sweeps over all
 ROUGH = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
 MORE = 6  # ... until they are so many times as many
-ALONE = (
-    16  # sweeps over an island between sweeps over all; more = less often whether islands met, fewer sweeps over all
-)
+ALONE = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 

@@ -18,6 +18,7 @@ from wholebody.checks import shown
 from wholebody.errors import FileFormatError
 from wholebody.figures.urdf_file import UrdfFile
 from wholebody.figures.urdf_joints import Mimic, UrdfJoint
+from wholebody.figures.urdf_writing import ANY_LIMIT, add_joint
 from wholebody.records import with_values
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
@@ -132,15 +133,16 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
         if name in urdf.inertials:
             _add_inertial(link, urdf.inertials[name])
     for joint in joints:
-        made = SubElement(robot, "joint", name=joint.name, type=joint.kind)
-        SubElement(made, "parent", link=joint.parent)
-        SubElement(made, "child", link=joint.child)
-        angles = pin.rpy.matrixToRpy(joint.origin.rotation)
-        SubElement(made, "origin", xyz=_numbers(joint.origin.translation), rpy=_numbers(angles))
-        if joint.kind not in ("fixed", "floating"):
-            SubElement(made, "axis", xyz=_numbers(joint.axis))
-        if joint.kind in ("revolute", "prismatic"):  # urdfdom requires limits; the real ones are set afterwards
-            SubElement(made, "limit", lower="-1", upper="1", effort="1", velocity="1")
+        made = add_joint(
+            robot,
+            joint.name,
+            joint.kind,
+            joint.parent,
+            joint.child,
+            origin=joint.origin,
+            axis=None if joint.kind in ("fixed", "floating") else joint.axis,
+            limit=ANY_LIMIT if joint.kind in ("revolute", "prismatic") else None,
+        )
         if joint.mimic is not None:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
             SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
@@ -153,10 +155,6 @@ def _add_inertial(link: Element, given: Element) -> None:
         element = given.find(tag)
         if element is not None:
             SubElement(inertial, tag, {name: element.get(name, "") for name in names if element.get(name)})
-
-
-def _numbers(values: object) -> str:
-    return " ".join(repr(float(value)) for value in np.asarray(values))
 
 
 def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:

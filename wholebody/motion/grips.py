@@ -27,9 +27,7 @@ from wholebody.scene import Scene
 from wholebody.tasks import Hold
 
 OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
-ROOM = (
-    3e-4  # m: that shifted things are apart beyond what is asked: what moves on an arc from frame to frame dips by less
-)
+ROOM = 3e-4  # m: of shifted things beyond what is asked; between frames, on an arc, they come nearer by less
 NEAR = 0.02  # m: pairs nearer than this have rows
 SPREAD = 0.1  # s: how far a shift at one frame spreads to its neighbours
 MARGIN = 0.5  # s, before and after an overlap: in which grips are shifted

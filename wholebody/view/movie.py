@@ -58,9 +58,7 @@ def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[l
     return [number / fps for number in range(math.floor((count - 1) * dt * fps + 1e-9) + 1)], fps
 
 
-def counted(
-    pictures: Iterable[bytes], total: int, progress: Callable[[int, int], Any] | None
-) -> Iterator[bytes]:  # fmt: skip
+def counted(pictures: Iterable[bytes], total: int, progress: Callable[[int, int], Any] | None) -> Iterator[bytes]:
     """The pictures, and a call with the numbers of drawn and of all ones after each."""
     for drawn, picture in enumerate(pictures, start=1):
         yield picture

@@ -12,6 +12,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.adapters.one_call import OneCall
+from wholebody.bench.adapters.urdf import add_model_joint
 from wholebody.files import Scratch
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
@@ -94,7 +95,7 @@ class _Chain:
         ElementTree.SubElement(root, "link", name="link 0")
         for number, joint in enumerate(joints, 1):
             ElementTree.SubElement(root, "link", name=f"link {number}")
-            _write_joint(root, model, joint, number)
+            add_model_joint(root, model, joint, f"link {number - 1}", f"link {number}")
         with Scratch() as folder:
             path = folder / "chain.urdf"
             path.write_bytes(ElementTree.tostring(root))
@@ -114,25 +115,3 @@ class _Chain:
         found: Array = q.copy()
         found[self._places] = answer[0]
         return found
-
-
-def _write_joint(root: ElementTree.Element, model: pin.Model, index: int, number: int) -> None:
-    """Write a joint of one axis between two links of the chain."""
-    joint = model.joints[index]
-    data = joint.createData()
-    joint.calc(data, pin.neutral(model))
-    motion = np.array(data.S).ravel()
-    slides = joint.shortname().startswith("JointModelP")
-    place = model.jointPlacements[index]
-    made = ElementTree.SubElement(root, "joint", name=f"joint {number}", type="prismatic" if slides else "revolute")
-    ElementTree.SubElement(made, "parent", link=f"link {number - 1}")
-    ElementTree.SubElement(made, "child", link=f"link {number}")
-    turn = pin.rpy.matrixToRpy(place.rotation)
-    ElementTree.SubElement(made, "origin", xyz=_text(place.translation), rpy=_text(turn))
-    ElementTree.SubElement(made, "axis", xyz=_text(motion[:3] if slides else motion[3:]))
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-    ElementTree.SubElement(made, "limit", lower=repr(float(low)), upper=repr(float(high)), effort="1", velocity="1")
-
-
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)

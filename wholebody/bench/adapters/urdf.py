@@ -11,9 +11,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
 from wholebody.bench.adapters.loop import size
 from wholebody.errors import InputError
+from wholebody.figures.urdf_writing import FOLLOWS, add_joint, exact, urdf_axis
 from wholebody.scene import Scene
 
 ROOT = "root"
@@ -50,7 +50,7 @@ def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: 
     for index in range(model.njoints):
         ElementTree.SubElement(top, "link", name=_link(index))
     for index in range(1, model.njoints):
-        _joint(top, model, index)
+        add_model_joint(top, model, index, _link(model.parents[index]), _link(index))
     for number, piece in enumerate(scene.geometry.geometryObjects):
         shape, shift = _shape(scene, piece, folder / f"{number}.obj")
         _fixed(top, piece_name(number), piece.parentJoint, piece.placement * shift).append(shape)
@@ -67,36 +67,30 @@ def _link(index: int) -> str:
     return f"link {index}" if index else ROOT
 
 
-def _joint(top: ElementTree.Element, model: Any, index: int) -> None:
-    joint = model.joints[index]
-    kind = joint.shortname()
-    if joint.nv != 1 or not kind.startswith(("JointModelR", "JointModelP")):
-        raise InputError(f"joint {model.names[index]!r} is a {kind}; URDF is written for turning and sliding joints")
-    data = joint.createData()
-    joint.calc(data, pin.neutral(model))
-    motion = np.array(data.S).ravel()
-    slides = kind.startswith("JointModelP")
-    low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
+    """Add a turning or sliding joint of a model, with its placement, axis and limits, between two links.
+
+    Raises:
+        InputError: a joint of another kind.
+    """
+    joint, known = model.joints[index], urdf_axis(model, index)
+    if known is None or joint.shortname() == FOLLOWS:
+        raise InputError(
+            f"joint {model.names[index]!r} is a {joint.shortname()}; URDF is written for turning and sliding joints"
+        )
     speed = float(model.velocityLimit[joint.idx_v])
-    limit = {"effort": "1", "velocity": repr(speed if 0.0 < speed < FAST else FAST)}
+    limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < FAST else FAST}
     if joint.nq == 1:
-        limit |= {"lower": repr(float(low)), "upper": repr(float(high))}
-    name = "prismatic" if slides else "revolute" if joint.nq == 1 else "continuous"
-    made = ElementTree.SubElement(top, "joint", name=joint_name(index), type=name)
-    ElementTree.SubElement(made, "parent", link=_link(model.parents[index]))
-    ElementTree.SubElement(made, "child", link=_link(index))
-    ElementTree.SubElement(made, "origin", _origin(model.jointPlacements[index]))
-    ElementTree.SubElement(made, "axis", xyz=_text(motion[:3] if slides else motion[3:]))
-    ElementTree.SubElement(made, "limit", limit)
+        limit["lower"] = model.lowerPositionLimit[joint.idx_q]
+        limit["upper"] = model.upperPositionLimit[joint.idx_q]
+    place = model.jointPlacements[index]
+    add_joint(top, joint_name(index), known.kind, parent, child, origin=place, axis=known.axis, limit=limit)
 
 
 def _fixed(top: ElementTree.Element, name: str, joint: int, place: pin.SE3) -> ElementTree.Element:
     """Add a link that is fixed to that of a joint; return it."""
     link = ElementTree.SubElement(top, "link", name=name)
-    made = ElementTree.SubElement(top, "joint", name=f"{name} is fixed", type="fixed")
-    ElementTree.SubElement(made, "parent", link=_link(joint))
-    ElementTree.SubElement(made, "child", link=name)
-    ElementTree.SubElement(made, "origin", _origin(place))
+    add_joint(top, f"{name} is fixed", "fixed", _link(joint), name, origin=place)
     return link
 
 
@@ -121,13 +115,13 @@ def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, p
         length = repr(2.0 * float(shape.halfLength))
         ElementTree.SubElement(inner, "cylinder", radius=repr(float(shape.radius)), length=length)
     elif isinstance(shape, coal.Box):
-        ElementTree.SubElement(inner, "box", size=_text(2.0 * np.array(shape.halfSide)))
+        ElementTree.SubElement(inner, "box", size=exact(2.0 * np.array(shape.halfSide)))
     elif isinstance(shape, coal.Halfspace) and not piece.parentJoint:
         edge = SLAB * size(scene.figure)
-        ElementTree.SubElement(inner, "box", size=_text(np.array([edge, edge, 0.25 * edge])))
+        ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
         shift = _slab(scene, piece, 0.125 * edge)
     elif isinstance(shape, coal.Convex):
-        path.write_text(_obj(shape), encoding="utf-8")
+        path.writeexact(_obj(shape), encoding="utf-8")
         ElementTree.SubElement(inner, "mesh", filename=str(path))
     else:
         raise InputError(
@@ -148,16 +142,8 @@ def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
 
 def _obj(shape: Any) -> str:
     """A hull as a Wavefront file."""
-    lines = ["v " + _text(shape.point(k)) for k in range(shape.num_points)]
+    lines = ["v " + exact(shape.point(k)) for k in range(shape.num_points)]
     for k in range(shape.num_polygons):
         triangle = shape.polygons(k)
         lines.append("f " + " ".join(str(triangle[corner] + 1) for corner in range(3)))
     return "\n".join(lines) + "\n"
-
-
-def _origin(place: pin.SE3) -> dict[str, str]:
-    return {"xyz": _text(place.translation), "rpy": _text(pin.rpy.matrixToRpy(place.rotation))}
-
-
-def _text(values: Array) -> str:
-    return " ".join(repr(float(value)) for value in values)

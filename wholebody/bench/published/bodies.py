@@ -19,8 +19,8 @@ from wholebody.arrays import Array, Indices
 from wholebody.bench.published.shapes import Meshes, described, pose_of
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.urdf_writing import urdf_axis
 
-HINGE, SLIDE = "revolute", "prismatic"
 ROOT = ("root x", "root y", "root z", "root qx", "root qy", "root qz", "root qw")
 NO_LIMIT = 1e6  # rad, m: beyond which a limit is none
 LIGHT = 1e-6  # kg: of a link that only has a place
@@ -136,35 +136,24 @@ def _urdf(figure: Figure, name: str, links: tuple[str, ...], meshes: Meshes) -> 
 
 
 def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
-    kind, axis = _axis(model, joint)
-    at = model.joints[joint].idx_q
+    known, at = urdf_axis(model, joint), model.joints[joint].idx_q
+    if known is None or known.kind == "continuous":
+        raise InputError(
+            f"joint {model.names[joint]!r} is a {model.joints[joint].shortname()}; only hinges and slides with limits "
+            "are published"
+        )
     low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
     if not max(abs(low), abs(high)) < NO_LIMIT:
         raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
     speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), NO_LIMIT)
     return [
-        f'  <joint name={quoteattr(model.names[joint])} type="{kind}">',
+        f'  <joint name={quoteattr(model.names[joint])} type="{known.kind}">',
         f"    <parent link={quoteattr(links[model.parents[joint]])}/><child link={quoteattr(links[joint])}/>",
         f"    {_origin(model.jointPlacements[joint])}",
-        f'    <axis xyz="{_numbers(axis)}"/>',
+        f'    <axis xyz="{_numbers(known.axis)}"/>',
         f'    <limit lower="{low!r}" upper="{high!r}" effort="1000" velocity="{speed!r}"/>',
         "  </joint>",
     ]
-
-
-def _axis(model: pin.Model, joint: int) -> tuple[str, Array]:
-    """Kind and axis of a joint, from its motion subspace."""
-    found = model.joints[joint]
-    if (found.nq, found.nv) != (1, 1):
-        raise InputError(
-            f"joint {model.names[joint]!r} is a {found.shortname()}; only hinges and slides with limits are published"
-        )
-    data = model.createData()
-    pin.computeJointJacobians(model, data, pin.neutral(model))
-    motion = np.asarray(data.joints[joint].S).ravel()
-    if np.linalg.norm(motion[3:]) > 0.5:
-        return HINGE, motion[3:]
-    return SLIDE, motion[:3]
 
 
 def _inertial(inertia: pin.Inertia) -> list[str]:

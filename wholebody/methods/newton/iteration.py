@@ -32,9 +32,7 @@ ENOUGH = 1.0  # largest damping
 DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
 HARD_SHARE = 1e-6  # of the squared damping applies to constraints, for conflicts among them
 ERROR_CLAMP = 0.3  # m or rad: largest reduction of a goal's error in a step; larger = fewer steps, more of them fail
-LARGEST_TURN = (
-    0.35  # change of Euler parameters in a step, twice that in radians; beyond it the linearisation is useless
-)
+LARGEST_TURN = 0.35  # change of Euler parameters in a step, half the radians; a linearisation is useless beyond it
 FUNNEL = 0.5  # m or rad of violation allowed for a metre of goal; larger = longer steps, more to restore
 WIDEST = 0.5  # m or rad: largest violation allowed after any step
 RESTORE_ABOVE = 0.7  # share of the funnel from which a step only restores; larger = fewer such steps, more damped ones

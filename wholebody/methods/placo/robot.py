@@ -18,6 +18,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
+from wholebody.figures.urdf_writing import ANY_LIMIT, add_joint, urdf_axis
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
@@ -31,8 +32,6 @@ direction; enlarged pieces overlap there instead.
 
 ENDLESS = 1e6  # rad, m: limit of a joint that has none
 BASE = "base"
-FOLLOWS = "JointModelMimic"
-"""Pinocchio's name of a joint that follows another."""
 
 
 class Robot:
@@ -182,56 +181,29 @@ def _skeleton(figure: Figure, frames: Mapping[str, tuple[int, pin.SE3]]) -> Elem
     for index in range(root + 1, model.njoints):
         link[index] = f"l{index:05d}"
         ElementTree.SubElement(robot, "link", name=link[index])
-        kind, axis = _kind(model, index)
-        joint = _joint(robot, f"j{index:05d}", kind, link[int(model.parents[index])], link[index])
-        ElementTree.SubElement(joint, "axis", xyz=" ".join(repr(float(value)) for value in axis))
-        if kind != "continuous":
-            ElementTree.SubElement(joint, "limit", lower="-1", upper="1", effort="1", velocity="1")
+        known = urdf_axis(model, index)
+        if known is None:
+            raise UnsupportedTermError("placo", [_refused(model, index)])
+        limit = None if known.kind == "continuous" else ANY_LIMIT
+        names = f"j{index:05d}", known.kind, link[int(model.parents[index])], link[index]
+        add_joint(robot, *names, axis=known.axis, limit=limit)
     for name, (carrier, _) in frames.items():
         ElementTree.SubElement(robot, "link", name=name)
-        _joint(robot, f"to {name}", "fixed", link[carrier], name)
+        add_joint(robot, f"to {name}", "fixed", link[carrier], name)
     return robot
-
-
-def _joint(robot: ElementTree.Element, name: str, kind: str, parent: str, child: str) -> ElementTree.Element:
-    joint = ElementTree.SubElement(robot, "joint", name=name, type=kind)
-    ElementTree.SubElement(joint, "parent", link=parent)
-    ElementTree.SubElement(joint, "child", link=child)
-    return joint
 
 
 def unsupported_joints(figure: Figure) -> list[str]:
     """The first joint of a kind that placo's robots do not have, with the reason; empty if there is none."""
     model = figure.model
     for index in range(2 if figure.root == "free" else 1, model.njoints):
-        name, kind = model.names[index], model.joints[index].shortname()
-        if _urdf_kind(model.joints[index]) is None:
-            return [f"joint {name!r}, a {kind} (its robots have turning and sliding joints and one root)"]
+        name = model.names[index]
+        if urdf_axis(model, index) is None:
+            return [f"{_refused(model, index)} (its robots have turning and sliding joints and one root)"]
         if name in figure.followers and figure.followers[name].offset:
             return [f"joint {name!r}, which mimics another with an offset (its gears have none)"]
     return []
 
 
-def _urdf_kind(joint: Any) -> str | None:
-    if joint.shortname() == FOLLOWS:
-        return "prismatic" if _motion(joint)[:3].any() else "revolute"
-    kinds = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
-    return kinds.get((joint.shortname().removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
-
-
-def _kind(model: Any, index: int) -> tuple[str, Array]:
-    """URDF's word for a joint, and its axis (3,)."""
-    joint = model.joints[index]
-    kind = _urdf_kind(joint)
-    if kind is None:
-        raise UnsupportedTermError("placo", [f"joint {model.names[index]!r}, a {joint.shortname()}"])
-    motion = _motion(joint)
-    return kind, motion[:3] if kind == "prismatic" else motion[3:]
-
-
-def _motion(joint: Any) -> Array:
-    """(6,) motion of a joint of one degree of freedom, of unit length; of one that follows another, its own."""
-    data = joint.createData()
-    joint.calc(data, np.zeros(joint.idx_q + max(joint.nq, 2)))
-    motion = np.array(data.S).ravel()
-    return motion / joint.extract().scaling if joint.shortname() == FOLLOWS else motion
+def _refused(model: Any, index: int) -> str:
+    return f"joint {model.names[index]!r}, a {model.joints[index].shortname()}"

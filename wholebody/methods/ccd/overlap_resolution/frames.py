@@ -32,9 +32,7 @@ OVERRUN = 16  # further queries and goals after which no chain is processed any 
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
 DIP = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
-PASSED = (
-    2e-3  # m: allowed overlap of the motion of a single step; the motion between shown postures is swept more closely
-)
+PASSED = 2e-3  # m: allowed overlap of the motion of a single step; `DIP` is that between shown postures
 WIDE = 5e-3  # m: margin of limbs that return to a free posture, so that they have room to turn
 TINY = 1e-12  # rad, m
 

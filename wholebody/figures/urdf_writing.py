@@ -1,0 +1,93 @@
+"""Joints as elements of a URDF, and what URDF calls a joint of Pinocchio's model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+
+FOLLOWS = "JointModelMimic"
+"""Pinocchio's name of a joint that follows another."""
+
+ANY_LIMIT = {"lower": -1.0, "upper": 1.0, "effort": 1.0, "velocity": 1.0}
+"""A limit where a URDF must have one, for readers that get the real one elsewhere."""
+
+_KINDS = {("R", 1): "revolute", ("R", 2): "continuous", ("P", 1): "prismatic"}
+
+
+class UrdfAxis(NamedTuple):
+    """A joint of one degree of freedom as URDF says it.
+
+    Attributes:
+        kind: "revolute", "continuous" or "prismatic".
+        axis: (3,) unit direction in the frame of the joint.
+    """
+
+    kind: str
+    axis: Array
+
+
+def urdf_axis(model: pin.Model, index: int) -> UrdfAxis | None:
+    """Kind and axis of a joint of a model; None for one that does not turn about or slide along one axis.
+
+    A joint that follows another has its own axis, without the factor by which it follows.
+    """
+    joint = model.joints[index]
+    name = joint.shortname()
+    follows = name == FOLLOWS
+    kind = _KINDS.get((name.removeprefix("JointModel")[0], joint.nq)) if joint.nv == 1 else None
+    if kind is None and not follows:
+        return None
+    data = joint.createData()
+    joint.calc(data, np.zeros(joint.idx_q + max(joint.nq, 2)))  # Pinocchio sets some axes only then
+    motion = np.array(data.S).ravel()
+    if follows:
+        motion = motion / joint.extract().scaling
+        kind = "prismatic" if motion[:3].any() else "revolute"
+    return UrdfAxis(str(kind), motion[:3] if kind == "prismatic" else motion[3:])
+
+
+def add_joint(
+    robot: Element,
+    name: str,
+    kind: str,
+    parent: str,
+    child: str,
+    *,
+    origin: pin.SE3 | None = None,
+    axis: Iterable[float] | None = None,
+    limit: Mapping[str, float] | None = None,
+) -> Element:
+    """Add a joint between two links, with exact numbers, and return it.
+
+    Args:
+        robot: the URDF's root element.
+        name: of the joint.
+        kind: its type in URDF.
+        parent: link.
+        child: link.
+        origin: placement of the child in the parent at zero; None for none.
+        axis: (3,) direction; None for none.
+        limit: numbers by the names of the attributes of `<limit>`; None for no such element.
+    """
+    joint = SubElement(robot, "joint", name=name, type=kind)
+    SubElement(joint, "parent", link=parent)
+    SubElement(joint, "child", link=child)
+    if origin is not None:
+        angles = pin.rpy.matrixToRpy(origin.rotation)
+        SubElement(joint, "origin", xyz=exact(origin.translation), rpy=exact(angles))
+    if axis is not None:
+        SubElement(joint, "axis", xyz=exact(axis))
+    if limit is not None:
+        SubElement(joint, "limit", {attribute: repr(float(value)) for attribute, value in limit.items()})
+    return joint
+
+
+def exact(values: Iterable[float]) -> str:
+    """Numbers with all their digits, parted by spaces, as URDF writes vectors."""
+    return " ".join(repr(float(value)) for value in values)
