@@ -71,6 +71,21 @@ def test_reaches(tmp_path: Path, docs: Path) -> None:
     assert "seeds 5 to 6" in (docs / "results.md").read_text()
 
 
+def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Tables and report are written before anything is drawn."""
+
+    def fails(*_: object) -> None:
+        raise RuntimeError("no chart")
+
+    monkeypatch.setattr(plot_style, "save", fails)
+    out = tmp_path / "out"
+    with pytest.raises(RuntimeError, match="no chart"):
+        bench("reaches", "--count", "1", "--first", "5", "--methods", "qp/daqp", "--out", str(out))
+    _, rows = read_rows(out / "reaches.csv", ReachRow)
+    assert [row.seed for row in rows] == [5]
+    assert (out / "reaches.md").is_file()
+
+
 def test_solve(tmp_path: Path, docs: Path) -> None:
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
     assert bench("solve", *words) == 0

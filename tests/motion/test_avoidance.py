@@ -247,9 +247,21 @@ class Replaced:
     q: np.ndarray
     name: str = "replaced"
     said: str = ""
+    clearance: float = 0.0
+    dynamics: None = None
 
     def avoid(self, *asked: object) -> MethodResult:
         return MethodResult(self.q, message=self.said)
+
+
+def test_a_method_that_lacks_a_part_of_the_protocol_is_named(planar_arm: Callable[..., Figure]) -> None:
+    clip, scene = arm_and_ball(planar_arm, 3)
+
+    class Nameless:
+        avoid = Replaced(clip.q).avoid
+
+    with pytest.raises(wb.InputError, match=r"Nameless.* has no name; see wholebody\.motion\.avoider"):
+        wb.avoid(clip, scene, method=Nameless())  # type: ignore[arg-type]
 
 
 def test_a_free_clip_is_not_told_as_one_that_collides(planar_arm: Callable[..., Figure]) -> None:

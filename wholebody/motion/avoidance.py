@@ -139,8 +139,10 @@ def as_avoider(given: object) -> Avoider:
     """
     if isinstance(given, str):
         return avoider_named(given)
-    if isinstance(given, type) or not callable(getattr(given, "avoid", None)) or not hasattr(given, "name"):
+    if isinstance(given, type) or not callable(getattr(given, "avoid", None)):
         raise InputError(f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.Trajectory()")
+    if lacking := [part for part in ("name", "clearance", "dynamics") if not hasattr(given, part)]:
+        raise InputError(f"avoid: method {shown(given)} has no {lacking[0]}; see wholebody.motion.avoider")
     return given  # type: ignore[return-value]
 
 
@@ -191,9 +193,9 @@ def avoid(
         if not has_setting(chosen, "dynamics"):
             raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
         chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
-    strong = getattr(chosen, "dynamics", None)
+    strong = chosen.dynamics
     stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
-    terms = frame_terms(scene, clip.q, clip.dt, given, getattr(chosen, "clearance", 0.0))
+    terms = frame_terms(scene, clip.q, clip.dt, given, chosen.clearance)
     began = time.perf_counter()
     result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began

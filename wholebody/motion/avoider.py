@@ -10,6 +10,7 @@ from wholebody.checks import function, instance
 from wholebody.errors import InputError
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given
+from wholebody.motion.strength import Strength
 from wholebody.scene import Scene
 
 
@@ -55,6 +56,14 @@ class Avoider(Protocol):
     @property
     def name(self) -> str:
         """Name for tables, and by which `avoid` finds it."""
+
+    @property
+    def clearance(self) -> float:
+        """Least distance of every pair that it keeps, metres."""
+
+    @property
+    def dynamics(self) -> Strength | None:
+        """The strength within which it keeps torques; None where it looks at none."""
 
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip.

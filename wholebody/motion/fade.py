@@ -57,6 +57,10 @@ class Fade:
         """Name for tables."""
         return "fade"
 
+    @property
+    def dynamics(self) -> None:
+        """It looks at no torques."""
+
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)

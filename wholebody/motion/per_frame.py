@@ -56,6 +56,10 @@ class PerFrame:
         """Name for tables."""
         return "frames"
 
+    @property
+    def dynamics(self) -> None:
+        """It looks at no torques."""
+
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         check_input(clip, scene, progress)

@@ -22,8 +22,7 @@ from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.discomfort import Discomfort
-from wholebody.tasks.displacement import Displacement
-from wholebody.tasks.effort import Effort
+from wholebody.tasks.distance import Displacement, Effort
 from wholebody.tasks.rhythm import Rhythm
 
 SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints; `Rhythm` is one over its squares

@@ -6,8 +6,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.center_of_mass import CenterOfMass
 from wholebody.tasks.discomfort import Discomfort
-from wholebody.tasks.displacement import Displacement
-from wholebody.tasks.effort import Effort
+from wholebody.tasks.distance import Displacement, Effort
 from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.hold import Hold

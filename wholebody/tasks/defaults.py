@@ -11,7 +11,7 @@ from wholebody.figures.state import State
 from wholebody.tasks.balance import Balance
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
-from wholebody.tasks.effort import Effort
+from wholebody.tasks.distance import Effort
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones

@@ -1,7 +1,8 @@
-"""Weighted squared distance of a posture from another, with its derivatives, and the measures that are one."""
+"""Weighted squared distance of a posture from another, and the measures that are one: `Effort` and `Displacement`."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,7 +10,8 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.tasks.base import Measure
+from wholebody.tasks import inputs
+from wholebody.tasks.base import Measure, Surroundings, filled
 
 LEAST_CURVATURE = 1e-6
 """Curvature [1/rad^2] of degrees of freedom without weight: positive, as methods require, and far below any in use."""
@@ -73,3 +75,52 @@ class DistanceMeasure(Measure):
     def curvature(self, state: State) -> Array:
         """(nv,) second derivative; exact for joints of one degree of freedom."""
         return self.distance.curvature
+
+
+@dataclass(frozen=True, eq=False)
+class Effort(DistanceMeasure):
+    """Squared displacement of every joint from the start, weighted by joint [rad^2].
+
+    ``sum_i gamma_i (q_i - q_i_start)^2`` (Marler and Arora's effort; eq. 2.5 of the thesis on posture prediction), with
+    the figure's `effort_weights` for gamma: moving the spine costs more than moving an arm.
+
+    Attributes:
+        weight: factor on the measure [1/rad^2].
+        distance: the start, and the weight of every degree of freedom; once resolved.
+    """
+
+    weight: float = 1.0
+    distance: SquaredDistance = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the value."""
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Effort: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Effort:
+        """Store the start."""
+        return filled(self, distance=SquaredDistance.build(scene.model, start, scene.figure.effort_weights))
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement(DistanceMeasure):
+    """Squared displacement of every joint from the neutral posture, weighted by joint [rad^2].
+
+    ``sum_i w_i (q_i - q_i_neutral)^2``, the joint displacement of Abdel-Malek and Arora 2013 ("Human Motion Simulation:
+    Predictive Dynamics", chapter 3), with the figure's `neutral_weights` for w.
+
+    Attributes:
+        weight: factor on the measure [1/rad^2].
+        distance: the neutral posture, and the weight of every degree of freedom; once resolved.
+    """
+
+    weight: float = 1.0
+    distance: SquaredDistance = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Check the value."""
+        object.__setattr__(self, "weight", inputs.weight(self.weight, "Displacement: weight"))
+
+    def resolve(self, scene: Surroundings, start: Array) -> Displacement:
+        """Read the neutral posture and the weights of the figure."""
+        figure = scene.figure
+        return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))

@@ -84,7 +84,7 @@ class Screenshots:
 
     def page(self, page: str, size: Any) -> bytes:
         """PNG of a page (HTML) that has its scene in it; raises like `picture`."""
-        browser = self._sized(size)
+        browser = self._sized(check_size(size))
         self._shown = None
         browser.open_html(page)
         return browser.capture()
@@ -95,23 +95,22 @@ class Screenshots:
             self._browser.close()
         self._browser = self._shown = None
 
-    def _sized(self, size: Any) -> Browser:
-        width, height = check_size(size)
+    def _sized(self, size: tuple[int, int]) -> Browser:
         if self._browser is None:
             self._browser = Browser()
-        self._browser.resize((width, height))
+        self._browser.resize(size)
         return self._browser
 
     def _draw(self, wanted: Sequence[Command], size: Any) -> Browser:
         """Bring the page to what the commands draw."""
-        browser, before = self._sized(size), self._shown
+        width, height = check_size(size)
+        browser, before = self._sized((width, height)), self._shown
         self._shown = None  # until all is drawn: after an error the next picture begins anew
         lacking = None if before is None else changes(before, wanted)
         if lacking is None or before is None:
             browser.open_html(picture_page())
             before, lacking = Store(), list(wanted)
         data = base64.b64encode(bundle([command.payload for command in lacking])).decode("ascii")
-        width, height = check_size(size)
         browser.evaluate(f"wholebody.resize({width}, {height}); wholebody.take(wholebody.bytes('{data}')); 0")
         for command in lacking:
             before.apply(command)

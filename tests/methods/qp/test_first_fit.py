@@ -56,7 +56,7 @@ def test_a_first_fit_gives_up_haste_after_two_steps_that_are_rejected():
     """The way up through a board is blocked; the next step is damped more, the third asks for a piece of the way."""
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.6, 0.0, 0.8))
-    goals = [wb.Point("right_hand", (0.45, -0.2, 0.95), offset=(0.0, 0.0, -0.05))]
+    goals = [wb.Point("right_hand", (0.5, -0.2, 0.95), offset=(0.0, 0.0, -0.05))]
     feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, goals=goals, constraints=feet, clearance=0.003)
     solution = wb.QP(tolerance=1e-4, measures=False).solve(problem)
@@ -64,7 +64,7 @@ def test_a_first_fit_gives_up_haste_after_two_steps_that_are_rejected():
     assert [first.note, second.note] == ["blocked", "blocked"]
     assert second.step < first.step
     assert third.note == "goal"
-    assert third.step < second.step
+    assert third.step < 0.9 * second.step
     assert solution.status == "solved"
 
 

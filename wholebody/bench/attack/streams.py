@@ -20,9 +20,7 @@ from wholebody.problem import Problem
 
 DIP = 5e-4  # m, of pieces of up to a metre: as far as a way between two postures may go deeper into a pair than before
 PARTS = 8  # of a way that are looked at
-DRIFT = (
-    5e-3  # m, rad: by which a step may worsen what must hold, beside the square of its length: rows are to first order
-)
+DRIFT = 5e-3  # m, rad: by which a step may worsen what must hold beyond the square of its length, as rows are linear
 FRAMES = (10, 40)
 STEPS = (0.001, 1.0 / 60.0, 0.1, 1.0)  # s
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from itertools import chain
 from typing import Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 
 CAPTION = "Time of a frame and what is left to the goal, frame by frame"
 
@@ -36,6 +37,6 @@ def run(arguments: argparse.Namespace) -> int:
     facts = machine()
     rows, every = challenge.measure(packaged_tasks()[challenge.TASK], frames, print)
     tables: dict[str, list[Any]] = {"challenge": rows, "challenge-frames": list(chain.from_iterable(every.values()))}
-    charts = {"challenge": (drag_chart(every, arguments.out / "challenge"), CAPTION)}
+    charts = {"challenge": Chart(partial(drag_chart, every), CAPTION)}
     publish("challenge", challenge.report(rows, facts), arguments, facts=facts, tables=tables, charts=charts)
     return 0

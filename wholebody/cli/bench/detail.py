@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 
 CAPTION = "Time of a solve against what each level gets wrong, judged in the finest model"
 
@@ -39,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
             print(row, flush=True)
         else:
             rows.append(row)
-    charts = {"detail": (detail.chart(rows, arguments.out / "detail"), CAPTION)}
+    charts = {"detail": Chart(partial(detail.chart, rows), CAPTION)}
     report = detail.report(rows, refused, facts)
     publish("detail", report, arguments, facts=facts, tables={"detail": rows}, charts=charts)
     return 0

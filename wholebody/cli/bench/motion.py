@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 from pathlib import Path
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 
 CAPTION = "Deviation, jerk and sliding against seconds for each second of motion; hollow: not free; dotted: asked"
 CAPTION_OF_CHECKS = "CPU time of a check of each clip with each piece of equipment; black: as it is, coloured: freed"
@@ -57,9 +58,9 @@ def run(arguments: argparse.Namespace) -> int:
     )  # fmt: skip
     charts = {}
     if any(row.measured and row.method != measuring.CHECKED for row in rows):
-        charts["motion"] = report.chart(rows, arguments.out / "motion"), CAPTION
+        charts["motion"] = Chart(partial(report.chart, rows), CAPTION)
     if any(row.measured for row in rows):
-        charts["motion-check"] = report.check_chart(rows, arguments.out / "motion-check"), CAPTION_OF_CHECKS
+        charts["motion-check"] = Chart(partial(report.check_chart, rows), CAPTION_OF_CHECKS)
     publish("motion", report.report(rows, facts), arguments, charts=charts)
     return 0
 

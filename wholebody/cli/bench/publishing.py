@@ -5,13 +5,25 @@ from __future__ import annotations
 import argparse
 import shutil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from wholebody.cli.arguments import Commands, add_folders
 from wholebody.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+
+
+class Chart(NamedTuple):
+    """A chart that is still to be drawn.
+
+    Attributes:
+        draw: draws it into a file, whose suffix it replaces, and returns its SVG and its PNG.
+        caption: for the documentation.
+    """
+
+    draw: Callable[[Path], tuple[Path, Path]]
+    caption: str
 
 
 def measuring(
@@ -32,9 +44,11 @@ def publish(
     *,
     facts: Mapping[str, str] | None = None,
     tables: Mapping[str, Sequence[Any]] | None = None,
-    charts: Mapping[str, tuple[tuple[Path, Path], str]] | None = None,
+    charts: Mapping[str, Chart] | None = None,
 ) -> None:
-    """Write tables and report, and into the documentation the report with its charts where that is asked for.
+    """Write tables and report, draw charts, and write both into the documentation where that is asked for.
+
+    What was measured is written before anything is drawn, so that a chart that fails loses no measurement.
 
     Args:
         name: of the report's file, and of its section of results.md.
@@ -42,7 +56,7 @@ def publish(
         arguments: of the command.
         facts: of the machine, for the tables.
         tables: rows by the name of their CSV file.
-        charts: files of each chart (SVG and PNG), and its caption.
+        charts: by the names of their files.
     """
     from wholebody.bench.tables import replace_section, write_rows, write_text
 
@@ -50,15 +64,15 @@ def publish(
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
     write_text(arguments.out / f"{name}.md", report + "\n")
     print(report)
+    drawn = [(chart.draw(arguments.out / file), chart.caption) for file, chart in (charts or {}).items()]
     print(f"wrote {arguments.out}")
     if arguments.update_docs is None:
         return
-    drawn = dict(charts or {})
-    pictures = [f"![{caption}](assets/bench/{chart}.svg)" for chart, (_, caption) in drawn.items()]
+    pictures = [f"![{caption}](assets/bench/{svg.name})" for (svg, _), caption in drawn]
     replace_section(arguments.update_docs / "results.md", name, "\n\n".join([*pictures, report]))
     folder = arguments.update_docs / "assets" / "bench"
     folder.mkdir(parents=True, exist_ok=True)
-    for (svg, _), _ in drawn.values():
+    for (svg, _), _ in drawn:
         shutil.copyfile(svg, folder / svg.name)
     print(f"wrote {arguments.update_docs / 'results.md'}")
 

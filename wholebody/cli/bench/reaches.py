@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 
 
 def add_to(commands: Commands) -> None:
@@ -43,6 +44,6 @@ def run(arguments: argparse.Namespace) -> int:
             if row.status != "solved":
                 print(f"seed {row.seed}, {method}: {row.status}; {row.how}")
     report = reaches_report(rows, facts, arguments.jobs)
-    charts = {"reaches": (reach_times(rows, arguments.out / "reaches"), "Share of the reaches solved within a time")}
+    charts = {"reaches": Chart(partial(reach_times, rows), "Share of the reaches solved within a time")}
     publish("reaches", report, arguments, facts=facts, tables={"reaches": rows}, charts=charts)
     return 0

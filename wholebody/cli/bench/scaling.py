@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 from wholebody.errors import UnknownNameError
 
 CAPTION = "Time of a solve, of a step, of the judgement and of the building of the geometry, as one size grows"
@@ -48,7 +49,7 @@ def run(arguments: argparse.Namespace) -> int:
     if "newton" in methods:
         bodies = sizes["joints"] if arguments.quick else scaling.ASSEMBLIES
         rows += scaling.assembly_rows(bodies, repeats)
-    charts = {"scaling": (scaling.chart(rows, arguments.out / "scaling"), CAPTION)}
+    charts = {"scaling": Chart(partial(scaling.chart, rows), CAPTION)}
     left_out = [line for line in lines if "left out" in line]
     report = scaling.report(rows, left_out, facts)
     publish("scaling", report, arguments, facts=facts, tables={"scaling": rows}, charts=charts)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.publishing import check_count, measuring, publish
+from wholebody.cli.bench.publishing import Chart, check_count, measuring, publish
 
 PAIRS_OF_RUNS = 15  # with a person's defaults and without: their ratio then has an interval of some 3 %
 
@@ -72,11 +73,11 @@ def run(arguments: argparse.Namespace) -> int:
     report = step_report(rows, facts, stated, shares, refusals if figures else None, costs)
     name = "step-figures" if figures else "step"
     tables: dict[str, Sequence[Any]] = {name: rows, f"{name}-times": times}
-    charts = {f"{name}-times": (step_times(times, arguments.out / f"{name}-times"), "Time of a step of every tool")}
+    charts = {f"{name}-times": Chart(partial(step_times, times), "Time of a step of every tool")}
     if not figures:
         tables["step-person"] = costs
-        drawn = least_distances(times, arguments.out / "step-distances")
-        charts["step-distances"] = drawn, "Least distance of any pair after every step"
+        caption = "Least distance of any pair after every step"
+        charts["step-distances"] = Chart(partial(least_distances, times), caption)
     publish(name, report, arguments, facts=facts, tables=tables, charts=charts)
     if not figures:
         print("\n".join(goal_lines(rows)))

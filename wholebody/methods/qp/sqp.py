@@ -112,9 +112,7 @@ class SQP:
         """Begin with a wide trust region and nothing remembered."""
         self._radius, self._measures, self._full_step = FIRST_RADIUS, self.measures, self.full_step
         self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
-        self._stretch = (
-            1.0  # goals that conflict stay far while steps get short: then all of their errors are asked for
-        )
+        self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not mended
         self._memory = Anderson()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better

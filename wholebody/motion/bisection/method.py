@@ -96,6 +96,15 @@ class Bisection:
         """Name for tables."""
         return "bisection"
 
+    @property
+    def clearance(self) -> float:
+        """It keeps pairs from overlapping, and no farther."""
+        return 0.0
+
+    @property
+    def dynamics(self) -> None:
+        """It looks at no torques."""
+
     def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`.
 
