@@ -33,6 +33,7 @@ ROOMS = (
         "moving_scene",
         "moving_things",
         "workspace",
+        "scene_contents",
         "scene",
         "tasks",
         "derivatives",
