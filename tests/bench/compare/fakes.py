@@ -76,7 +76,7 @@ class Fake:
         if self.does == "hangs":
             time.sleep(60.0)
         if self.does == "spins":
-            np.linalg.svd(np.random.default_rng(0).normal(size=(6000, 6000)))  # in compiled code for minutes
+            np.linalg.svd(np.random.default_rng(0).normal(size=(3000, 3000)))  # in compiled code for half a minute
         if self.does == "dies":
             os._exit(3)
         if self.does == "sleeps":

@@ -20,7 +20,7 @@ from wholebody.bench.compare.store import NAME, Store
 from wholebody.errors import InputError, WholebodyError
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
-CAP = 3.0  # s: much more than a solve takes on a machine with other things to do, less than what hangs
+CAP = 1.0  # s of the processor: much more than a solve takes, less than what hangs
 
 
 def settings(fakes: ModuleType, *does: str, cases: int = 1, sweep: int = 1, cap: float = 5.0) -> Settings:
@@ -44,7 +44,7 @@ def test_a_method_that_solves_is_judged_at_every_budget(misbehaved: dict[str, li
     assert sorted(record.tolerance for record in records) == [1e-6, 1e-4, 1e-2]
     for record in records:
         assert record.success(max(1e-3, 1.1 * record.tolerance))
-        assert 0.0 < record.seconds < CAP
+        assert 0.0 < record.cpu_seconds < CAP
         assert record.best > 0.0
     assert min(record.worst for record in records) < 2e-6
 
