@@ -14,7 +14,7 @@ from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
 from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with_parent
+from wholebody.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with
 
 ANSWERS = 10.0  # s: for which a scheduler is waited for
 
@@ -96,8 +96,9 @@ def own_child() -> Child:
     """The child process of this thread; it lives as long as this process, or until `close_own_child`."""
     if not hasattr(_local, "child"):
         _local.child = Child(ONE_THREAD)
-        if multiprocessing.current_process().name.startswith("LokyProcess"):
-            end_with_parent()  # joblib's process would wait for minutes
+        parent = multiprocessing.parent_process()
+        if parent is not None and multiprocessing.current_process().name.startswith("LokyProcess"):
+            end_with(int(parent.pid or 0))  # joblib's process would wait for minutes
     child: Child = _local.child
     return child
 
