@@ -88,6 +88,23 @@ def test_nonnegative_least_squares_are_those_of_scipy(kind):
         np.testing.assert_allclose(left, right - reference @ rows, atol=1e-8)  # what is left is unique, shares are not
 
 
+@pytest.mark.parametrize(
+    ("rows", "right"),
+    [
+        ([(1, 0, 1), (2, -2, 2), (2, -2, -2), (2, 2, -1), (-2, -2, -1)], (60, -20, 20)),
+        ([(1, 2, -2), (1, -1, -2), (0, -2, 1), (-2, -2, -1), (1, 0, -1)], (18, -18, -12)),
+        ([(-1, -1, 1), (0, -2, 2), (2, -1, 0), (-2, 1, -1), (0, 0, -1)], (0, -60, 40)),
+    ],
+)
+def test_a_share_that_is_nothing_and_stays_nothing_leaves(rows, right):
+    rows = np.array(rows, dtype=float)
+    smallest = np.nextafter(0.0, 1.0)  # of such numbers shares are rounded to 0 while their rows still push
+    share, left = nonnegative_least_squares(rows, smallest * np.array(right), np.linalg.norm(rows, axis=1))
+    assert np.isfinite(share).all()
+    assert (share >= 0.0).all()
+    assert np.isfinite(left).all()
+
+
 def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):
     scene = wb.Scene(planar_arm(LENGTHS)).add(wb.Box((0.2, 0.2, 0.2)), name="block", at=(0.5, 0.5, 0.0))
     problem = wb.Problem(scene, goals=[wb.Point("tip", (0.5, 0.5, 0.0))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import time
 from collections.abc import Iterator
@@ -101,6 +102,13 @@ def test_outside_of_a_job_there_is_nobody_to_tell() -> None:
     tell("nothing")
     allow(1e6)
     assert signal.getitimer(signal.ITIMER_REAL)[0] <= alarm
+
+
+def test_a_process_whose_parent_ended_while_it_began_ends_too() -> None:
+    gone = subprocess.Popen([sys.executable, "-c", ""])
+    gone.wait()
+    code = f"import time; from wholebody.runner import end_with; end_with({gone.pid}); time.sleep(60.0)"
+    assert subprocess.run([sys.executable, "-c", code], timeout=50.0, check=False).returncode == 1
 
 
 def test_the_folders_of_the_package_hide_no_other_package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

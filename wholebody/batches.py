@@ -7,13 +7,14 @@ whose processes are forked; it stays on this machine.
 from __future__ import annotations
 
 import multiprocessing
+import signal
 import threading
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import AbstractContextManager, ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from typing import Any
 
 from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with_parent
+from wholebody.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with
 
 ANSWERS = 10.0  # s: for which a scheduler is waited for
 
@@ -65,7 +66,8 @@ def spread(
             parallel = joblib.Parallel(
                 n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs + 1
             )  # fmt: skip
-            answers = parallel(joblib.delayed(function)(argument) for argument in arguments)
+            with _deaf():
+                answers = parallel(joblib.delayed(function)(argument) for argument in arguments)
             try:
                 yield from answers
             finally:
@@ -74,12 +76,29 @@ def spread(
         close_own_child()  # which does the jobs where there is one at a time
 
 
+@contextmanager
+def _deaf() -> Iterator[None]:
+    """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good, and print no traceback while they begin.
+
+    The one who began them ends them. Only the main thread hears Ctrl-C.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    handler = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.SIG_DFL if handler is None else handler)
+
+
 def own_child() -> Child:
     """The child process of this thread; it lives as long as this process, or until `close_own_child`."""
     if not hasattr(_local, "child"):
         _local.child = Child(ONE_THREAD)
-        if multiprocessing.current_process().name.startswith("LokyProcess"):
-            end_with_parent()  # joblib's process would wait for minutes
+        parent = multiprocessing.parent_process()
+        if parent is not None and multiprocessing.current_process().name.startswith("LokyProcess"):
+            end_with(int(parent.pid or 0))  # joblib's process would wait for minutes
     child: Child = _local.child
     return child
 

@@ -35,7 +35,7 @@ class UnknownNameError(WholebodyError, KeyError):
             known: all known names.
             where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
         """
-        known = sorted(known)
+        known = sorted(set(known))
         near = get_close_matches(str(name)[:SHOWN], known, n=4, cutoff=0.4) or known[:6]
         hint = f"did you mean {', '.join(map(one_line, near))}?" if near else "there are none."
         place = f"{where}: " if where else ""

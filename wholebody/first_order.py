@@ -284,20 +284,28 @@ def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tupl
         new = int(agrees.argmax())
         if agrees[new] <= enough:
             break
+        before = share.copy(), pushing.copy()
         pushing[new] = True
         trial = _shares(units, products, right, pushing)
         if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of those that push
             pushing[new], barred[new] = False, True
             continue
-        while trial is not None and (falling := pushing & (trial <= 0.0)).any():
-            part = np.full(len(rows), np.inf)
-            part[falling] = share[falling] / (share[falling] - trial[falling])
+        for _ in range(int(pushing.sum())):  # each time at least one row leaves
+            if trial is None or not (falling := pushing & (trial <= 0.0)).any():
+                break
+            part, way = np.full(len(rows), np.inf), share[falling] - trial[falling]
+            part[falling] = share[falling] / np.where(way > 0.0, way, 1.0)  # 0 for a share that is 0 and stays 0
             share += part.min() * (trial - share)
             pushing[part <= part.min()] = False
             share[~pushing] = 0.0
             trial = _shares(units, products, right, pushing)
         share = share if trial is None else trial
-        left, barred = right - share @ units, ~counts
+        rest = right - share @ units
+        if np.linalg.norm(rest) < np.linalg.norm(left):
+            left, barred = rest, ~counts
+        else:  # rows that nearly depend: what rounding leaves would join and leave in turn for ever
+            share, pushing = before
+            barred[new] = True
     return share / scale, left
 
 

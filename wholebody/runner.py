@@ -35,7 +35,7 @@ LONGEST_WORDS = 200  # most characters kept of the last line that a process wrot
 
 _START = (
     "import sys; sys.path[:] = [{root!r}, *filter(None, sys.path)]; from wholebody.runner import serve; "
-    "sys.path.remove({root!r}); sys.path.append({root!r}); serve({descriptor})"
+    "sys.path.remove({root!r}); sys.path.append({root!r}); serve({descriptor}, {parent})"
 )
 """The code of a new interpreter. It imports our package first, and then restores the order of the search path."""
 
@@ -188,7 +188,7 @@ class Child:
         self._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
         with theirs:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno())],
+                [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno(), parent=os.getpid())],
                 stdin=subprocess.DEVNULL,
                 stdout=self._words,
                 stderr=self._words,
@@ -261,9 +261,13 @@ def tell(note: Any) -> None:
         _parent.send((False, note))
 
 
-def end_with_parent() -> None:
-    """End this process when its parent has ended, also in the middle of a job."""
-    threading.Thread(target=_end_after, args=(os.getppid(),), daemon=True).start()
+def end_with(parent: int) -> None:
+    """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
+
+    Args:
+        parent: process id; whoever began this process says it, for an orphan's parent is another process.
+    """
+    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 
 
 def _end_after(parent: int) -> None:
@@ -272,8 +276,8 @@ def _end_after(parent: int) -> None:
     _exit(1)
 
 
-def serve(descriptor: int) -> None:
-    """Do jobs until the parent has ended; the main loop of a process of `Child`.
+def serve(descriptor: int, parent: int) -> None:
+    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`.
 
     Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
     """
@@ -281,7 +285,7 @@ def serve(descriptor: int) -> None:
     _parent = Connection(descriptor)
     _end_at_alarms()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    end_with_parent()
+    end_with(parent)
     try:
         while True:
             seconds, packed = _parent.recv()

@@ -46,7 +46,13 @@ def test_nan_comes_back(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("content", "said"),
-    [("a,b\n1,2\n", "columns"), ("name,count,value,good\nx,one,1.0,True\n", "row 1"), ("", "columns")],
+    [
+        ("a,b\n1,2\n", "columns"),
+        ("name,count,value,good\nx,one,1.0,True\n", "row 1"),
+        ("", "columns"),
+        ("name,count,value,good\nx,1\n", "row 1"),
+        ("name,count,value,good\n" + "x" * 200_000, "no CSV"),
+    ],
 )
 def test_files_of_another_kind_are_refused(tmp_path: Path, content: str, said: str) -> None:
     path = tmp_path / "rows.csv"

@@ -138,7 +138,7 @@ def test_it_is_solved_swept_tracked_reduced_and_judged(load: Callable[..., wb.Fi
     assert scene.sweep(figure.neutral, goal_q) is None
     assert figure.reduced("own").joints == ("own",)
     assert figure.reduced("z_leader").joints == ("a_finger", "b_slider", "z_leader")
-    for method in set(installed_methods()) - {"qp", "dls"}:
+    for method in (name for name in installed_methods() if name not in ("qp", "dls")):
         with pytest.raises(wb.WholebodyError, match=r"(?i)mimic"):
             wb.solve(problem, method=method)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from wholebody.errors import FileFormatError
-from wholebody.files import make_folder, write
+from wholebody.files import make_folder, read_text, write
 
 _R = TypeVar("_R")
 
@@ -39,22 +39,27 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     """Read back what `write_rows` wrote.
 
     Raises:
-        FileFormatError: another kind of file, or a value that is none.
+        FileFormatError: no file, another kind of file, or a value that is none.
     """
     facts: dict[str, str] = {}
-    lines = path.read_text(encoding="utf-8").splitlines()
+    lines = read_text(path, "table").splitlines()
     while lines and lines[0].startswith("# "):
         name, _, value = lines.pop(0)[2:].partition(": ")
         facts[name] = value
     types = get_type_hints(kind)
     names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
-    reader = csv.DictReader(lines)
-    if reader.fieldnames is None or list(reader.fieldnames) != names:
-        raise FileFormatError(f"{path}: the columns are {reader.fieldnames}, not {names}; measure again")
+    try:
+        given = list(csv.reader(lines))
+    except csv.Error as error:
+        raise FileFormatError(f"{path}: is no CSV ({error}); measure again") from None
+    if not given or given[0] != names:
+        found = ", ".join(given[0])[:200] if given else "none"
+        raise FileFormatError(f"{path}: the columns are {found}, not {', '.join(names)}; measure again")
     rows = []
-    for number, row in enumerate(reader, start=1):
+    for number, cells in enumerate(given[1:], start=1):
         try:
-            rows.append(kind(**{name: _value(types[name], row[name]) for name in names}))
+            values = zip(names, cells, strict=True)
+            rows.append(kind(**{name: _value(types[name], cell) for name, cell in values}))
         except ValueError as error:
             raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
     return facts, rows

@@ -192,8 +192,10 @@ def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     pin.updateFramePlacements(model, data)
-    names = {*scene.figure.segments, *(thing.segment for thing in scene.objects.values() if thing.segment is not None)}
-    return {name: pin.SE3(data.oMf[scene.frame_id(name)]) for name in names}
+    carrying = (thing.segment for thing in scene.objects.values() if thing.segment is not None)
+    return {
+        name: pin.SE3(data.oMf[scene.frame_id(name)]) for name in dict.fromkeys((*scene.figure.segments, *carrying))
+    }
 
 
 def held_together(scene: Scene) -> tuple[tuple[str, str], ...]:

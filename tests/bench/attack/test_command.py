@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Iterator
+from itertools import islice
 from pathlib import Path
 
 import pytest
 
+from wholebody.bench.attack.case import Case, Verdict
 from wholebody.bench.attack.report import Row
+from wholebody.bench.attack.running import Ended
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
 
 def bench(*words: str) -> int:
@@ -37,6 +41,30 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     assert "\nold\n" not in page
     assert "calls with odd arguments" in page
     assert (out / "README.md").is_file()
+
+
+def test_other_runs_are_counted_too(tmp_path: Path) -> None:
+    words = ("--cases", "2", "--kinds", "argument")
+    bench(*words, "--seed", "3", "--out", str(tmp_path / "a"))
+    bench(*words, "--seed", "1", "--out", str(tmp_path / "b"), "--also", str(tmp_path / "a" / "attack.csv"))
+    _, rows = read_rows(tmp_path / "b" / "attack.csv", Row)
+    assert [row.seed for row in rows] == [1, 1, 3, 3]
+    assert "Seed 1, 3." in (tmp_path / "b" / "attack.md").read_text()
+    (tmp_path / "none.csv").write_text("a,b\n1,2\n")
+    with pytest.raises(FileFormatError, match=r"none.csv: the columns are a, b, not kind, "):
+        bench(*words, "--also", str(tmp_path / "none.csv"))
+
+
+def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def two(cases: Iterator[Case], *_: object) -> Iterator[Ended]:
+        for case in islice(cases, 2):
+            yield Ended(case, None, Verdict("right", "nothing"))
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
+    assert bench("--out", str(tmp_path)) == 130
+    _, rows = read_rows(tmp_path / "attack.csv", Row)
+    assert [row.number for row in rows] == [0, 1]
 
 
 def test_what_cannot_be_asked_is_refused() -> None:

@@ -63,6 +63,17 @@ def test_errors_are_those_of_plain_geometry(arm: wb.Scene) -> None:
     assert not judge(problem, [], [], np.array([0.0, np.nan])).finite
 
 
+def test_a_persons_ranges_of_motion_count_without_being_stated() -> None:
+    scene = wb.Scene(wb.load("human", detail="capsules"))
+    figure, problem = scene.figure, wb.Problem(scene)
+    assert judge(problem, [], [], problem.start).constraints == 0.0
+    bent = figure.with_joints(problem.start, {name: 1.0 for name in figure.joints if name.startswith("neck")})
+    bent = figure.clamp(bent)  # each angle of the neck is one that it has, but not all of them together
+    assert judge(problem, [], [], bent).limits == 0.0
+    assert judge(problem, [], [], bent).constraints > 0.05
+    assert judge(wb.Problem(scene, range_of_motion=False), [], [], bent).constraints == 0.0
+
+
 def test_a_place_and_a_turn_of_a_free_root_are_told_apart() -> None:
     scene = wb.Scene(wb.load("hand"))
     q = scene.figure.neutral

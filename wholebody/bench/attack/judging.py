@@ -2,7 +2,8 @@
 
 It shares nothing with the package's own assessment but what the user wrote: the terms as they were given, the shapes of
 the things and where they stand. Pairs are the figure's own, and every piece of the figure that can move with every
-piece of every thing. Balance and reach cones, which are constructions of the package's own, are read from their terms.
+piece of every thing. Balance, reach cones and ranges of motion, which are constructions of the package's own, are read
+from their terms; a person has them without being told.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ from wholebody.arrays import Array
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 
+OWN = (wb.Balance, wb.ReachCones, wb.RangeOfMotion)
+"""Constraints whose values are those of the package's own terms."""
 RESTING = 1e-6  # m: a pair that begins deeper than this begins inside, and is asked for the whole clearance
 
 
@@ -97,7 +100,7 @@ class Pairs:
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
     """Measure a posture (nq,) against goals, constraints and bounds as they were given.
 
-    Of the problem only the scene, the start and the clearance are read, and Balance and ReachCones.
+    Of the problem only the scene, the start, the clearance and the terms of `OWN` are read.
     """
     scene, start = problem.scene, problem.start
     q = np.asarray(q, dtype=float)
@@ -115,7 +118,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
     body = _Body(scene.model, start, q)
     held = [value for term in constraints for value in body.constraint(term)]
     for term in problem.constraints:
-        if type(term).__name__ in ("Balance", "ReachCones"):
+        if isinstance(term, OWN):
             value = np.atleast_1d(term.value(scene.state(q)))
             held += list(np.maximum(term.lower - value, value - term.upper))
     return Judged(

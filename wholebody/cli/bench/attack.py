@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from itertools import count
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.cli.arguments import Commands, add_folders
@@ -17,11 +18,13 @@ if TYPE_CHECKING:
     from wholebody.bench.attack.report import Row
 
 PAGE = "reliability.md"
+INTERRUPTED = 130  # exit code after Ctrl-C
 DESCRIPTION = """\
 Attack the package with random hard cases: solves that begin inside things, with goals that contradict or are out of
 reach; streams; sweeps; mutated files; odd arguments. Answers are judged by coal over all pairs and by Pinocchio alone.
 Every failure is written as a script that repeats it. Case K of a seed is always the same. The exit code is 1 where
-something was wrong: a false claim, an error other than one sentence, a crash, or no end within a minute."""
+something was wrong: a false claim, an error other than one sentence, a crash, or no end within a minute. What ended
+before Ctrl-C is written."""
 
 
 def add_to(commands: Commands) -> None:
@@ -33,6 +36,9 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("--cases", type=int, metavar="N", help="end after as many cases, if the time suffices")
     parser.add_argument("--kinds", nargs="+", metavar="KIND", help="of cases: solve, stream, sweep, file, argument")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes at a time (default: 1)")
+    parser.add_argument(
+        "--also", nargs="+", type=Path, default=[], metavar="CSV", help="attack.csv of other runs, counted too"
+    )
     add_folders(parser, "out/attack")
     parser.set_defaults(run=run)
 
@@ -40,21 +46,26 @@ def add_to(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report
-    from wholebody.bench.attack.report import is_slow
+    from wholebody.bench.attack.report import Row, is_slow
     from wholebody.bench.attack.running import attack, for_seconds
     from wholebody.bench.machine import machine
-    from wholebody.bench.tables import replace_section, write_rows, write_text
+    from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
 
     _check(arguments)
+    earlier = [one for path in arguments.also for one in read_rows(path, Row)[1]]
     rows: list[Row] = []
-    tell = _teller(rows)
-    for ended in attack(_cases(arguments), arguments.jobs, for_seconds(arguments.seconds)):
-        line = tell(ended)
-        if line.outcome == "wrong" or is_slow(line):
-            report.keep(ended, arguments.out)
+    tell, interrupted = _teller(rows), False
+    try:
+        for ended in attack(_cases(arguments), arguments.jobs, for_seconds(arguments.seconds)):
+            line = tell(ended)
+            if line.outcome == "wrong" or is_slow(line):
+                report.keep(ended, arguments.out)
+    except KeyboardInterrupt:
+        interrupted = True
+    rows += earlier
     if not rows:
-        raise InputError("no case was begun; give more --seconds")
-    rows.sort(key=lambda one: one.number)
+        raise InputError("no case ended; give more --seconds")
+    rows.sort(key=lambda one: (one.seed, one.number))
     facts = machine()
     write_rows(arguments.out / "attack.csv", facts, rows)
     report.index(rows, arguments.out)
@@ -65,7 +76,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.update_docs is not None:
         replace_section(arguments.update_docs / PAGE, "attack", text)
         print(f"wrote {arguments.update_docs / PAGE}")
-    return int(any(one.outcome == "wrong" for one in rows))
+    return INTERRUPTED if interrupted else int(any(one.outcome == "wrong" for one in rows))
 
 
 def _check(arguments: argparse.Namespace) -> None:
