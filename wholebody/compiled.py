@@ -25,6 +25,7 @@ LOOPS = (
     "wholebody.methods.qp.active_set",
     "wholebody.methods.qp.curved_reach",
     "wholebody.methods.qp.solvers.osqp_solver",
+    "wholebody.methods.qp.solvers.split_form",
     "wholebody.methods.qp.step_program",
     "wholebody.methods.qp.subproblem",
     "wholebody.methods.qp.turning",

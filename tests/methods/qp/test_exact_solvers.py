@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import daqp
 import numpy as np
 import pytest
@@ -11,8 +13,9 @@ from scipy.optimize import lsq_linear
 
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.solvers.quadprog_solver import inverse_factor
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
-from wholebody.methods.qp.solvers.split_form import scaled_split, split
+from wholebody.methods.qp.solvers.split_form import empty_form, scaled_split, split
 
 TOLERANCE = 1e-6  # rad: bounded least squares of weights that differ by a factor of 1e6 are as exact as this
 
@@ -73,7 +76,7 @@ def test_every_solver_is_exact(name, program):
 def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
     workspace = OSQPSolver().workspace(program)
     n, m, slots = workspace.n, workspace.m, workspace.slots
-    form = scaled_split(program, slots)
+    form = scaled_split(program, empty_form(n, m, slots))
     assert workspace.hessian == pytest.approx(form.diagonal)
     assert workspace.gradient == pytest.approx(form.linear)
     assert workspace.matrix().toarray() == pytest.approx(np.vstack([np.eye(n, n + m + slots), form.matrix]))
@@ -88,7 +91,7 @@ def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
 def test_the_scaled_form_is_the_same_program(program):
     """Its variables are those of the split form, scaled; the objective is the same, whatever the weights."""
     n, m, k = program.size, len(program.target), len(program.least)
-    plain, form = split(program), scaled_split(program, k)
+    plain, form = split(program), scaled_split(program, empty_form(n, m, k))
     rng = np.random.default_rng(0)
     x = rng.uniform(program.lower, program.upper)
     z = np.concatenate([x, program.rows @ x - program.target, np.maximum(program.least - program.elastic @ x, 0.0)])
@@ -99,6 +102,38 @@ def test_the_scaled_form_is_the_same_program(program):
     rows = form.matrix @ scaled
     assert rows[:m] == pytest.approx(form.lower[:m], abs=1e-9 * (1.0 + np.abs(form.lower[:m]).max(initial=0.0)))
     assert (rows[m:] >= form.lower[m:] - 1e-9 * np.abs(form.lower[m:]) - 1e-12).all()
+
+
+def test_a_form_that_was_used_is_as_good_as_a_new_one(random_program):
+    """A program with fewer elastic rows leaves nothing behind of the one before."""
+    rng = np.random.default_rng(1)
+    more, fewer = random_program(rng, 7, 3, 6), random_program(rng, 7, 3, 2)
+    used = scaled_split(fewer, scaled_split(more, empty_form(7, 3, 8)))
+    for one, other in zip(used, scaled_split(fewer, empty_form(7, 3, 8)), strict=True):
+        assert np.array_equal(one, other)
+
+
+@settings(max_examples=60, deadline=None)
+@given(program=programs())
+def test_quadprog_gets_a_factor_of_the_inverse_hessian(program):
+    factor = inverse_factor(program)
+    assert np.array_equal(factor, np.triu(factor))
+    hessian = np.diag(program.diagonal) + (program.rows.T * program.weight) @ program.rows
+    assert factor.T @ hessian @ factor == pytest.approx(np.eye(program.size), abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["quadprog", "piqp"])
+def test_solvers_whose_hessian_has_the_weights_close_programs_with_heavy_rows(name, random_program):
+    """Weights of 1e10 beside 1; what a solver answers itself is near, before its active set is corrected."""
+    rng, closed, off = np.random.default_rng(2), 0, []
+    for _ in range(100):
+        program = replace(random_program(rng), weight=np.array([1.0, 1e10, 1e4, 1e10]))
+        solver = make_solver(name, hot_start=False)
+        answer = solver.solve(program, None)
+        closed += answer.by == name
+        off.append(np.abs(solver.own() - answer.x).max())
+    assert closed >= 90
+    assert np.quantile(off, 0.9) < 1e-3
 
 
 def test_daqp_may_refuse_a_program(monkeypatch):

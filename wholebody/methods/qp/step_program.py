@@ -10,6 +10,7 @@ from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.linearisation import Passing
@@ -39,6 +40,8 @@ RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foresee
 CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
 LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
+BENT = 2e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
+STRAIGHT = 5e-7  # m, rad: by which what is held may be curved other than as foreseen without another program
 AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
@@ -89,7 +92,8 @@ class StepProgram:
         self.goals = len(self._subproblem.goal_share)
         self._soft = self.goals + int((self._subproblem.kind == 0).sum())
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
-        self._settled = False
+        self._settled, self._curving, self._bend = False, False, 0.0
+        self._constraints, self._held = problem.constraints, np.flatnonzero(self._subproblem.kind == 0)
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
         self._joints = np.concatenate(
@@ -119,6 +123,11 @@ class StepProgram:
             if asked <= WORSE * max(damping, LITTLE):
                 break
             answer, damping, asked = self._once(at, measures, asked)
+        bend, self._bend = self._bend, answer.motion * answer.turn
+        if len(self._held) and (self._curving or abs(self._bend - bend) > BENT):
+            self._curving = self._foresee(at, answer.x)
+            if self._curving:
+                answer, _, _ = self._once(at, measures, damping)
         return answer
 
     def ended(self, q: Array, displacement: Array, whole: bool) -> None:
@@ -198,6 +207,27 @@ class StepProgram:
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
         return Answer(answer.x, motion, turn, worst, spare, answer.exact, answer.iterations, answer.by), damping, asked
+
+    def _foresee(self, at: Passing, displacement: Array) -> bool:
+        """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.
+
+        Returns:
+            Whether that is another curve than the last program ran ahead of.
+        """
+        state, before, first = self._workspace.state, self._before, len(at.q)
+        state.update(pin.integrate(state.model, at.q, displacement))
+        values = np.concatenate([np.atleast_1d(constraint.value(state)) for constraint in self._constraints])
+        state.update(at.q)
+        error, held = self._soft_values[0], slice(first + self.goals, -2)
+        there = (values - self._subproblem.bound[0])[self._held]
+        curved = there - error[self.goals :] - self._soft_rows[self.goals :] @ displacement
+        known = before[-1] > 0.0 and np.array_equal(before[:first], at.q)
+        foreseen = np.clip(error[self.goals :] - before[held], -CURVED, CURVED) if known else 0.0
+        if not known:  # its goals are asked for as without a step before
+            before[:first], before[-2:] = at.q, (0.0, 1.0)
+            before[first : first + self.goals] = error[: self.goals] + 2.0 * RESTING
+        before[held] = error[self.goals :] - curved
+        return bool(np.abs(np.clip(curved, -CURVED, CURVED) - foreseen).max() > STRAIGHT)
 
     def _ends(self) -> Any:
         """See `tracking_kernel.parts`."""

@@ -7,7 +7,7 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
-from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.native_solver import Native, SplitFormSolver
 from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e30  # DAQP's infinity
@@ -16,13 +16,13 @@ TOLERANCE = 1e-9  # of rows
 EQUALITY = 5  # DAQP's mark for a row that is always active
 
 
-class DAQPSolver(NativeSolver):
+class DAQPSolver(SplitFormSolver):
     """DAQP with a model that lives on, and begins with the active set of its last answer."""
 
     name = "daqp"
 
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native | None:
-        """See `NativeSolver.minimise`."""
+    def answer(self, form: SplitForm, n: int, m: int) -> Native | None:
+        """See `SplitFormSolver.answer`."""
         hessian = np.diag(form.diagonal)
         upper = np.concatenate([form.box_upper[:n], np.minimum(form.upper, FAR)])
         lower = np.concatenate([form.box_lower[:n], form.lower])

@@ -12,28 +12,36 @@ from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
-from wholebody.methods.qp.solvers.split_form import SCALE, SplitForm, read_active, scaled_split, slots_for
+from wholebody.methods.qp.solvers.split_form import (
+    SCALE,
+    SplitForm,
+    compiled_kernel,
+    empty_form,
+    read_active,
+    scaled_split,
+    slots_for,
+)
 from wholebody.records import with_values
 
 
 class Native(NamedTuple):
-    """What a solver answers to a scaled split form.
+    """What a solver answers to a program.
 
     Attributes:
-        z: (n + m + slots,) its variables.
+        x: (n,) the displacement, in units of the program.
         box: (n,) multipliers of the box, positive at upper bounds.
-        push: (slots,) multipliers of the elastic rows, positive where they push.
+        push: (k or more,) multipliers of the elastic rows, positive where they push.
         iterations: the solver's own.
     """
 
-    z: Array
+    x: Array
     box: Array
     push: Array
     iterations: int
 
 
 class NativeSolver(QPSolver):
-    """A solver on the scaled split form, whose answer is made exact by correcting the active set of its multipliers."""
+    """A solver whose answer is made exact by correcting the active set of its multipliers."""
 
     def __init__(self, hot_start: bool = True) -> None:
         """Begin without a workspace."""
@@ -49,18 +57,16 @@ class NativeSolver(QPSolver):
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise, from the last answer where the workspace is of the program's size, and once more without it."""
         n, m, k = program.size, len(program.target), len(program.least)
-        before = self._shape[2] if self._shape[:2] == (n, m) else 0
-        slots = slots_for(program, before)
-        form = scaled_split(program, slots)
-        if self._shape != (n, m, slots):
-            self._shape, self._workspace = (n, m, slots), None
+        shape = (n, m, slots_for(program, self._shape[2] if self._shape[:2] == (n, m) else 0))
+        if self._shape != shape:
+            self._shape, self._workspace = shape, None
         iterations, x = 0, np.zeros(n)
         for _ in range(1 if self._workspace is None else 2):
-            found = self.minimise(form, n, m)
+            found = self.minimise(program, shape[2])
             if found is None:
                 break
             iterations += found.iterations
-            x = self._own = np.where(np.isfinite(found.z[:n]), found.z[:n], 0.0) / SCALE
+            x = self._own = np.where(np.isfinite(found.x), found.x, 0.0)
             solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
@@ -68,14 +74,47 @@ class NativeSolver(QPSolver):
         return last_resort(program, x, iterations)
 
     @abstractmethod
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native | None:
+    def minimise(self, program: QuadraticProgram, slots: int) -> Native | None:
         """Ask the solver.
 
         Args:
-            form: what to solve; `self._workspace` is None where its size is another than that of the one before.
+            program: what to solve; `self._workspace` is None where its size is another than that of the one before.
+            slots: elastic rows that a workspace has room for, at least the program's.
+
+        Returns:
+            Its answer, or None where it refuses the program.
+        """
+
+
+class SplitFormSolver(NativeSolver):
+    """A solver that gets the scaled split form."""
+
+    def __init__(self, hot_start: bool = True) -> None:
+        """Begin without a workspace."""
+        super().__init__(hot_start)
+        self._form = empty_form(0, 0, 0)
+
+    def load(self) -> None:
+        """Make the loop that fills the form ready."""
+        compiled_kernel()
+
+    def minimise(self, program: QuadraticProgram, slots: int) -> Native | None:
+        """See `NativeSolver.minimise`."""
+        n, m = program.size, len(program.target)
+        if self._workspace is None:
+            self._form = empty_form(n, m, slots)
+        found = self.answer(scaled_split(program, self._form), n, m)
+        return None if found is None else found._replace(x=found.x[:n] / SCALE)
+
+    @abstractmethod
+    def answer(self, form: SplitForm, n: int, m: int) -> Native | None:
+        """Ask the solver.
+
+        Args:
+            form: what to solve, written over by the next; `self._workspace` is None where it is of another size.
             n: variables with a box.
             m: soft rows, which come first.
 
         Returns:
-            Its answer, or None where it refuses the program.
+            Its answer with all of the form's variables for x, or None where it refuses the program.
         """

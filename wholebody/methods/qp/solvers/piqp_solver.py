@@ -1,16 +1,23 @@
-"""PIQP (Schwan, Jiang, Kuhn and Jones 2023): a proximal interior-point method."""
+"""PIQP (Schwan, Jiang, Kuhn and Jones 2023): a proximal interior-point method.
+
+It factorises a matrix of all variables in each iteration. So the residuals of the soft rows are no variables here;
+their weights are in the Hessian D + T' W T.
+"""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import piqp
 
+from wholebody.arrays import Array
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
-from wholebody.methods.qp.solvers.split_form import SplitForm
+from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE
 
-TOLERANCE = 1e-8  # of the optimality conditions; the active set is then corrected
+TOLERANCE = 1e-5  # of the optimality conditions; the active set is then corrected
 LIMIT = 100  # iterations
-ACTIVE = 1e-6  # multiplier above which a row counts: those of an interior point are never zero
 
 
 class PIQPSolver(NativeSolver):
@@ -18,23 +25,49 @@ class PIQPSolver(NativeSolver):
 
     name = "piqp"
 
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
+    def minimise(self, program: QuadraticProgram, slots: int) -> Native:
         """See `NativeSolver.minimise`."""
-        data = {
-            "P": np.diag(form.diagonal), "c": form.linear, "A": np.asfortranarray(form.matrix[:m]), "b": form.lower[:m],
-            "G": np.asfortranarray(form.matrix[m:]), "h_l": form.lower[m:], "x_l": form.box_lower,
-            "x_u": form.box_upper,
-        }  # fmt: skip
+        n, k = program.size, len(program.least)
+        data = _condensed(program, slots)
         if self._workspace is None:
             self._workspace = piqp.DenseSolver()
             settings = self._workspace.settings
             settings.eps_abs, settings.eps_rel, settings.max_iter = TOLERANCE, 0.0, LIMIT
+            # the set is read where it is plain, long before the gap closes; rows have one scale already
+            settings.check_duality_gap, settings.preconditioner_iter = False, 0
             self._workspace.setup(**data)
         else:
             self._workspace.update(**data)
         self._workspace.solve()
         found = self._workspace.result
-        box = np.asarray(found.z_bu)[:n] - np.asarray(found.z_bl)[:n]
-        push = np.asarray(found.z_l)
-        box, push = (np.where(np.abs(one) > ACTIVE, one, 0.0) for one in (box, push))
-        return Native(np.array(found.x), box, push, max(int(found.info.iter), 1))
+        z, push = np.asarray(found.x), np.asarray(found.z_l)[:k]
+        x = z[:n]
+        box_lower, box_upper = np.asarray(found.z_bl)[:n], np.asarray(found.z_bu)[:n]
+        return Native(
+            x / SCALE,
+            _active(box_upper, data["x_u"][:n] - x) - _active(box_lower, x - data["x_l"][:n]),
+            _active(push, data["G"][:k] @ z - data["h_l"][:k]),
+            max(int(found.info.iter), 1),
+        )
+
+
+def _active(multiplier: Array, room: Array) -> Array:
+    """Multipliers of what is active, and zero else: of an interior point none is, but it exceeds the room left."""
+    result: Array = np.where(multiplier > np.maximum(room, 0.0), multiplier, 0.0)
+    return result
+
+
+def _condensed(program: QuadraticProgram, slots: int) -> dict[str, Any]:
+    """The program over x and its elastic rows' residuals, scaled as the split form is, as PIQP names its parts."""
+    n, k = program.size, len(program.least)
+    size, root = n + slots, np.sqrt(np.minimum(program.elastic_weight, HEAVIEST))
+    hessian, linear = np.eye(size), np.zeros(size)
+    hessian[:n, :n] = (program.rows.T * (program.weight / SCALE**2)) @ program.rows
+    hessian.flat[: n * (size + 1) : size + 1] += program.diagonal / SCALE**2
+    linear[:n] = (program.linear - (program.weight * program.target) @ program.rows) / SCALE
+    rows, least, places = np.eye(slots, size, n, order="F"), np.full(slots, IDLE), np.arange(k)
+    rows[:k, :n] = program.elastic * (root / SCALE)[:, None]
+    rows[places, n + places], least[:k] = root / np.sqrt(program.elastic_weight), root * program.least
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    lower[:n], upper[:n] = SCALE * program.lower, SCALE * program.upper
+    return {"P": hessian, "c": linear, "G": rows, "h_l": least, "x_l": lower, "x_u": upper}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from proxsuite import proxqp
 
-from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.native_solver import Native, SplitFormSolver
 from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e20  # ProxQP's infinity
@@ -13,13 +13,13 @@ TOLERANCE = 1e-6  # of the optimality conditions; the active set is then correct
 LIMIT = 200  # outer iterations
 
 
-class ProxQPSolver(NativeSolver):
+class ProxQPSolver(SplitFormSolver):
     """ProxQP with a workspace that lives on, and begins with its last answer."""
 
     name = "proxqp"
 
-    def minimise(self, form: SplitForm, n: int, m: int) -> Native:
-        """See `NativeSolver.minimise`."""
+    def answer(self, form: SplitForm, n: int, m: int) -> Native:
+        """See `SplitFormSolver.answer`."""
         size, slots = len(form.linear), len(form.lower) - m
         data = (
             np.diag(form.diagonal), form.linear, form.matrix[:m], form.lower[:m], form.matrix[m:], form.lower[m:],

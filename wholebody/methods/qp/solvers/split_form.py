@@ -13,7 +13,8 @@ one, however heavy its rows: the heaviest are nearly hard, since their residuals
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -67,26 +68,32 @@ def split(program: QuadraticProgram) -> SplitForm:
     )
 
 
-def scaled_split(program: QuadraticProgram, slots: int) -> SplitForm:
-    """The scaled split form of a program, with idle rows until it has `slots` elastic ones."""
-    n, m, k = program.size, len(program.target), len(program.least)
-    root = np.sqrt(np.minimum(program.weight, HEAVIEST))
-    elastic_root = np.sqrt(np.minimum(program.elastic_weight, HEAVIEST))
+def scaled_split(program: QuadraticProgram, form: SplitForm) -> SplitForm:
+    """The scaled split form of a program.
+
+    Args:
+        program: with at most as many elastic rows as the form has slots.
+        form: of `empty_form`, or of a program before; its arrays are written over.
+
+    Returns:
+        The same form.
+    """
+    parts = (
+        program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
+        program.elastic_weight, program.lower, program.upper,
+    )  # fmt: skip
+    compiled_kernel().fill(*map(np.ascontiguousarray, parts), SCALE, HEAVIEST, IDLE, *form)
+    return form
+
+
+def empty_form(n: int, m: int, slots: int) -> SplitForm:
+    """Room for the scaled split forms of programs of n variables, m soft rows and at most so many elastic ones."""
     size = n + m + slots
-    matrix = np.zeros((m + slots, size))
-    matrix[:m, :n] = program.rows * (root / SCALE)[:, None]
-    matrix[m : m + k, :n] = program.elastic * (elastic_root / SCALE)[:, None]
-    matrix[np.arange(m), n + np.arange(m)] = -root / np.sqrt(program.weight)
-    matrix[m + np.arange(slots), n + m + np.arange(slots)] = 1.0
-    matrix[m + np.arange(k), n + m + np.arange(k)] = elastic_root / np.sqrt(program.elastic_weight)
-    linear, diagonal = np.zeros(size), np.ones(size)
-    linear[:n], diagonal[:n] = program.linear / SCALE, program.diagonal / SCALE**2
-    lower, upper = np.full(m + slots, IDLE), np.full(m + slots, np.inf)
-    lower[:m] = upper[:m] = root * program.target
-    lower[m : m + k] = elastic_root * program.least
-    box_lower, box_upper = np.full(size, -np.inf), np.full(size, np.inf)
-    box_lower[:n], box_upper[:n] = SCALE * program.lower, SCALE * program.upper
-    return SplitForm(diagonal, linear, matrix, lower, upper, box_lower, box_upper)
+    box = np.full(size, np.inf)
+    return SplitForm(
+        np.ones(size), np.zeros(size), np.zeros((m + slots, size)), np.full(m + slots, IDLE),
+        np.full(m + slots, np.inf), -box, box,
+    )  # fmt: skip
 
 
 def slots_for(program: QuadraticProgram, before: int) -> int:
@@ -102,3 +109,13 @@ def read_active(box: Array, push: Array) -> ActiveSet:
         push: (k,) of the elastic rows, positive where they push.
     """
     return ActiveSet(box < -PUSHING, box > PUSHING, push > PUSHING)
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp.solvers import split_kernel
+
+    none, one, row = np.zeros(0), np.ones(1), np.zeros((0, 1))
+    split_kernel.fill(one, one, row, none, none, row, none, none, one, one, SCALE, HEAVIEST, IDLE, *empty_form(1, 0, 1))
+    return split_kernel
