@@ -114,7 +114,7 @@ class Surface(NamedTuple):
 def surface_of(figure: Any) -> Surface | None:
     """Return the surface of a person, an avatar or a hand; None for any other figure.
 
-    The first time a body is drawn takes seconds; then it is kept in the user's cache folder.
+    The first time a body is drawn takes a second more; then it is kept in the user's cache folder.
     """
     if not isinstance(figure, Figure):
         return None
