@@ -34,7 +34,7 @@ def arms_down(figure):
     return figure.with_joints(figure.posture("standing"), dict.fromkeys(figure.joints, 0.0))
 
 
-def test_has_fifty_five_degrees_of_freedom_and_no_gimbal():
+def test_has_fifty_five_degrees_of_freedom_in_its_groups():
     figure = person()
     assert (figure.model.nq, figure.model.nv, len(figure.joints)) == (56, 55, 49)
     assert [

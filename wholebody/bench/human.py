@@ -17,6 +17,9 @@ CASES = ("F5", "F50", "F95", "M5", "M50", "M95")
 WITHIN, OVERHEAD = 0.015, 0.025
 """Metres: residuals to keep to, and that of the overhead reach."""
 
+THIN = ("thigh", "neck")
+"""Circumferences that the pieces do not keep to."""
+
 QUICK = 3
 """Number of tasks of a short run."""
 
@@ -82,6 +85,7 @@ def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
     cases = list(dict.fromkeys(row.case for row in found.dimensions))
     residuals = {(row.name, row.case): 1e3 * row.residual for row in found.dimensions}
     values = {(row.name, row.case): 1e3 * row.ansur for row in found.dimensions}
+    others = max(1e3 * abs(row.residual) for row in found.circumferences if row.name not in THIN)
     return (
         render(
             "human.md",
@@ -91,6 +95,8 @@ def page(found: Measured, facts: Mapping[str, str], *, pictures: bool) -> str:
             cases=cases,
             residuals=residuals,
             values=values,
+            thin=THIN,
+            others=others,
             pictures=pictures,
             within=1e3 * WITHIN,
             overhead=1e3 * OVERHEAD,

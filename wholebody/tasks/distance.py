@@ -84,6 +84,10 @@ class Effort(DistanceMeasure):
     ``sum_i gamma_i (q_i - q_i_start)^2`` (Marler and Arora's effort; eq. 2.5 of the thesis on posture prediction), with
     the figure's `effort_weights` for gamma: moving the spine costs more than moving an arm.
 
+    The angles of a ball joint that is made of three hinges count one by one, which is not the square of its rotation
+    vector: near an arm stretched to the side two of them turn it alike. docs/theory/person.md says how far the two are
+    apart.
+
     Attributes:
         weight: factor on the measure [1/rad^2].
         distance: the start, and the weight of every degree of freedom; once resolved.

@@ -59,3 +59,23 @@ def test_a_smooth_union_only_adds() -> None:
     sharp, smooth = union(parts)(points), union(parts, 0.04)(points)
     assert (smooth <= sharp).all()
     assert (sharp - smooth).max() <= 0.01 + 1e-12
+
+
+@pytest.mark.parametrize("normal", [(0.0, 0.0, 1.0), (0.42, 0.0, 1.0), (0.3, 0.2, 0.9)])
+def test_the_edge_of_a_cut_is_sharp_on_a_coarse_grid(normal: tuple[float, float, float]) -> None:
+    """A rod of radius 80 mm, cut off: its edge is an ellipse, and triangles of 20 mm keep to it."""
+    radius, plane = 0.08, np.array(normal) / np.linalg.norm(normal)
+    rod = round_cone((0.0, 0.0, -0.1), (0.0, 0.0, 0.15), radius, radius)
+    found = triangles(rod, LOW, np.array([0.2, 0.2, 0.3]), 0.02, [half_space((0.0, 0.0, 0.03), normal)])
+    mesh = trimesh.Trimesh(found.vertices, found.faces, process=False)
+    forth = [tuple(edge) for edge in mesh.edges.tolist()]
+    assert sorted(forth) == sorted((b, a) for a, b in forth)  # closed
+    angles = np.linspace(0.0, 2.0 * np.pi, 400)
+    x, y = radius * np.cos(angles), radius * np.sin(angles)
+    edge = np.column_stack([x, y, 0.03 - (plane[0] * x + plane[1] * y) / plane[2]])
+    _, distance, _ = trimesh.proximity.closest_point_naive(mesh, edge)
+    sag = radius - np.sqrt(radius**2 - (0.5 * 1.5 * 0.02) ** 2)  # of a chord of one and a half cells
+    assert distance.max() < 1.2 * sag
+    points, _ = trimesh.sample.sample_surface(mesh, 4000, seed=1)
+    beyond = np.maximum(rod(points), (points - [0.0, 0.0, 0.03]) @ plane)
+    assert np.abs(beyond).max() < 0.003

@@ -214,3 +214,23 @@ def test_what_is_kept_equals_what_is_made(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.setenv(VARIABLE, str(tmp_path))
     assert surface_of(load("hand", side="left")) is not None
     surfaces._hand_surface.cache_clear()
+
+
+@pytest.mark.parametrize("who", PEOPLE)
+def test_the_shirt_ends_in_one_level_line_and_covers_the_belt(who: str) -> None:
+    surface = surface_of(load("human", **PEOPLE[who]))
+    assert surface is not None
+    parts = {part.name: part.surface for part in surface.parts}
+    shirt, trousers = parts["shirt"], parts["trousers"]
+    top = float(trousers.vertices[:, 2].max())
+    trunk = (np.abs(shirt.vertices[:, 1]) < 0.25) & (shirt.vertices[:, 2] < top)
+    hem = float(shirt.vertices[trunk, 2].min())
+    assert 0.015 < top - hem < 0.03
+    # Around the trunk the lowest vertex that points outward is at the hem, in every direction.
+    outward = np.hypot(shirt.normals[:, 0], shirt.normals[:, 1]) > 0.7
+    middle = shirt.vertices[trunk].mean(axis=0)
+    angle = np.degrees(np.arctan2(*(shirt.vertices - middle)[:, 1::-1].T)) // 15
+    lowest = [shirt.vertices[trunk & outward & (angle == sector), 2].min() for sector in range(-12, 12)]
+    np.testing.assert_allclose(lowest, hem, atol=5e-4)
+    under = trousers.vertices[trousers.vertices[:, 2] > hem + 0.002]
+    assert turns(under, shirt.vertices[shirt.faces]).min() > 0.5

@@ -44,6 +44,7 @@ class Garment(NamedTuple):
         high: (3,) greatest corner.
         cell: size of the grid's cells, metres.
         claims: regions of the bones that move it.
+        cuts: half spaces that end it at sharp edges: hem, collar, cuffs.
     """
 
     name: str
@@ -53,6 +54,7 @@ class Garment(NamedTuple):
     high: Array
     cell: float
     claims: Sequence[Claim]
+    cuts: Sequence[Field] = ()
 
 
 class Part(NamedTuple):
@@ -80,7 +82,7 @@ def made(garment: Garment, order: Sequence[str]) -> Part:
         garment: the garment.
         order: names of all bones of the body.
     """
-    surface = triangles(garment.field, garment.low, garment.high, garment.cell)
+    surface = triangles(garment.field, garment.low, garment.high, garment.cell, garment.cuts)
     return Part(garment.name, garment.color, surface, *influences(surface.vertices, garment.claims, order))
 
 

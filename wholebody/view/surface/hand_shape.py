@@ -63,7 +63,7 @@ def hand_shape(person: Body, side: str) -> HandShape:
             claims.append(Claim(segment, shape, 0.0035))
         fingers.append(union(bones))
     wrist = person.radius("wrist")
-    stump = union([round_cone((x, 0.0, STUMP), (x, 0.0, -0.004), 0.82 * wrist, 0.72 * wrist) for x in (-0.008, 0.008)])
+    stump = union([round_cone((x, 0.0, STUMP), (x, 0.0, -0.004), 0.68 * wrist, 0.72 * wrist) for x in (-0.008, 0.008)])
     claims.append(Claim(f"{side}_forearm", lambda points: np.maximum(-points[:, 2], 0.0), 0.006))
     thenar = _thenar(size, sign, bind[f"{side}_thumb_proximal"])
     solid = union([union([union(fingers, 0.002), palm], 0.007), thenar], 0.010)

@@ -2,17 +2,20 @@
 
 After Gibson, "Constrained elastic surface nets", MICCAI 1998. Vertices are then moved onto the surface along the
 field's gradient. Each edge of the grid that the surface crosses gives one quadrilateral, so the surface is closed.
+Where a solid is cut off, the vertices of the cells that the edge of the cut passes are moved onto the edge, as in dual
+contouring (Ju et al., "Dual contouring of Hermite data", SIGGRAPH 2002): a coarse grid has a straight edge too.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.view.surface.fields import Field
+from wholebody.view.surface.fields import Field, intersection
 
 NEWTON_STEPS = 2
 """Steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the error."""
@@ -22,6 +25,12 @@ LARGEST_STEP = 0.5
 
 BLOCK = 4
 """Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
+
+EDGE_STEPS = 4
+"""Newton steps from the middle of a cell to the edge of a cut."""
+
+LARGEST_EDGE_STEP = 1.0
+"""Of the cells' size, along an axis: where the edge of a cut is farther from the middle of a cell, its vertex stays."""
 
 STEEPEST = 1.8
 """Largest slope of a field near its surface; of a distance it is 1."""
@@ -44,15 +53,19 @@ class Triangles(NamedTuple):
     faces: NDArray[np.int64]
 
 
-def triangles(field: Field, low: Array, high: Array, cell: float) -> Triangles:
-    """Return the surface of a field.
+def triangles(field: Field, low: Array, high: Array, cell: float, cuts: Sequence[Field] = ()) -> Triangles:
+    """Return the surface of what is in a field and in every cut.
 
     Args:
-        field: negative inside; positive on the boundary of the box.
-        low: (3,) least corner of a box that contains the solid.
+        field: negative inside.
+        low: (3,) least corner of a box that contains the solid in its inside.
         high: (3,) greatest corner.
         cell: size of the grid's cells, metres.
+        cuts: such as half spaces; the edges between them and the field are sharp.
     """
+    body = field
+    for cut in cuts:
+        field = intersection(field, cut)
     blocks = np.ceil((high - low) / cell / BLOCK).astype(int) + 1
     values = _values(field, low - cell, blocks, cell)
     values[values == 0.0] = 1e-12
@@ -66,7 +79,11 @@ def triangles(field: Field, low: Array, high: Array, cell: float) -> Triangles:
     vertices = _middles(values, cells, cell) + (low - cell)
     faces = _faces(inside, number)
     vertices = _moved(field, vertices, cell)
-    return Triangles(vertices, gradient(field, vertices), faces)
+    normals = gradient(field, vertices)
+    if cuts:
+        for passed, points in _on_edges(body, cuts, values, cells, low - cell, cell):
+            vertices[passed], normals[passed] = points, gradient(body, points)
+    return Triangles(vertices, normals, faces)
 
 
 def gradient(field: Field, points: Array) -> Array:
@@ -146,4 +163,40 @@ def _moved(field: Field, vertices: Array, cell: float) -> Array:
         away = points - step - start
         far = np.maximum(np.linalg.norm(away, axis=1, keepdims=True) / (LARGEST_STEP * cell), 1.0)
         points = start + away / far
+    return np.asarray(points)
+
+
+def _on_edges(
+    body: Field, cuts: Sequence[Field], values: Array, cells: NDArray[np.int64], start: Array, cell: float
+) -> Iterator[tuple[NDArray[np.int64], Array]]:
+    """For each cut, the cells (k,) that its edge with the body passes, and the points (k, 3) of the edge nearest them.
+
+    A vertex belongs to the edge if some of the quadrilaterals around it are the body's and others the cut's: then no
+    quadrilateral lies across the edge.
+    """
+    sides = [body, *cuts]
+    middles = start + (cells + 0.5) * cell
+    near = np.flatnonzero(np.min([np.abs(cut(middles)) for cut in cuts], axis=0) < STEEPEST * cell)
+    at = [values[tuple((cells[near] + corner).T)] for corner in _CORNERS]
+    kinds = np.zeros((len(near), len(sides)), dtype=bool)
+    for a, b in _EDGES:
+        crossing = np.flatnonzero((at[a] < 0.0) != (at[b] < 0.0))
+        share = at[a][crossing] / (at[a][crossing] - at[b][crossing])
+        here, there = np.array(_CORNERS[a]), np.array(_CORNERS[b])
+        points = start + (cells[near[crossing]] + here + share[:, None] * (there - here)) * cell
+        kinds[crossing, np.argmax([side(points) for side in sides], axis=0)] = True
+    for number, cut in enumerate(cuts):
+        passed = near[kinds[:, 0] & kinds[:, 1 + number]]
+        points = _nearest_on_both(body, cut, middles[passed])
+        kept = np.abs(points - middles[passed]).max(axis=1) < LARGEST_EDGE_STEP * cell
+        yield passed[kept], points[kept]
+
+
+def _nearest_on_both(first: Field, second: Field, points: Array) -> Array:
+    """The points (n, 3) moved to where both fields are zero, by Newton steps of least length."""
+    for _ in range(EDGE_STEPS):
+        values = np.column_stack([first(points), second(points)])
+        rows = np.stack([_slopes(side, points, values[:, k]) for k, side in enumerate((first, second))], axis=1)
+        gram = rows @ rows.transpose(0, 2, 1) + 1e-6 * np.eye(2)  # where the two are parallel there is no edge
+        points = points - np.einsum("nki,nk->ni", rows, np.linalg.solve(gram, values[:, :, None])[:, :, 0])
     return np.asarray(points)

@@ -164,17 +164,17 @@ class PersonShape:
         body = grown(union(solids, 0.035 * scale), CLOTH)
         hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
         opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
-        cut = intersection(intersection(body, hem, 0.006), opening, 0.006)
+        cuts = [hem, opening]
         for side, _ in SIDES:
             wrist, elbow = self.at(f"{side}_hand"), self.at(f"{side}_forearm")
             along = (wrist - elbow) / np.linalg.norm(wrist - elbow)
-            cut = intersection(cut, half_space(wrist - 0.022 * scale * along, along), 0.012)
+            cuts.append(half_space(wrist - 0.022 * scale * along, along))
         segments = [*TRUNK, "neck", *self._sided("clavicle", "upper_arm", "forearm")]
         points = [self.at(name) for name in [*segments, *self._sided("hand")]]
         points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
         low, high = bounds(points, 0.085 * scale + 0.05)
         claims = self._claims([name for name in segments if name != "neck"])
-        return Garment("shirt", SHIRT, cut, low, high, 0.020, claims)
+        return Garment("shirt", SHIRT, body, low, high, 0.020, claims, cuts)
 
     def _trousers(self) -> Garment:
         scale = self.size.stature / 1.75
@@ -191,18 +191,18 @@ class PersonShape:
                 )
             )
         body = grown(union(solids, 0.04 * scale), TUCKED)
-        body = intersection(body, half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0)), 0.004)
+        cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
             along = (ankle - knee) / np.linalg.norm(ankle - knee)
             body = union(
                 [body, round_cone(ankle - 0.20 * scale * along, ankle, 0.050 * scale, 0.058 * scale)], 0.06 * scale
             )
-            body = intersection(body, half_space(ankle + 0.012 * scale * along, along), 0.004)
+            cuts.append(half_space(ankle + 0.012 * scale * along, along))
         segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
         low, high = bounds([*points, np.array([0.0, 0.0, self._belt()])], 0.13 * scale + 0.04)
-        return Garment("trousers", TROUSERS, body, low, high, 0.024, self._claims(segments))
+        return Garment("trousers", TROUSERS, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _calf(self, side: str, sign: float) -> Field:
         """The muscle behind the shank."""

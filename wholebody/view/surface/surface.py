@@ -22,7 +22,7 @@ from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
 
-FORMAT = "2"
+FORMAT = "6"
 """Part of the key of kept surfaces: another one whenever a shape, a weight or the layout changes."""
 
 HALF = "/half"
@@ -114,7 +114,7 @@ class Surface(NamedTuple):
 def surface_of(figure: Any) -> Surface | None:
     """Return the surface of a person, an avatar or a hand; None for any other figure.
 
-    The first time a body is drawn takes seconds; then it is kept in the user's cache folder.
+    The first time a body is drawn takes a second more; then it is kept in the user's cache folder.
     """
     if not isinstance(figure, Figure):
         return None

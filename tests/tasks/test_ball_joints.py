@@ -1,0 +1,135 @@
+"""Effort counts the three angles of a ball joint: how far that is from counting its rotation vector, and where.
+
+The page on the person states these figures. Rotations are those of pinocchio's frames, not of the measure.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.arrays import Array
+from wholebody.bench import human_tasks
+from wholebody.figures.state import State
+
+FIRST = ("flexion", "abduction", "rotation")
+TRUNK = ("flexion", "lateral", "rotation")
+BALLS = {
+    **{f"{side}_{name}": FIRST for side in ("left", "right") for name in ("shoulder", "hip")},
+    **dict.fromkeys(("spine1", "spine2", "spine3", "spine4", "neck1"), TRUNK),
+}
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    return wb.Scene(wb.load("human"))
+
+
+@pytest.fixture(scope="module")
+def arms(scene: wb.Scene) -> Array:
+    """(400, nq) standing people whose left arm is anywhere in its ranges of motion."""
+    figure, rng = scene.figure, np.random.default_rng(0)
+    start, state, found = figure.posture("standing"), State(scene.model), []
+    kept = [term.resolve(scene, start) for term in (wb.RangeOfMotion(), wb.ReachCones())]
+    places = [figure.model.joints[figure.joint_id(f"left_shoulder_{name}")].idx_q for name in FIRST]
+    lower, upper = figure.model.lowerPositionLimit[places], figure.model.upperPositionLimit[places]
+    while len(found) < 400:
+        q = start.copy()
+        q[places] = rng.uniform(lower, upper)
+        state.update(q)
+        if all(term.value(state).min() >= 0.0 for term in kept):
+            found.append(q)
+    return np.array(found)
+
+
+def turn(figure: wb.Figure, q: Array, ball: str) -> Array:
+    """(3, 3) rotation of the last of a ball joint's hinges against what carries the first."""
+    ids = [figure.joint_id(f"{ball}_{name}") for name in BALLS[ball]]
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, q)
+    return np.asarray(data.oMi[figure.model.parents[ids[0]]].rotation.T @ data.oMi[ids[-1]].rotation)
+
+
+def both(figure: wb.Figure, q: Array, start: Array, ball: str) -> tuple[float, float]:
+    """Weighted squares of the changes of the angles, and of the rotation vector in the parent's axes."""
+    joints = [figure.model.joints[figure.joint_id(f"{ball}_{name}")] for name in BALLS[ball]]
+    away = np.array([q[joint.idx_q] - start[joint.idx_q] for joint in joints])
+    weights = np.array([figure.effort_weights[joint.idx_v] for joint in joints])
+    vector = pin.log3(turn(figure, q, ball) @ turn(figure, start, ball).T)
+    # At zero flexion turns about y, abduction and bending to a side about x, rotation about z.
+    return float(weights @ away**2), float(weights @ vector[[1, 0, 2]] ** 2)
+
+
+def shoulder(figure: wb.Figure, flexion: float, abduction: float, rotation: float) -> Array:
+    values = zip(FIRST, (flexion, abduction, rotation), strict=True)
+    joints = {f"left_shoulder_{name}": math.radians(degrees) for name, degrees in values}
+    return np.asarray(figure.with_joints(figure.posture("standing"), joints))
+
+
+def test_shoulders_alone_can_bring_their_first_and_last_axis_together(scene: wb.Scene) -> None:
+    figure = scene.figure
+    for ball, names in BALLS.items():
+        joint = figure.model.joints[figure.joint_id(f"{ball}_{names[1]}")]
+        low, high = figure.model.lowerPositionLimit[joint.idx_q], figure.model.upperPositionLimit[joint.idx_q]
+        if ball.endswith("shoulder"):
+            assert low < 0.5 * math.pi < high
+        else:
+            assert max(-low, high) <= math.radians(45.0) + 1e-9
+
+
+def test_a_motion_about_one_axis_counts_the_same(scene: wb.Scene) -> None:
+    figure, start = scene.figure, shoulder(scene.figure, 0.0, 0.0, 0.0)
+    for angles in ((100.0, 0.0, 0.0), (0.0, 100.0, 0.0), (0.0, 0.0, 60.0), (-40.0, 0.0, 0.0)):
+        counted, vector = both(figure, shoulder(figure, *angles), start, "left_shoulder")
+        assert counted == pytest.approx(vector)
+        state = State(scene.model).update(shoulder(figure, *angles))
+        assert wb.Effort().resolve(scene, start).value(state) == pytest.approx(counted)
+
+
+def test_in_the_t_pose_angles_count_a_turn_from_nothing_to_twice(scene: wb.Scene) -> None:
+    """Flexion and rotation by 30 degrees: against each other the arm stays, with each other it turns by 60."""
+    figure, start = scene.figure, shoulder(scene.figure, 0.0, 90.0, 0.0)
+    size = 2.0 * math.radians(30.0) ** 2
+    counted, vector = both(figure, shoulder(figure, 30.0, 90.0, 30.0), start, "left_shoulder")
+    assert (counted, vector) == pytest.approx((size, 0.0))
+    counted, vector = both(figure, shoulder(figure, -30.0, 90.0, 30.0), start, "left_shoulder")
+    assert (counted, vector) == pytest.approx((size, 2.0 * size))
+
+
+def test_over_the_shoulders_range_the_two_differ_as_the_page_says(scene: wb.Scene, arms: Array) -> None:
+    figure, start = scene.figure, scene.figure.posture("standing")
+    pairs = np.array([both(figure, q, start, "left_shoulder") for q in arms])
+    low, middle, high = np.percentile(pairs[:, 1] / pairs[:, 0], [5, 50, 95])
+    assert low == pytest.approx(0.43, abs=0.06)
+    assert middle == pytest.approx(0.93, abs=0.04)
+    assert high == pytest.approx(1.28, abs=0.06)
+    # The rotation vector has a kink of its own within the range: at 180 degrees it turns round.
+    turns = np.degrees(np.sqrt(pairs[:, 1]))
+    assert turns.max() > 175.0
+    assert np.mean(turns > 170.0) == pytest.approx(0.06, abs=0.03)
+
+
+def test_another_order_of_axes_would_be_farther_from_singular(scene: wb.Scene, arms: Array) -> None:
+    """|cos| of the middle angle: about x after y and before z, as it is, and about z after y and before x."""
+    turns = np.array([turn(scene.figure, q, "left_shoulder") for q in arms])
+    present, other = (np.sqrt(1.0 - turns[:, 1, column] ** 2) for column in (2, 0))
+    near = math.sin(math.radians(20.0))
+    assert np.mean(present < near) == pytest.approx(0.22, abs=0.05)
+    assert np.mean(other < near) < 0.08
+    raised = turn(scene.figure, shoulder(scene.figure, 0.0, 90.0, 0.0), "left_shoulder")
+    assert abs(raised[1, 2]) == pytest.approx(1.0)
+    assert abs(raised[1, 0]) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_in_everyday_tasks_the_sum_differs_by_a_twentieth(scene: wb.Scene) -> None:
+    figure = scene.figure
+    for name, made in human_tasks.tasks(figure).items():
+        problem = made()
+        q = wb.solve(problem).q
+        pairs = np.array([both(figure, q, problem.start, ball) for ball in BALLS])
+        effort = wb.Effort().resolve(problem.scene, problem.start).value(State(problem.scene.model).update(q))
+        assert abs(pairs[:, 0].sum() - pairs[:, 1].sum()) < 0.05 * effort, name
