@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -9,6 +10,7 @@ import sys
 import tempfile
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -127,3 +129,24 @@ def test_folders_that_are_not_ours_stay(tmp_path: Path, monkeypatch: pytest.Monk
         "wholebody-scratch-being-made",
         "wholebody-scratch-link",
     ]
+
+
+def test_a_folder_that_another_process_takes_for_abandoned_is_made_anew(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Another process may look between the making of the lock file and its locking."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    removed: list[Path] = []
+    flock = fcntl.flock
+
+    def slow(file: Any, kind: int) -> None:
+        if kind == fcntl.LOCK_EX and not removed:
+            removed.extend(tmp_path.iterdir())
+            files.Scratch().close()
+        flock(file, kind)
+
+    monkeypatch.setattr(fcntl, "flock", slow)
+    with files.Scratch() as mine:
+        (mine / "text").write_text("here")
+        assert not removed[0].exists()
+        assert [mine] == list(tmp_path.iterdir())

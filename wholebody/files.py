@@ -225,9 +225,14 @@ class Scratch:
     def __init__(self) -> None:
         """Make the folder, and remove those of processes that have ended."""
         _remove_abandoned()
-        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-        self._lock = (self.path / LOCK).open("wb")
-        fcntl.flock(self._lock, fcntl.LOCK_EX)
+        while True:
+            self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+            with suppress(FileNotFoundError):
+                self._lock = (self.path / LOCK).open("wb")
+                fcntl.flock(self._lock, fcntl.LOCK_EX)
+                if (self.path / LOCK).exists():  # else another process removed it between its making and its locking
+                    return
+                self._lock.close()
 
     def close(self) -> None:
         """Remove the folder. Calling it again does nothing."""

@@ -73,6 +73,7 @@ def test_charts_are_there_in_both_kinds(folder: Path) -> None:
     for name, label in (
         ("compare-arm", "time of a solve [ms]"),
         ("compare-arm-profile", "time over that of the fastest method"),
+        ("compare-arm-profile", "2 problems, which all methods took"),
         ("compare-overview", "solved [%]"),
     ):
         assert (folder / "out" / "charts" / f"{name}.png").read_bytes().startswith(b"\x89PNG")

@@ -6,6 +6,7 @@ from math import inf, isnan
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 from scipy import stats
 
 from wholebody.bench.compare import statistics
@@ -16,6 +17,15 @@ def test_intervals_of_shares_are_wilsons(count: int, of: int) -> None:
     expected = stats.binomtest(count, of).proportion_ci(method="wilson")
     assert statistics.wilson(count, of) == pytest.approx((expected.low, expected.high), abs=1e-12)
     assert statistics.wilson(0, 0) == (0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("count", "of", "low", "high"),
+    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0, 0.1611), (1, 29, 0.0061, 0.1718)],
+)
+def test_intervals_of_shares_are_the_published_ones(count: int, of: int, low: float, high: float) -> None:
+    """Newcombe 1998, "Two-sided confidence intervals for the single proportion", table I, method 3."""
+    assert statistics.wilson(count, of) == pytest.approx((low, high), abs=5e-5)
 
 
 def test_200_of_200_is_no_more_than_98_percent_for_sure() -> None:
@@ -32,6 +42,34 @@ def test_nine_in_ten_intervals_of_medians_and_means_hold_the_truth() -> None:
         means += mean.low <= 1.0 <= mean.high
     assert 180 <= medians <= 200
     assert 178 <= means <= 199
+
+
+def test_the_bootstrap_is_scipys_up_to_its_own_chance() -> None:
+    """Ends of the interval agree to a twentieth of its width: 2,000 draws leave about 3 % of it to chance."""
+    values = np.exp(np.random.default_rng(5).normal(-3.0, 1.0, 60))
+
+    def mean(drawn: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+        return np.exp(np.log(drawn + 1e-3).mean(axis=axis)) - 1e-3
+
+    for found, statistic in (
+        (statistics.shifted_geometric_mean(values.tolist()), mean),
+        (statistics.median(values.tolist()), np.median),
+    ):
+        expected = stats.bootstrap(
+            (values,), statistic, n_resamples=20_000, method="percentile", vectorized=True,
+            random_state=np.random.default_rng(6),
+        ).confidence_interval  # fmt: skip
+        width = expected.high - expected.low
+        assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.1 * width)
+
+
+def test_the_interval_of_a_ratio_is_students_where_logarithms_are_normal() -> None:
+    logs = np.random.default_rng(7).normal(0.3, 0.5, 80)
+    ones = {("a", k): 1.0 for k in range(80)}
+    found = statistics.ratio({("a", k): float(np.exp(value)) for k, value in enumerate(logs)}, ones)
+    low, high = stats.t.interval(0.95, 79, logs.mean(), logs.std(ddof=1) / np.sqrt(80))
+    assert found.value == pytest.approx(np.exp(logs.mean()))
+    assert (np.log(found.low), np.log(found.high)) == pytest.approx((low, high), abs=0.1 * (high - low))
 
 
 def test_a_median_over_failures_is_infinite() -> None:
@@ -66,6 +104,37 @@ def test_friedmans_test_is_scipys_and_the_critical_difference_the_textbooks() ->
     assert ranked.critical_difference == pytest.approx(2.343 * np.sqrt(3 * 4 / (6 * 30)), rel=1e-3)  # Demsar, table 5a
     assert ranked.methods[2] == "c"
     assert ranked.alike == ((0, 1),)
+
+
+DEMSAR = {
+    "C4.5": (4, 1, 4, 4, 4, 1, 3, 2.5, 4, 2.5, 4, 3, 4, 3),
+    "C4.5+m": (3, 2, 1, 1, 2, 2.5, 2, 2.5, 3, 2.5, 2.5, 2, 1, 1),
+    "C4.5+cf": (2, 3, 2, 3, 3, 4, 4, 4, 2, 2.5, 1, 4, 2, 4),
+    "C4.5+m+cf": (1, 4, 3, 2, 1, 2.5, 1, 1, 1, 2.5, 2.5, 1, 3, 2),
+}
+"""Ranks of four methods on 14 data sets: Demsar 2006, table 6."""
+
+
+def test_the_worked_example_of_the_paper() -> None:
+    """Its mean ranks, and its verdict: Nemenyi's test is not powerful enough to tell any two of the four apart."""
+    ranked = statistics.ranking(DEMSAR)
+    assert ranked is not None
+    assert ranked.methods == ("C4.5+m+cf", "C4.5+m", "C4.5+cf", "C4.5")
+    assert ranked.ranks == pytest.approx((1.964, 2.000, 2.893, 3.143), abs=5e-4)
+    assert ranked.critical_difference == pytest.approx(1.25, abs=5e-3)
+    assert ranked.p_value < 0.05
+    assert ranked.alike == ((0, 3),)
+
+
+@pytest.mark.parametrize(
+    ("methods", "critical"),
+    [(3, 2.343), (4, 2.569), (5, 2.728), (6, 2.850), (7, 2.949), (8, 3.031), (9, 3.102), (10, 3.164)],
+)
+def test_critical_values_are_those_of_the_papers_table(methods: int, critical: float) -> None:
+    ranked = statistics.ranking({str(k): [float(k)] * 24 for k in range(methods)})
+    assert ranked is not None
+    expected = critical * np.sqrt(methods * (methods + 1) / (6 * 24))
+    assert ranked.critical_difference == pytest.approx(expected, rel=5e-4)
 
 
 def test_nobody_is_ranked_where_all_are_alike() -> None:

@@ -121,7 +121,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
 def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     """What a reader who reads nothing else should know."""
     ranked, picked = standings(results, rows), choices(results, rows)
-    said = [_in_doubt(results, ranked)]
+    said = [_in_doubt(results, ranked, rows)]
     fast = _by_method((one.fastest, f"{words(one.set)} ({one.fastest_ms:.3g} ms)") for one in picked if one.fastest)
     if fast:
         said.append(f"**Fastest of the dependable, on the problems that both solve:** {fast}.")
@@ -149,7 +149,7 @@ def _by_method(found: Iterable[tuple[Sequence[str], str]]) -> str:
     return "; ".join(f"{names} in {', '.join(each)}" for names, each in sets.items())
 
 
-def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
+def _in_doubt(results: Results, ranked: Sequence[Standing], rows: Sequence[Summary]) -> str:
     """Which method to take where nothing else is known: the most dependable, and of those the ones that are fastest."""
     most = max((one.dependable for one in ranked), default=0)
     if not most:
@@ -160,9 +160,11 @@ def _in_doubt(results: Results, ranked: Sequence[Standing]) -> str:
     if not apart and len(alike) > 1:
         apart = " The times of its settings cannot be told apart."
     solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
+    lowest = min(row.success_low for row in rows if row.method in alike and row.dependable)
     return (
-        f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems in {most} of "
-        f"{len(results.sets)} sets.{apart}"
+        f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems given in "
+        f"{most} of {len(results.sets)} sets; "
+        f"the lowest interval of these shares begins at {100 * lowest:.0f} %.{apart}"
     )
 
 

@@ -122,11 +122,16 @@ def profiles(results: Results, family: str, title: str, adapters: Sequence[str],
             shares = [100.0 * count / cases for count in counts]
             bands = np.array([wilson(count, cases) for count in counts]) * 100.0
             (drawn[adapter],) = panel.step(x, shares, where="post", color=seen.color, linewidth=1.6, zorder=3)
-            panel.fill_between(x, *bands.T, step="post", color=seen.color, alpha=0.12, linewidth=0.0, zorder=2)
+            some = [count > 0 for count in counts]  # before its first success the bands of all methods are one
+            panel.fill_between(
+                x, *bands.T, where=some, step="post", color=seen.color, alpha=0.12, linewidth=0.0, zorder=2
+            )
         panel.axhline(98.0, color=GREY, linewidth=0.9, linestyle="--", zorder=1)
         plot_style.plain_log(panel)
         panel.set(xlim=(1.0, end), ylim=(0.0, 103.0))
         panel.set_title(f"solved to {tolerance:g} m and rad", loc="left", fontsize=10)
+        count = max((cases for _, cases in found.values()), default=0)
+        panel.set_title(f"{count} problems, which all methods took", loc="right", fontsize=8, color=GREY)
         panel.set(xlabel="time over that of the fastest method", ylabel="cases solved within that factor [%]")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
     _legend(chart, adapters, drawn)
