@@ -102,6 +102,26 @@ def _at(state: State, piece: Any) -> Any:
     return coal.Transform3s(place.rotation, place.translation)
 
 
+def test_a_frame_touches_in_spite_of_a_clearance_that_its_segment_keeps_from_all_else() -> None:
+    """Both fingertip and button are within the clearance of each other; the panel behind the button is not."""
+    scene = wb.Scene(wb.load("human"))
+    scene.add(wb.Box((0.02, 0.6, 0.6)), name="panel", at=(0.60, -0.2, 1.1))
+    scene.add(wb.Sphere(0.03), name="button", at=(0.57, -0.2, 1.1))
+    held = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    goal = wb.Touch("right_index_tip", "button")
+    solution = wb.solve(wb.Problem(scene, goals=[goal], constraints=held, clearance=0.01))
+    assert solution.status == "solved", solution.message
+    tip = scene.figure.placement(solution.q, "right_index_tip").translation
+    assert np.linalg.norm(tip - (0.57, -0.2, 1.1)) == pytest.approx(0.03, abs=2e-5)
+    near = scene.contacts(solution.q, within=0.02)
+    kept = [
+        distance
+        for pair, distance in zip(near.pair, near.distance, strict=True)
+        if {scene.piece_owner[pair[0]], scene.piece_owner[pair[1]]} == {"right_hand", "panel"}
+    ]
+    assert all(distance > 0.01 - 1e-5 for distance in kept)
+
+
 def test_a_thing_that_is_moved_is_touched_where_it_is(scene: wb.Scene) -> None:
     own = copy.deepcopy(scene)
     q = own.figure.posture("standing")

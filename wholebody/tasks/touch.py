@@ -16,7 +16,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, face, surface
+from wholebody.tasks.surfaces import Surface, carried_by, face, surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +25,7 @@ class Touch(ContactTerm):
 
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
     that of the nearest points along the normal. Use it as a goal or as a constraint. The clearance of what is to touch
-    is zero. A thing that is moved is touched where it is.
+    is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
 
     Attributes:
         part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches.
@@ -66,7 +66,9 @@ class Touch(ContactTerm):
         where = f"Touch({shown(self.part)}, {shown(self.thing)})"
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
-        return filled(self, parts=(Gap(first, second),), touches=owner_pairs(first.owners, second.owners))
+        return filled(
+            self, parts=(Gap(first, second),), touches=owner_pairs(touched(scene, first), touched(scene, second))
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,11 @@ class Lean(ContactTerm):
         leaned_on = face(scene, self.on, -toward, state, where)
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
         return filled(self, parts=(Gap(first, second), facing), touches=owner_pairs(first.owners, second.owners))
+
+
+def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:
+    """Segments and things whose clearance is zero where a surface touches: of a point, what its joint carries."""
+    return found.owners or carried_by(scene, found.name, found.joints[0]).owners
 
 
 def named(name: object, where: str) -> str:
