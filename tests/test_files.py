@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import signal
 import subprocess
@@ -114,6 +115,24 @@ def test_what_a_killed_process_leaves_is_removed_by_the_next(tmp_path: Path, mon
         process.wait()
         if process.stdout is not None:
             process.stdout.close()
+
+
+def test_a_folder_that_is_being_made_is_not_taken_as_left_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    lock, looked = fcntl.flock, []
+
+    def late(file: object, how: int) -> None:
+        if how == fcntl.LOCK_EX and not looked:  # somebody else looks just before the first one locks
+            looked.append(file)
+            files.Scratch().close()
+        lock(file, how)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with files.Scratch() as mine:
+        assert looked
+        assert mine.is_dir()
 
 
 def test_folders_that_are_not_ours_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

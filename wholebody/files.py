@@ -226,8 +226,10 @@ class Scratch:
         """Make the folder, and remove those of processes that have ended."""
         _remove_abandoned()
         self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-        self._lock = (self.path / LOCK).open("wb")
+        unseen = self.path / f"{LOCK}.new"  # others take a lock that they see and that is free as left by the dead
+        self._lock = unseen.open("wb")
         fcntl.flock(self._lock, fcntl.LOCK_EX)
+        unseen.rename(self.path / LOCK)
 
     def close(self) -> None:
         """Remove the folder. Calling it again does nothing."""

@@ -175,7 +175,7 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
     for label, size in zip([*signed.labels, *one_sided.labels], push.tolist(), strict=True):
         found[label] = found.get(label, 0.0) + size
     most, deepest = max(found.values(), default=0.0), max(violated.values(), default=0.0)
-    frames = {
+    frames: dict[Label, str | None] = {
         ("constraint", (name,)): getattr(term, "frame", None)
         for name, term in zip(asked.names, asked.constraints, strict=True)
     }
