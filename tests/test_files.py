@@ -10,7 +10,6 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -118,6 +117,24 @@ def test_what_a_killed_process_leaves_is_removed_by_the_next(tmp_path: Path, mon
             process.stdout.close()
 
 
+def test_a_folder_that_is_being_made_is_not_taken_as_left_behind(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    lock, looked = fcntl.flock, []
+
+    def late(file: object, how: int) -> None:
+        if how == fcntl.LOCK_EX and not looked:  # somebody else looks just before the first one locks
+            looked.append(file)
+            files.Scratch().close()
+        lock(file, how)  # type: ignore[arg-type]
+
+    monkeypatch.setattr(fcntl, "flock", late)
+    with files.Scratch() as mine:
+        assert looked
+        assert mine.is_dir()
+
+
 def test_folders_that_are_not_ours_stay(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     (tmp_path / "wholebody-scratch-being-made").mkdir()  # its process is about to lock it
@@ -129,24 +146,3 @@ def test_folders_that_are_not_ours_stay(tmp_path: Path, monkeypatch: pytest.Monk
         "wholebody-scratch-being-made",
         "wholebody-scratch-link",
     ]
-
-
-def test_a_folder_that_another_process_takes_for_abandoned_is_made_anew(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Another process may look between the making of the lock file and its locking."""
-    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
-    removed: list[Path] = []
-    flock = fcntl.flock
-
-    def slow(file: Any, kind: int) -> None:
-        if kind == fcntl.LOCK_EX and not removed:
-            removed.extend(tmp_path.iterdir())
-            files.Scratch().close()
-        flock(file, kind)
-
-    monkeypatch.setattr(fcntl, "flock", slow)
-    with files.Scratch() as mine:
-        (mine / "text").write_text("here")
-        assert not removed[0].exists()
-        assert [mine] == list(tmp_path.iterdir())

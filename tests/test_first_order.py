@@ -122,3 +122,20 @@ def test_an_answer_says_it_in_words_and_in_the_picture(planar_arm):
 def test_stretched_limbs_are_said_to_be_too_short(planar_arm):
     problem = wb.Problem(wb.Scene(planar_arm(LENGTHS)), goals=[wb.Point("tip", (1.5, 0.0, 0.0))])
     assert wb.assess(problem, np.zeros(2)).in_the_way == "; nothing pushes back: the limbs do not reach"
+
+
+def test_constraints_are_called_as_they_were_given():
+    scene = wb.Scene(wb.load("human", detail="capsules"))
+    figure = scene.figure
+    bent = figure.with_joints(figure.neutral, {name: 1.0 for name in figure.joints if name.startswith("neck")})
+    frozen = wb.Freeze(*(name for name in figure.joints if name.startswith("neck")))
+    problem = wb.Problem(scene, figure.clamp(bent), constraints=[frozen, wb.Hold("left_foot")])
+    assert problem.constraint_names == (
+        "constraints[1], Hold('left_foot')", "RangeOfMotion (by default)", "ReachCones (by default)",
+    )  # fmt: skip
+    solution = wb.solve(problem)
+    assert solution.status == "infeasible"
+    assert "RangeOfMotion (by default) is missed" in solution.message
+    assert "constraints[0]" not in solution.message
+    problem.constraints = problem.constraints[:1]
+    assert problem.constraint_names == ("constraints[1], Hold('left_foot')",)

@@ -225,14 +225,11 @@ class Scratch:
     def __init__(self) -> None:
         """Make the folder, and remove those of processes that have ended."""
         _remove_abandoned()
-        while True:
-            self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
-            with suppress(FileNotFoundError):
-                self._lock = (self.path / LOCK).open("wb")
-                fcntl.flock(self._lock, fcntl.LOCK_EX)
-                if (self.path / LOCK).exists():  # else another process removed it between its making and its locking
-                    return
-                self._lock.close()
+        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+        unseen = self.path / f"{LOCK}.new"  # others take a lock that they see and that is free as left by the dead
+        self._lock = unseen.open("wb")
+        fcntl.flock(self._lock, fcntl.LOCK_EX)
+        unseen.rename(self.path / LOCK)
 
     def close(self) -> None:
         """Remove the folder. Calling it again does nothing."""

@@ -68,10 +68,11 @@ class _Rows:
 
 
 class _Asked(NamedTuple):
-    """What was asked of a posture when it was judged."""
+    """What was asked of a posture when it was judged; `names` are those of the constraints."""
 
     goals: tuple[Goal, ...]
     constraints: tuple[Constraint, ...]
+    names: tuple[str, ...]
     bounds: tuple[Bound, ...]
     measures: tuple[Measure, ...]
     figure: Figure
@@ -88,7 +89,9 @@ class FirstOrder:
         """Keep what was asked, the posture where `pairs` are, and the pairs that push there."""
         self.fits = fits
         scene = problem.scene
-        self._asked = _Asked(problem.goals, problem.constraints, problem.bounds, problem.measures, scene.figure)
+        self._asked = _Asked(
+            problem.goals, problem.constraints, problem.constraint_names, problem.bounds, problem.measures, scene.figure
+        )
         self._built, self._q = scene.built, pairs.state.q.copy()
         self._near = pairs.nearer(problem.clearances + ACTIVE)
         self._clearances = problem.clearances[self._near.number]
@@ -158,7 +161,7 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
         value = np.atleast_1d(constraint.value(state))
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
         if np.abs(missed).max(initial=0.0) > MET:
-            violated[_constraint(number, constraint)] = float(np.abs(missed).max())
+            violated["constraint", (asked.names[number],)] = float(np.abs(missed).max())
             pull += missed @ _dense(constraint.jacobian(state), state)
     if violated:
         for row, number in zip(rows, numbers, strict=True):
@@ -172,7 +175,10 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
     for label, size in zip([*signed.labels, *one_sided.labels], push.tolist(), strict=True):
         found[label] = found.get(label, 0.0) + size
     most, deepest = max(found.values(), default=0.0), max(violated.values(), default=0.0)
-    frames = {_constraint(k, term): getattr(term, "frame", None) for k, term in enumerate(asked.constraints)}
+    frames: dict[Label, str | None] = {
+        ("constraint", (name,)): getattr(term, "frame", None)
+        for name, term in zip(asked.names, asked.constraints, strict=True)
+    }
     first = [Blocker(*label, size / deepest, True, frames.get(label)) for label, size in violated.items()]
     second = [
         Blocker(*label, size / most, False, frames.get(label)) for label, size in found.items() if size > WORTH * most
@@ -185,11 +191,6 @@ def _without(rows: _Rows, labels: dict[Label, float]) -> _Rows:
     left = _Rows(rows.rows[0].shape[1])
     left.add(np.vstack(rows.rows)[kept], [label for label, keep in zip(rows.labels, kept, strict=True) if keep])
     return left
-
-
-def _constraint(number: int, constraint: Any) -> Label:
-    name = getattr(constraint, "frame", None)
-    return "constraint", (f"constraints[{number}], {type(constraint).__name__}" + (f"({name!r})" if name else ""),)
 
 
 class _Active(NamedTuple):
@@ -217,7 +218,7 @@ def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
         value = np.atleast_1d(constraint.value(state))
         jacobian = _dense(constraint.jacobian(state), state)
         low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
-        label = _constraint(number, constraint)
+        label: Label = ("constraint", (asked.names[number],))
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))
         one_sided.add(jacobian[low & ~high], [label] * int((low & ~high).sum()))
         one_sided.add(-jacobian[high & ~low], [label] * int((high & ~low).sum()))

@@ -104,6 +104,7 @@ class Problem(checks.Settled):
         measured = usual if measures is None else _checked(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
+        self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
         if balance is not None:
             checks.flag(balance, "balance")
         self.bounds: tuple[Bound, ...] = tuple(
@@ -155,6 +156,23 @@ class Problem(checks.Settled):
         """The constraints without the defaults."""
         added = {id(term) for term in self.defaults}
         return tuple(term for term in self.constraints if id(term) not in added)
+
+    @property
+    def constraint_names(self) -> tuple[str, ...]:
+        """What messages call each constraint: where it stood in the list that was given, its class and its frame.
+
+        A default of a person, which stood nowhere, is called by its class alone. Constraints that were set afterwards
+        are counted as they were set.
+        """
+        defaults = {id(term) for term in self.defaults}
+        count = sum(id(term) not in defaults for term in self.constraints)
+        places = iter(self._places if len(self._places) == count else range(count))
+        found = []
+        for term in self.constraints:
+            frame = getattr(term, "frame", None)
+            name = type(term).__name__ + (f"({frame!r})" if frame else "")
+            found.append(f"{name} (by default)" if id(term) in defaults else f"constraints[{next(places)}], {name}")
+        return tuple(found)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.

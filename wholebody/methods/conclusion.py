@@ -127,9 +127,9 @@ def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, floa
         key=lambda item: item[1],
     )
     state = State(problem.scene.model).update(q)
-    for number, term in enumerate(problem.constraints):
+    for name, term in zip(problem.constraint_names, problem.constraints, strict=True):
         value = np.atleast_1d(term.value(state))
         missed = float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0))
         if missed > worst[1]:
-            worst = (f"constraints[{number}], {type(term).__name__}", missed)
+            worst = (name, missed)
     return worst

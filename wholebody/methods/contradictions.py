@@ -93,7 +93,7 @@ class _Finder:
         for number, term in enumerate(self._problem.constraints):
             if not isinstance(term, Hold) or term.relative_to is not None:
                 continue
-            name = f"constraints[{number}], Hold({term.frame!r})"
+            name = self._problem.constraint_names[number]
             group, local = self._frame(term.frame)
             here = self._at(group, local)
             if here is not None:
