@@ -35,9 +35,7 @@ def docs(tmp_path: Path) -> Path:
     return folder
 
 
-def test_step(
-    tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("wholebody.cli.bench.step.PAIRS_OF_RUNS", 2)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
