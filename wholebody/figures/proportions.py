@@ -13,7 +13,6 @@ from dataclasses import replace
 from functools import cache, lru_cache
 
 import numpy as np
-from scipy.special import chdtri, ndtr
 
 from wholebody.arrays import Array
 from wholebody.checks import known, number, shown
@@ -118,6 +117,8 @@ def likely_change(person: Body, which: list[int], change: Array) -> Array:
                 f"proportions: {name} {usual[name] + change[k]:g} m is {abs(deviation):.1f} standard deviations from "
                 f"that of {people}; give {low:.3f} to {high:.3f} m or another stature"
             )
+    from scipy.special import chdtri, ndtr  # loading it takes longer than loading a person, and few are asked for so
+
     given = covariance[np.ix_(which, which)] + OBSERVER**2 * np.eye(len(which))
     gains = np.linalg.solve(given, change)
     if change @ gains > chdtri(len(which), 2.0 * ndtr(-FARTHEST)):

@@ -11,7 +11,7 @@ from types import MappingProxyType
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.checks import flag, instance, listed, shown
+from wholebody.checks import a, flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
@@ -142,7 +142,7 @@ def as_avoider(given: object) -> Avoider:
     if isinstance(given, type) or not callable(getattr(given, "avoid", None)):
         raise InputError(f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.Trajectory()")
     if lacking := [part for part in ("name", "clearance", "dynamics") if not hasattr(given, part)]:
-        raise InputError(f"avoid: method {shown(given)} has no {lacking[0]}; see wholebody.motion.avoider")
+        raise InputError(f"avoid: method is {a(type(given))} without {lacking[0]}; see wholebody.motion.avoider")
     return given  # type: ignore[return-value]
 
 

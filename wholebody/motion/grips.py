@@ -17,7 +17,6 @@ from typing import NamedTuple
 import coal
 import numpy as np
 import pinocchio as pin
-import scipy.sparse as sp
 
 from wholebody.arrays import Array
 from wholebody.motion.trajectory.banded_qp import BandedQP, banded_solver
@@ -110,6 +109,8 @@ def _deepest(rows: list[_Row]) -> float:
 
 def _window(grip: _Grip, window: Window, q: Array, dt: float, clearance: float) -> Array | None:
     """(frames, 3) shifts of a window; None where none is found that parts everything."""
+    import scipy.sparse as sp
+
     count = len(window)
     seams = window.first > 0, window.end < len(q)
     bands = Objective(count, np.ones(3), SPREAD, dt, seams).bands

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import nnls
 
 from wholebody.arrays import Array
 
@@ -45,6 +44,8 @@ def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -
     """
     if len(points) == 0:
         return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
+    from scipy.optimize import nnls
+
     around = 2.0 * np.pi * np.arange(CONE_EDGES) / CONE_EDGES
     edges = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(CONE_EDGES)])
     directions = np.tile(edges, (len(points), 1))

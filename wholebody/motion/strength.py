@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtri
 
 from wholebody import checks
 from wholebody.arrays import Array
@@ -122,6 +121,8 @@ class Strength:
     def _torque(self, name: str | None) -> float:
         if name is None:
             return np.inf
+        from scipy.special import ndtri
+
         logs = np.log(SEXES[self.sex][name])
         return float(np.exp(np.interp(ndtri(self.percentile / 100.0), ndtri(np.array(PERCENTILES) / 100.0), logs)))
 

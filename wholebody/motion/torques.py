@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import pinocchio as pin
-from scipy.signal import butter, sosfiltfilt
 
 from wholebody import checks
 from wholebody.arrays import Array, Mask
@@ -227,6 +226,8 @@ def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
     rate = 1.0 / clip.dt
     if cutoff is None or rate < 4.0 * cutoff:
         return clip
+    from scipy.signal import butter, sosfiltfilt  # it loads scipy.stats, which takes longer than a short clip
+
     sections = butter(ORDER, cutoff, fs=rate, output="sos")
     reach = min(len(clip) - 1, int(np.ceil(3.0 * rate / cutoff)))
     if reach < 1:

@@ -9,7 +9,6 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.motion.files.gltf import joint_tree
 from wholebody.view.bodies import Bodies
 from wholebody.view.viewed_scene import ViewedScene
 
@@ -26,6 +25,8 @@ def posture_glb(scene: ViewedScene, q: Array) -> bytes:
     """
     import trimesh
     from trimesh.exchange.gltf import export_glb
+
+    from wholebody.motion.files.gltf import joint_tree
 
     data = State(scene.model).update(q).data
     tree, joints = joint_tree(scene.model, list(data.liMi))
