@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from wholebody.bench.compare.advice import choices, effort, error, slowness, standings
+from wholebody.bench.compare.advice import choices, effort, error, reference, slowness, standings
 from wholebody.bench.compare.charts import groups
 from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.rankings import in_words, rankings
@@ -71,7 +71,7 @@ def write_pages(given: Material, charts: Mapping[str, tuple[Path, Path]], folder
         text = render(
             "compare_method.md", adapter=adapter, rows=[row for row in rows if row.method == adapter.name],
             titles={family.name: family.title for family in given.settings.sets}, standing=standing.get(adapter.name),
-            slowness=slowness, good=GOOD, sets=len(given.settings.sets), facts=given.facts,
+            slowness=slowness, base=reference(results), good=GOOD, sets=len(given.settings.sets), facts=given.facts,
         )  # fmt: skip
         made.append(_page(folder, page_name("method", adapter.name), adapter.name, text, links, []))
     return made
