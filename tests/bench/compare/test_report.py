@@ -85,7 +85,10 @@ def test_every_set_and_every_method_has_a_page(folder: Path) -> None:
     assert set(pages) == {"set-arm.html", *(f"method-{name}.html" for name in ("solves", "lies", "refuses", "hangs"))}
     assert "100.0 [34, 100]" in pages["set-arm.html"]  # two of two, by Wilson
     assert pages["set-arm.html"].count("<svg") == 2
-    assert "A fake that lies. It lies." in pages["method-lies.html"]
+    assert "A fake that lies. It lies. wb.Fake() is code." in pages["method-lies.html"]
+    assert "stand together" not in pages["set-arm.html"]  # one method stands alone
+    assert "It solves least" not in pages["method-solves.html"]  # it solves all
+    assert "Its time over that" not in pages["method-solves.html"]  # it is the one that others are compared with
     for text in pages.values():
         assert not FETCHED.search(text)
         assert all(name in pages for name in re.findall(r'href="([^"]+\.html)"', text))

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 from wholebody.bench.adapters import adapters
 from wholebody.bench.compare.pages import Material
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.compare.statistics import LEAST
+from wholebody.bench.compare.statistics import LEAST, median
 from wholebody.bench.compare.summary import kernel_of
 from wholebody.bench.problem_sets.registry import problem_set
 from wholebody.bench.report import words
@@ -46,7 +46,8 @@ class Locked:
         sets, methods: names.
         amounts: the numbers of its settings.
         facts: of the machine and the versions.
-        figures: by set, method and name: "solved", as a share, and "median time" of an answer, in kernels.
+        figures: by set, method and name: "solved", as a share, and "median time" of an answer, in kernels,
+            both by the processor: the kernel is too short to wait for other work, and a solve is not.
     """
 
     sets: tuple[str, ...]
@@ -81,11 +82,9 @@ def locked(given: Material) -> Locked:
     for row in given.rows:
         if row.refused < row.cases:
             figures[row.set, row.method, "solved"] = Figure(row.success, row.success_low, row.success_high)
-            times = (
-                1e-3 * row.median_ms / kernel.value,
-                1e-3 * row.median_low_ms / kernel.high,
-                1e-3 * row.median_high_ms / kernel.low,
-            )
+            answered = [one for one in given.results.default(row.set, row.method) if one.answered]
+            spent = median([one.cpu_seconds for one in answered])
+            times = (spent.value / kernel.value, spent.low / kernel.high, spent.high / kernel.low)
             if row.cases - row.refused >= LEAST and all(isfinite(value) for value in times):
                 figures[row.set, row.method, "median time"] = Figure(*times)
     asked = given.settings

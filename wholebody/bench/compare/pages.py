@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
-from wholebody.bench.compare.advice import choices, effort, error, slowness, standings
+from wholebody.bench.compare.advice import choices, effort, error, reference, slowness, standings
 from wholebody.bench.compare.charts import groups
 from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.rankings import in_words, rankings
@@ -15,7 +16,7 @@ from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.report import render
+from wholebody.bench.report import render, upfirst
 from wholebody.bench.tables import write_text
 
 FOLDER = "pages"
@@ -71,10 +72,18 @@ def write_pages(given: Material, charts: Mapping[str, tuple[Path, Path]], folder
         text = render(
             "compare_method.md", adapter=adapter, rows=[row for row in rows if row.method == adapter.name],
             titles={family.name: family.title for family in given.settings.sets}, standing=standing.get(adapter.name),
-            slowness=slowness, good=GOOD, sets=len(given.settings.sets), facts=given.facts,
+            sentence=partial(_sentence, adapter.name), slowness=slowness, base=reference(results), good=GOOD,
+            sets=len(given.settings.sets), facts=given.facts,
         )  # fmt: skip
         made.append(_page(folder, page_name("method", adapter.name), adapter.name, text, links, []))
     return made
+
+
+def _sentence(name: str, said: str) -> str:
+    """What an adapter says, as a sentence; names of code, which methods have too, keep their small letters."""
+    first = re.split(r"\W", said, maxsplit=1)[0]
+    kept = first in (re.split(r"\W", name, maxsplit=1)[0], "wb") or re.match(r"\w+\.\w", said)
+    return f"{(said if kept else upfirst(said)).rstrip('.')}."
 
 
 def page_name(kind: str, name: str) -> str:

@@ -35,7 +35,7 @@ class Summary:
         median_low_ms, median_high_ms: bootstrap interval of the median.
         mean_ms, mean_low_ms, mean_high_ms: shifted geometric mean over all cases not refused, with its interval; one
             that is not solved counts as long as a solve, or on the average a frame, may take.
-        kernels: the median in units of the reference kernel; NaN where that was not timed.
+        kernels: the median of the processor's time in units of the reference kernel; NaN where that was not timed.
         cold_ms: median of the first solve in a process; NaN where no process was new.
         tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
         setup_ms, iterations: medians; the first to build a model of its own.
@@ -119,6 +119,7 @@ def _summary(
 
     solved, fine = (share([record.success(tolerance) for record in taken]) for tolerance in (COARSE, FINE))
     usual = median([record.seconds for record in answered])
+    cpu = middle([record.cpu_seconds for record in answered])
     longest = frame_cap(cap, results.frames(family)) if results.moving(family) else cap
     # the cap is of the processor's time: by the clock, a busy machine may take longer
     mean = shifted_geometric_mean(
@@ -148,10 +149,10 @@ def _summary(
         mean_ms=1e3 * mean.value,
         mean_low_ms=1e3 * mean.low,
         mean_high_ms=1e3 * mean.high,
-        kernels=usual.value / kernel,
+        kernels=cpu / kernel,
         cold_ms=1e3 * middle([seconds[adapter] for seconds in cold if adapter in seconds]),
         p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
-        cpu_median_ms=1e3 * middle([record.cpu_seconds for record in answered]),
+        cpu_median_ms=1e3 * cpu,
         tool=middle([record.tool_seconds / max(record.seconds, 1e-9) for record in answered]),
         setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
         iterations=middle([record.iterations for record in answered]),
