@@ -78,7 +78,7 @@ def draw(problems: dict[tuple[str, str], wb.Problem], solutions: dict[tuple[str,
             for column, control in enumerate(CONTROLS):
                 viewer.show(solutions[person, control].q, problem=problems[person, control])
                 try:
-                    one = Image.open(viewer.picture(path, size=(width, height)))
+                    one = Image.open(viewer.picture(path, size=(width, height), legend=False))
                 except wb.MissingPackageError as error:
                     print(f"no picture: {error}")
                     continue

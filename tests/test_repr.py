@@ -36,3 +36,13 @@ def test_scene_problem_and_solution_in_three_lines() -> None:
     assert "unreachable" in repr(solution)
     missed = np.linalg.norm(scene.figure.placement(solution.q, "right_index_tip").translation - (9.0, 0.0, 1.0))
     assert f"missed by {1e3 * missed:.3g} mm" in repr(solution)
+    assert str(solution.assessment) in repr(solution)
+
+
+def test_a_frame_of_a_drag_in_one_line() -> None:
+    scene = wb.Scene(wb.load("hand"))
+    place = scene.figure.placement(scene.figure.neutral, "right_index_tip").translation
+    frame = wb.Drag(wb.Problem(scene, goals=[wb.Point("right_index_tip", place)])).to(place)
+    assert repr(frame).startswith("DragFrame: error ")
+    assert "array" not in repr(frame)
+    assert f"{frame.iterations} iterations" in repr(frame)

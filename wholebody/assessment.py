@@ -65,6 +65,13 @@ class Assessment:
         """
         return self.first_order.optimality
 
+    def __str__(self) -> str:
+        return (
+            f"goals missed by {1e3 * self.goal_error:.3g} mm and {np.degrees(self.goal_angle):.3g} degrees; "
+            f"deepest overlap {1e3 * self.penetration:.3g} mm, limits off by {self.limit_violation:.3g}, "
+            f"constraints by {self.constraint_violation:.3g}"
+        )
+
     @property
     def blockers(self) -> tuple[Blocker, ...]:
         """What stands in the way, the hardest first; none where goals are met and everything holds."""

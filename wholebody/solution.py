@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-import numpy as np
-
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment
 
@@ -67,11 +65,8 @@ class Solution:
         return self.status == "solved"
 
     def __repr__(self) -> str:
-        judged = self.assessment
         return (
             f"Solution: {self.status} by {self.method} in {1e3 * self.seconds:.1f} ms, {self.iterations} iterations\n"
-            f"  goals missed by {1e3 * judged.goal_error:.3g} mm and {np.degrees(judged.goal_angle):.3g} degrees; "
-            f"deepest overlap {1e3 * judged.penetration:.3g} mm, limits off by {judged.limit_violation:.3g}, "
-            f"constraints by {judged.constraint_violation:.3g}\n"
+            f"  {self.assessment}\n"
             f"  {self.message}"
         )

@@ -7,9 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import wholebody as wb
 from wholebody.view.browser import Browser
+from wholebody.view.goal_markers import Goals
 
 _PANEL = """(() => {
   const box = document.getElementById("panel");
@@ -65,3 +67,44 @@ def test_a_notebook_shows_the_scene_in_a_frame(browser: Browser, tmp_path: Path)
     assert browser.evaluate(f"{framed}.document.querySelector('#panel b').textContent") == "In a notebook"
     assert browser.evaluate(f"{framed}.viewer.scene_tree.find(['figure', 'body']).object.children.length") > 0
     assert browser.evaluate(f"{framed}.viewer.capture_image().length") > 10_000
+
+
+def _pixels(path: Path) -> Any:
+    return np.asarray(Image.open(path).convert("RGB")).astype(int)
+
+
+@pytest.mark.browser
+def test_a_picture_has_the_panel_in_a_corner_beside_the_figure(chromium: str, tmp_path: Path) -> None:
+    scene = wb.Scene(wb.load("hand"))
+    q = scene.figure.neutral
+    middle = scene.state(q).center_of_mass()
+    width, height = 640, 480
+    with wb.Viewer(scene, title="A hand") as viewer:
+        viewer.show(q)
+        for aside, column in (((0.0, 0.0, 0.0), 0), ((0.0, 0.3, -0.2), 1)):  # in the middle; at the left, at the top
+            viewer.look(middle + (1.0, 0.0, 0.0) + aside, middle + aside)
+            bare = _pixels(viewer.picture(tmp_path / "bare.png", (width, height), legend=False))
+            told = _pixels(viewer.picture(tmp_path / "told.png", (width, height)))
+            rows, columns = np.nonzero(np.abs(told - bare).max(axis=2))
+            assert rows.size
+            inside = told[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1]
+            assert inside.shape[1] < 0.45 * width
+            assert inside.shape[0] < 0.45 * height
+            assert inside.min() < 100  # letters
+            assert (columns.max() < width / 2) == (column == 0)
+            hand = np.abs(bare - bare[-1, width // 2]).max(axis=2) > 60
+            assert hand.any()
+            assert not hand[rows.min() : rows.max() + 1, columns.min() : columns.max() + 1].any()
+        small = [viewer.picture(tmp_path / f"{flag}.png", (160, 120), legend=flag) for flag in (False, True)]
+        np.testing.assert_array_equal(*map(_pixels, small))  # no room for it
+        assert Image.open(viewer.save(tmp_path / "saved.png")).size == (960, 720)
+
+
+def test_what_is_looked_at_from_afar_does_not_make_the_figure_small() -> None:
+    scene = wb.Scene(wb.load("human"))
+    eyes = scene.figure.placement(scene.figure.posture("standing"), "gaze").translation
+    for far, kept in ((0.4, 0.4), (6.0, 1.0)):
+        looked_at = eyes + (far * 0.8, far * 0.6, 0.0)
+        problem = wb.Problem(scene, "standing", goals=[wb.Axis("gaze", (1, 0, 0), toward=looked_at)])
+        (place,) = Goals(scene, problem).targets(scene.state(problem.start))
+        np.testing.assert_allclose(place, eyes + (kept * 0.8, kept * 0.6, 0.0), atol=1e-9)

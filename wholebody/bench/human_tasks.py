@@ -269,7 +269,7 @@ def _draw(problem: Problem, q: Array, path: Path) -> None:
     with Viewer(problem.scene, contact_distance=-1.0, see_through=glass) as viewer:
         viewer.show(q)
         viewer.look((3.5, -2.9, 1.9), (0.05, 0.0, 1.08))
-        viewer.picture(path, SIZE)
+        viewer.picture(path, SIZE, legend=False)
     _smaller(path)
 
 

@@ -15,9 +15,10 @@ from wholebody.files import write
 
 MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6
-INCHES = 2.4  # of one height
+INCHES = 2.4  # width of one height
+LETTERS = 0.75  # inches of one height for its title and its axis
 DPI = 120
-MEANING = "below 0: metres short; above: reached"
+MEANING = "red: metres short    green: reached, 1 with the least measure"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
 _PAGE = """<!doctype html>
@@ -39,9 +40,11 @@ slider.addEventListener("input",show);show();
 def draw_slices(found: Any, path: Path) -> Path:
     """Draw the heights of a reach map beside each other, seen from above; returns the path."""
     shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), MOST_SLICES)).round().astype(int)).tolist()
-    columns = min(COLUMNS, len(shown))
-    rows = -(-len(shown) // columns)
-    chart, axes = _chart(rows, columns, (INCHES * columns + 1.2, INCHES * rows + 0.6))
+    rows = -(-len(shown) // COLUMNS)
+    columns = -(-len(shown) // rows)
+    deep, wide = (float(np.ptp(places)) + 0.1 for places in (found.x, found.y))
+    high = INCHES * min(max(deep / wide, 0.4), 2.5) + LETTERS
+    chart, axes = _chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 4.0)))
     values = heat(found)
     image: Any = None
     for axis in axes.flat[len(shown) :]:
@@ -49,7 +52,8 @@ def draw_slices(found: Any, path: Path) -> Path:
     for axis, k in zip(axes.flat, shown, strict=False):
         image = _slice(axis, found, values, k)
     bar = chart.colorbar(image, ax=list(axes.flat), shrink=0.8)
-    bar.set_label(MEANING, fontsize="small")
+    bar.set_label(MEANING, fontsize="x-small")
+    bar.ax.tick_params(labelsize="x-small")
     chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
     return write(path, _png(chart))
 

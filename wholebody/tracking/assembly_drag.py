@@ -32,6 +32,10 @@ class DragFrame(NamedTuple):
     seconds: float
     collisions: tuple[Collision, ...] = ()
 
+    def __repr__(self) -> str:
+        hit = f", {len(self.collisions)} collisions" if self.collisions else ""
+        return f"DragFrame: error {self.error:.3g}, {self.iterations} iterations, {1e3 * self.seconds:.3g} ms{hit}"
+
 
 class AssemblyDrag:
     """Follows a goal of an assembly that is moved from frame to frame; it moves the assembly's bodies.

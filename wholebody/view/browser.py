@@ -194,15 +194,16 @@ class Browser:
             raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
         return answer["result"].get("value")
 
-    def capture(self, first: str = "0") -> bytes:
+    def capture(self, first: str = "0", *, legend: bool = False) -> bytes:
         """PNG of the drawing, without the controls on top of it.
 
         Args:
             first: JavaScript to run before it in the same call, so that the page draws only once.
+            legend: whether the title, the status and the meaning of the colours stand in a corner.
         """
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
-        data: str = self.evaluate(f"{first}; viewer.capture_image()")
+        data: str = self.evaluate(f"{first}; wholebody.capture({json.dumps(legend)})")
         return base64.b64decode(data.partition(",")[2])
 
     def close(self) -> None:

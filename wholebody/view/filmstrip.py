@@ -53,7 +53,7 @@ def write_filmstrip(
     with Scratch() as folder:
         for number, q in enumerate(postures):
             viewer.show(q)
-            with Image.open(viewer.picture(folder / "one.png", size)) as picture:
+            with Image.open(viewer.picture(folder / "one.png", size, legend=False)) as picture:
                 strip.paste(picture, (number * (width + GAP), 0))
     made = io.BytesIO()
     strip.save(made, format="PNG")

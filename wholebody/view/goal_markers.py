@@ -19,6 +19,8 @@ from wholebody.view.viewed_scene import ViewedScene
 
 _TARGET = Marker("ball", style.TARGET, style.TARGET_RADIUS)
 _MISS = Marker("rod", style.MISS)
+FARTHEST_LOOK = 1.0
+"""Metres: what an axis is turned to is not drawn, and not kept in the picture, if it is farther from the frame."""
 
 
 class Goals:
@@ -44,7 +46,9 @@ class Goals:
             target, directed = _target(goal, here, state, self.scene)
             if here is None or target is None:
                 continue
-            if np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis")):
+            if not _far(goal, here) and (
+                np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis"))
+            ):
                 keyframe.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
             line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
             if line is not None:
@@ -58,7 +62,7 @@ class Goals:
             keyframe.markers[f"{root}/text"] = (label, _at(target.translation))
 
     def targets(self, state: State) -> Array:
-        """Positions (n, 3) that should be in the picture."""
+        """Positions (n, 3) that should be in the picture; on the way to what is looked at from afar."""
         found = [np.zeros((0, 3))]
         for goal in self.goals:
             target, _ = _target(goal, self._here(goal, state), state, self.scene)
@@ -97,15 +101,22 @@ def _wanted(goal: Any, here: pin.SE3) -> Array:
     return np.asarray(np.asarray(goal.toward, dtype=float) - here.translation)
 
 
+def _far(goal: Any, here: pin.SE3) -> bool:
+    """Whether a goal turns an axis to a place that is too far to be drawn."""
+    toward = getattr(goal, "toward", None) if hasattr(goal, "axis") else None
+    return toward is not None and bool(np.linalg.norm(_wanted(goal, here)) > FARTHEST_LOOK)
+
+
 def _target(goal: Any, here: pin.SE3 | None, state: State, scene: ViewedScene) -> tuple[pin.SE3 | None, bool]:
     """Target placement of the goal's frame, and whether the goal includes the orientation."""
     if here is None:
         return None, False
     target = getattr(goal, "target", None)
     if hasattr(goal, "axis"):
-        return pin.SE3(
-            np.eye(3), here.translation if goal.toward is None else np.asarray(goal.toward, dtype=float)
-        ), False
+        way = np.zeros(3) if goal.toward is None else _wanted(goal, here)
+        if _far(goal, here):
+            way *= FARTHEST_LOOK / np.linalg.norm(way)
+        return pin.SE3(np.eye(3), here.translation + way), False
     if hasattr(goal, "to"):
         base = state.frame(scene.figure.frame_id(goal.to))
         return (base * placement(goal.placement), True) if goal.placement is not None else (None, False)

@@ -7,7 +7,7 @@
   const viewer = new MeshCat.Viewer(pane, pane.dataset.still === undefined); // a page for pictures draws when asked to
   const obey = viewer.handle_command.bind(viewer);
   const labels = new Map();
-  const page = { ready: false, seek: seek, play: play, bytes: bytes, resize: resize };
+  const page = { ready: false, seek: seek, play: play, bytes: bytes, resize: resize, capture: capture };
   window.viewer = viewer;
   window.wholebody = page;
 
@@ -91,7 +91,9 @@
   }
 
   // The title, one line about the picture, and the meaning of its colours.
+  let told = null;
   function panel(cmd) {
+    told = cmd;
     const box = document.getElementById("panel");
     const line = (kind, text) => {
       const made = document.createElement(kind);
@@ -210,6 +212,72 @@
     arrange();
     draw();
   };
+
+  // A picture of the drawing, PNG as a data address; with the panel in the corner that hides least of the figure.
+  function capture(legend) {
+    if (!legend || !told) return viewer.capture_image();
+    viewer.render();
+    const canvas = document.createElement("canvas"), source = viewer.renderer.domElement;
+    [canvas.width, canvas.height] = [source.width, source.height];
+    const ctx = canvas.getContext("2d");
+    ctx.drawImage(source, 0, 0);
+    write_panel(ctx, canvas.width, canvas.height);
+    return canvas.toDataURL();
+  }
+
+  const LARGEST = 0.45; // of the width and of the height: a panel that needs more is left out
+  function write_panel(ctx, width, height) {
+    const unit = Math.max(11, Math.round(height / 55)), line = 1.45 * unit, pad = 0.8 * unit, most = LARGEST * width;
+    const font = weight => `${weight} ${unit}px "Helvetica Neue", Arial, "DejaVu Sans", sans-serif`;
+    const lines = [{ text: told.title, weight: "bold" }];
+    for (const part of told.status ? told.status.split("; ") : []) lines.push({ text: part, weight: "normal" });
+    for (const [text, ...rgb] of told.legend) lines.push({ text, weight: "normal", rgb });
+    let wide = 0;
+    for (const one of lines) {
+      ctx.font = font(one.weight);
+      wide = Math.max(wide, ctx.measureText(one.text).width + (one.rgb ? 1.4 * unit : 0));
+    }
+    wide += 2 * pad;
+    const high = lines.length * line + 1.2 * pad;
+    page.panel = null;
+    if (wide > most || high > LARGEST * height) return;
+    const [left, top] = free_corner(width, height, wide, high, pad);
+    page.panel = [left, top, wide, high];
+    ctx.fillStyle = "rgba(255,255,255,0.8)";
+    ctx.fillRect(left, top, wide, high);
+    ctx.textBaseline = "middle";
+    lines.forEach((one, k) => {
+      const middle = top + 0.6 * pad + (k + 0.5) * line;
+      let x = left + pad;
+      if (one.rgb) {
+        ctx.fillStyle = `rgb(${one.rgb.join(", ")})`;
+        ctx.fillRect(x, middle - 0.4 * unit, 0.8 * unit, 0.8 * unit);
+        x += 1.4 * unit;
+      }
+      ctx.fillStyle = "#333a42";
+      ctx.font = font(one.weight);
+      ctx.fillText(one.text, x, middle);
+    });
+  }
+
+  // Left and top of a box in the corner in which the fewest joints, goals and labels are; top left where all are free.
+  function free_corner(width, height, wide, high, gap) {
+    const found = [], at = new THREE.Vector3();
+    const add = object => {
+      at.setFromMatrixPosition(object.matrixWorld).project(viewer.camera);
+      found.push([(at.x + 1) / 2 * width, (1 - at.y) / 2 * height]);
+    };
+    for (const folder of ["figure", "goals"]) {
+      const node = viewer.scene_tree.children[folder];
+      for (const below of Object.values(node ? node.children : {})) add(below.object);
+    }
+    for (const sprite of labels.values()) add(sprite);
+    const right = width - wide - gap, low = height - high - gap, near = 0.06 * height;
+    const corners = [[gap, gap], [right, gap], [gap, low], [right, low]];
+    const hidden = ([left, top]) => found.filter(([x, y]) =>
+      x > left - near && x < left + wide + near && y > top - near && y < top + high + near).length;
+    return corners.reduce((best, one) => hidden(one) < hidden(best) ? one : best);
+  }
 
   let drawn = null; // width and height of a page for pictures
   const fit = viewer.set_3d_pane_size.bind(viewer);

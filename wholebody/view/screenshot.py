@@ -68,14 +68,14 @@ class Screenshots:
         self._browser: Browser | None = None
         self._shown: Store | None = None
 
-    def picture(self, wanted: Sequence[Command], size: Any) -> bytes:
-        """PNG of what these commands draw in an empty page, of this width and height.
+    def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
+        """PNG of what these commands draw in an empty page, of this width and height; with the panel if wanted.
 
         Raises:
             InputError: the size is out of range.
             MissingPackageError: there is no Chromium.
         """
-        return self._draw(wanted, size).capture()
+        return self._draw(wanted, size).capture(legend=legend)
 
     def pictures(self, wanted: Sequence[Command], size: Any, times: Iterable[float]) -> Iterator[bytes]:
         """PNGs at these times of a motion, seconds; raises like `picture`, before the first."""

@@ -15,12 +15,24 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
+from wholebody import checks
 from wholebody.errors import InputError, MissingPackageError, WholebodyError
 from wholebody.view import server
 from wholebody.view.server import PAGE, PUSH, SYNC, Command
 
 _START = "import runpy, sys; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
 _STARTING = 20.0  # s
+
+
+def seconds(timeout: object) -> float:
+    """Seconds to wait, which may be infinite.
+
+    Raises:
+        InputError: they are negative, or no number.
+    """
+    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
+        return timeout
+    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")
 
 
 class ViewerClosedError(WholebodyError):

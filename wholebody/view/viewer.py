@@ -33,7 +33,7 @@ from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
-from wholebody.view.sender import Sender
+from wholebody.view.sender import Sender, seconds
 from wholebody.view.server import ANIMATION, CAMERA, Command
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
@@ -280,27 +280,27 @@ class Viewer:
 
     def wait(self, timeout: float = 60.0) -> bool:
         """Wait up to `timeout` seconds (`math.inf` for ever) until a browser shows the page; return whether so."""
-        return self._live().wait(_seconds(timeout))
+        return self._live().wait(seconds(timeout))
 
     def wait_until_closed(self, timeout: float = math.inf) -> bool:
         """Wait up to `timeout` seconds until no browser shows the live page any more; return whether that is so."""
-        return self._live().wait_until_closed(_seconds(timeout))
+        return self._live().wait_until_closed(seconds(timeout))
 
     def sync(self, timeout: float = 10.0) -> bool:
         """Wait up to `timeout` seconds until every open tab has drawn everything; return whether it has."""
-        return self._live().sync(_seconds(timeout))
+        return self._live().sync(seconds(timeout))
 
     # ---- files
 
     def save(self, path: str | os.PathLike[str]) -> Path:
-        """Write the scene as one HTML file that opens in any browser without a network; as glTF to a path FILE.glb.
+        """Write the scene as one HTML file that opens in any browser without a network, FILE.glb as glTF.
 
-        HTML has the motion, glTF pieces and things at the posture, or at the motion's beginning. Returns the path.
-
-        Raises:
-            InputError: nothing is shown yet, or the file cannot be written.
+        HTML has the motion, glTF pieces and things at the posture, or at the motion's beginning. FILE.png is `picture`.
+        Returns the path; raises like `picture`.
         """
         place, commands = checks.path(path, "path"), self._commands()
+        if place.suffix.lower() == ".png":
+            return self.picture(place)
         gltf = place.suffix.lower() == ".glb"
         made = posture_glb(self._composition.scene, self._seen[0]) if gltf else static_page(commands, self.title)
         return write(place, made)
@@ -312,12 +312,14 @@ class Viewer:
         page = html.escape(static_page(self._commands(), self.title), quote=True)
         return f'<iframe srcdoc="{page}" style="width: 100%; height: 480px; border: 0"></iframe>'
 
-    def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720)) -> Path:
+    def picture(self, path: str | os.PathLike[str], size: tuple[int, int] = (960, 720), *, legend: bool = True) -> Path:
         """Write the scene as a PNG, drawn by a headless Chromium. A motion is shown at its beginning.
 
         Args:
             path: of the file.
             size: width and height, pixels.
+            legend: whether the page's panel stands in the corner where it hides least of the figure. It is left out
+                where it would be wider or higher than 45 % of the picture.
 
         Returns:
             The path.
@@ -326,9 +328,10 @@ class Viewer:
             InputError: nothing is shown yet, the size is out of range, or the file cannot be written.
             MissingPackageError: there is no Chromium.
         """
+        checks.flag(legend, "legend")
         place = check_writable(checks.path(path, "path"))
         wanted = [command for command in self._commands() if command.op != ANIMATION]
-        return write(place, self._screenshots.picture(wanted, size))
+        return write(place, self._screenshots.picture(wanted, size, legend=legend))
 
     def movie(
         self, path: str | os.PathLike[str], size: tuple[int, int] = (640, 480), fps: float | None = None, *,
@@ -391,10 +394,3 @@ class Viewer:
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
         return [self._camera_command() if command.op == CAMERA else command for command in self._graph.store.commands()]
-
-
-def _seconds(timeout: object) -> float:
-    """Seconds to wait, which may be infinite."""
-    if isinstance(timeout, float) and math.isinf(timeout) and timeout > 0.0:
-        return timeout
-    return checks.number(timeout, "timeout", 0.0, 1e9, "s, or math.inf")

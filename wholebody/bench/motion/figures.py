@@ -202,7 +202,7 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
                 viewer.look(middle + AWAY * away / np.linalg.norm(view), middle)
                 viewer.ghosts([before.q[frame]] if freed else [])
                 viewer.show(after.q[frame] if freed else before.q[frame])
-                with Image.open(viewer.picture(scratch / "one.png", TILE)) as picture:
+                with Image.open(viewer.picture(scratch / "one.png", TILE, legend=False)) as picture:
                     strip.paste(picture, (column * (width + GAP), row * (height + GAP)))
     made = io.BytesIO()
     strip.quantize(COLORS).save(made, format="PNG", optimize=True)

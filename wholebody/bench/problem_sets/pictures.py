@@ -64,7 +64,7 @@ def draw(name: str, path: Path) -> Path:
         viewer.show(posture, problem=case.problem)
         viewer.ghosts(ghosts)
         viewer.look(shot.eye, shot.target)
-        return viewer.picture(path, SIZE)
+        return viewer.picture(path, SIZE, legend=False)
 
 
 def main(folder: Path) -> None:
