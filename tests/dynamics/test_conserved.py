@@ -176,6 +176,36 @@ def test_what_is_between_two_that_close_costs_few_steps_and_bears_no_more_and_mo
     assert max(borne) < 4.0 * borne[0]
 
 
+def test_the_case_of_kane_and_levinson_gains_nothing(hand: wb.Figure) -> None:
+    """A rod strikes the floor with its tip, and the impact turns its sliding round: eq. 10 as it stands adds energy."""
+    share, mu, half, radius, mass = 1.0, 0.3, 0.5, 0.01, 1.0
+    scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
+    turned = pin.utils.rotate("y", 0.7)
+    tip = turned @ np.array([0.0, 0.0, -half]) - (0.0, 0.0, radius)
+    velocity = np.array([0.2, 0.0, -3.0])
+    body = wb.Body(mass=mass, material=wb.Material("stuff", others=(share, mu)), velocity=tuple(velocity))
+    place = pin.SE3(turned, np.array([AWAY, 0.0, -2.0 + 2.0 * SKIN]) - tip)
+    engine = RigidBodies(scene.add(wb.Capsule(radius, 2.0 * half), name="rod", at=place, body=body))
+    # about an axis across the rod: a cylinder, and a ball cut in half at its ends
+    cylinder, ball = 2.0 * half * radius**2, 4.0 / 3.0 * radius**3
+    across = cylinder * (radius**2 / 4.0 + half**2 / 3.0) + ball * (0.4 * radius**2 + half**2 + 0.75 * half * radius)
+    inertia = mass * across / (cylinder + ball)
+    rows = np.array([[1.0, 0.0], [0.0, 1.0]])  # velocities of the tip along z and x by an impulse there
+    lever = np.array([-tip[0], tip[2]])  # of the turning about y
+    answer = rows / mass + np.outer(lever, lever) / inertia
+    before = velocity[[2, 0]]
+    normal = -(1.0 + share) * before[0] / answer[0, 0]
+    sliding = before[1] + answer[1, 0] * normal
+    assert sliding * before[1] < 0.0  # turned round
+    plain = np.array([normal, -np.sign(before[1]) * min(mu * normal, abs(before[1]) / answer[1, 1])])
+    assert plain @ before + 0.5 * plain @ answer @ plain > 0.01  # J, gained by the plain equations
+    energy = engine.energy()
+    frames = [engine.advance(1 / 240) for _ in range(4)]
+    event = next(event for frame in frames for event in frame.events)
+    assert event.impulse[2] == pytest.approx(normal, rel=1e-3)
+    assert all(frame.energy <= energy + ROUNDING for frame in frames)
+
+
 def test_a_rod_on_its_tip_ends_though_its_friction_is_painleves(hand: wb.Figure) -> None:
     """A thin rod slides on its tip with mu above 4/3, where a rigid rod has no acceleration at all."""
     rough = wb.Material("rough", others=(0.0, 2.0))
