@@ -23,7 +23,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
-FREE, FIXED, DRIVEN = 0, 1, 2  # an island that touches nothing else, something fixed, something that is moved
+FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
 @compiled()
@@ -48,10 +48,55 @@ def _kinetic(mass: float, rotation: Array, inertia: Array, twist: Array, turning
 
 
 @compiled()
-def restrain(
+def _islands(
+    bodies: Indices,
+    impulse: Array,
+    contacts: int,
+    moving: Mask,
+    given: Mask,
+    pushed: Mask,
     root: Indices,
     kind: Indices,
-    chosen: Mask,
+) -> None:
+    """Write which bodies a contact pushes, the island of each, and what the islands touch; see `restrain`."""
+    for b in range(len(root)):
+        root[b], kind[b], pushed[b] = b, FREE, False
+    for c in range(len(bodies)):
+        if c < contacts and impulse[c, 0] <= 0.0:
+            continue
+        first, second = bodies[c, 0], bodies[c, 1]
+        if c < contacts:
+            pushed[first], pushed[second] = moving[first], moving[second]
+        if moving[first] and moving[second]:
+            while root[first] != first:
+                first = root[first]
+            while root[second] != second:
+                second = root[second]
+            root[max(first, second)] = min(first, second)
+    for b in range(len(root)):
+        top = b
+        while root[top] != top:
+            top = root[top]
+        root[b] = top
+    for c in range(len(bodies)):
+        if c < contacts and impulse[c, 0] <= 0.0:
+            continue
+        for side in range(2):
+            own, other = bodies[c, side], bodies[c, 1 - side]
+            if moving[own] and not moving[other]:
+                kind[root[own]] = max(kind[root[own]], DRIVEN if given[other] else FIXED)
+
+
+@compiled()
+def restrain(
+    bodies: Indices,
+    impulse: Array,
+    rate: Array,
+    target: Array,
+    unsolved: float,
+    moving: Mask,
+    given: Mask,
+    jointed: Mask,
     mass: Array,
     inertia: Array,
     position: Array,
@@ -59,13 +104,21 @@ def restrain(
     before: Array,
     twist: Array,
     fall: Array,
+    jammed: Mask,
 ) -> None:
     """Scale velocities down where an island gained energy.
 
+    Islands with joints keep the energy that RATTLE gives them, and those that something moved pushes are left alone.
+
     Args:
-        root: (n,) the island of each body.
-        kind: (n,) `FREE`, `FIXED` or `DRIVEN` for each island.
-        chosen: (n,) bodies on which a contact acts, of islands that nothing drives.
+        bodies: (m, 2) of all points, those of joints at the end.
+        impulse: (m, 3) of the program.
+        rate: (m, 3) of the points after it, m/s.
+        target: (k,) least rates along the normals of the contact points, m/s.
+        unsolved: how much a rate may be off, m/s.
+        moving: (n,) bodies that move by themselves and do not sleep.
+        given: (n,) bodies that are moved.
+        jointed: (n,) bodies with joints.
         mass: (n,).
         inertia: (n, 3, 3) in the bodies.
         position: (n, 3) centres of mass.
@@ -73,11 +126,26 @@ def restrain(
         before: (n, 6) velocities before the step.
         twist: (n, 6) after its program; changed in place.
         fall: (3,) gravity times the time of the step, m/s.
+        jammed: (k,) room: points that bear something of islands that something moved pushes, where a rate is off.
     """
-    count = len(root)
+    count, contacts = len(moving), len(target)
+    root, kind = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
+    chosen, off = np.empty(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    _islands(bodies, impulse, contacts, moving, given, chosen, root, kind)
+    for c in range(contacts):
+        jammed[c] = False
+        if impulse[c, 0] > 0.0 and abs(rate[c, 0] - target[c]) > unsolved:
+            off[root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]] = True
+    for c in range(contacts):
+        if impulse[c, 0] > 0.0:
+            island = root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]
+            jammed[c] = off[island] and kind[island] == DRIVEN
+    for b in range(count):
+        if jointed[b]:
+            kind[root[b]] = DRIVEN
     gain, turning = np.zeros(count), np.empty(3)
     for b in range(count):
-        if chosen[b]:
+        if chosen[b] and kind[root[b]] != DRIVEN:
             lifted = 0.0
             for k in range(3):
                 lifted -= mass[b] * fall[k] * twist[b, k]
@@ -86,8 +154,7 @@ def restrain(
     for island in range(count):
         if gain[island] > 0.0:
             _scale(
-                island, kind[island] == FREE, gain[island], root, chosen, mass, inertia, position,
-                rotation, twist, fall,
+                island, kind[island] == FREE, gain[island], root, chosen, mass, inertia, position, rotation, twist, fall
             )  # fmt: skip
 
 

@@ -22,6 +22,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.checks import TIME_STEP
 from wholebody.dynamics import (
     contact_kernel,
+    energy_kernel,
     impact_kernel,
     joint_kernel,
     motion_kernel,
@@ -402,6 +403,9 @@ def compiled_kernel() -> Any:
     solve_kernel.solve(none, pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
     solve_kernel.solve_islands(pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
     solve_kernel.residuals(pairs, laid[1], laid[3], some, some, hold, twist, vectors)
+    energy_kernel.restrain(
+        pairs, vectors, vectors, some, 1.0, mask, mask, mask, mass, unit, one, unit, twist, twist, np.zeros(3), mask[:0]
+    )
     contact_kernel.rates(pairs, laid[1], twist, vectors)
     contact_kernel.apply(pairs, laid[2], twist, vectors)
     contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
-from wholebody.dynamics import contact_kernel, energy_kernel, impact_kernel, passing_kernel, solve_kernel
+from wholebody.dynamics import contact_kernel, energy_kernel, impact_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.joints import JointRows, Joints
@@ -204,32 +204,12 @@ class StepProgram:
 
     def _restrain(self, began: Array, time: float, target: Array) -> None:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
-        state, bodies, moving = self.state, self._laid.bodies, self.state.moving
-        bearing = np.flatnonzero(self._bearing())
-        self._jammed[:] = False
-        if not len(bearing):
-            return
-        touching = bodies[np.concatenate([bearing, np.arange(len(self.points.gap), len(bodies))])]
-        root = np.arange(len(moving))
-        passing_kernel.join(touching[:, 0].copy(), touching[:, 1].copy(), moving.astype(np.intp), root)
-        kind = np.full(len(root), energy_kernel.FREE, dtype=np.intp)
-        for one, other in ((0, 1), (1, 0)):
-            at_rest = moving[touching[:, one]] & ~moving[touching[:, other]]
-            held, by = touching[at_rest, one], touching[at_rest, other]
-            np.maximum.at(kind, root[held], np.where(state.given[by], energy_kernel.DRIVEN, energy_kernel.FIXED))
-        # islands with joints keep the energy that RATTLE gives them
-        left_alone = kind == energy_kernel.DRIVEN
-        left_alone[root[self.joints.jointed]] = True
+        state = self.state
         energy_kernel.restrain(
-            root, kind, self.pushed() & moving & ~left_alone[root], state.pieces.mass, state.pieces.inertia,
-            state.position, state.rotation, began, state.twist, time * self.gravity,
+            self._laid.bodies, self.impulse, self._rates(state.twist), target, UNSOLVED, state.moving, state.given,
+            self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation, began,
+            state.twist, time * self.gravity, self._jammed,
         )  # fmt: skip
-        if (kind == energy_kernel.DRIVEN).any():
-            open_by = self._rates(state.twist)[bearing, 0] - target[bearing]
-            of = np.where(moving[bodies[bearing, 0]], bodies[bearing, 0], bodies[bearing, 1])
-            unsolved = np.zeros(len(root), dtype=bool)
-            unsolved[root[of[np.abs(open_by) > UNSOLVED]]] = True
-            self._jammed[bearing] = (unsolved & (kind == energy_kernel.DRIVEN))[root[of]]
 
     def work(self) -> float:
         """Work that bodies whose motion is given did by the impulses of the program, joules."""
