@@ -7,7 +7,15 @@ import pinocchio as pin
 import pytest
 
 from tests.reference import contact_program as clear
-from wholebody.dynamics import contact_kernel, impact_kernel, joint_kernel, motion_kernel, passing_kernel, solve_kernel
+from wholebody.dynamics import (
+    contact_kernel,
+    energy_kernel,
+    impact_kernel,
+    joint_kernel,
+    motion_kernel,
+    passing_kernel,
+    solve_kernel,
+)
 
 
 class Heap:
@@ -220,3 +228,49 @@ def test_the_height_of_a_piece_is_that_of_its_points(seed: int) -> None:
         )
         heights = sign * (points @ turned.T + at) @ direction
         assert found == pytest.approx(heights.max() + 0.05, abs=1e-12)
+
+
+@pytest.mark.parametrize("fixed", [False, True])
+def test_what_an_island_gained_is_taken_and_its_momentum_stays(fixed: bool) -> None:
+    """Two bodies that touch, alone or on something fixed, and a third that nothing touches."""
+    rng = np.random.default_rng(5)
+    mass, spread = rng.uniform(0.5, 2.0, 4), rng.normal(size=(4, 3, 3))
+    inertia = 0.1 * (spread @ spread.transpose(0, 2, 1)) + 0.05 * np.eye(3)
+    rotation, position = np.stack([pin.exp3(turn) for turn in rng.normal(size=(4, 3))]), rng.normal(size=(4, 3))
+    before, fall = rng.normal(size=(4, 6)), np.array([0.0, 0.0, -0.04]) if fixed else np.zeros(3)
+    twist = 1.1 * before
+    if not fixed:  # the program changes velocities by impulses of one body on the other
+        twist = before.copy()
+        push, at = 3.0 * rng.normal(size=3), rng.normal(size=3)
+        for body, sign in ((0, 1.0), (1, -1.0)):
+            turned = rotation[body] @ np.linalg.inv(inertia[body]) @ rotation[body].T
+            twist[body, :3] += sign * push / mass[body]
+            twist[body, 3:] += sign * turned @ np.cross(at - position[body], push)
+
+    def energy(of: np.ndarray, lifted: float) -> float:
+        world = rotation @ inertia @ rotation.transpose(0, 2, 1)
+        kinetic = 0.5 * (mass * (of[:, :3] ** 2).sum(axis=1) + np.einsum("bi,bij,bj->b", of[:, 3:], world, of[:, 3:]))
+        return float((kinetic - lifted * mass * (of[:, :3] @ fall))[:2].sum())
+
+    def momentum(of: np.ndarray) -> np.ndarray:
+        world = rotation @ inertia @ rotation.transpose(0, 2, 1)
+        linear = mass[:, None] * of[:, :3]
+        about = np.cross(position, linear) + np.einsum("bij,bj->bi", world, of[:, 3:])
+        return np.concatenate([linear[:2].sum(axis=0), about[:2].sum(axis=0)])
+
+    pairs = np.array([(0, 1), (3, 0)] if fixed else [(0, 1)])
+    moving, none = np.array([True, True, True, False]), np.zeros(4, dtype=bool)
+    began, kept = energy(before, 0.0), twist.copy()
+    assert energy(twist, 1.0) > began + 1e-3
+    bears, jammed = np.tile([1.0, 0.0, 0.0], (len(pairs), 1)), np.zeros(len(pairs), dtype=bool)
+    energy_kernel.restrain(
+        pairs, bears, np.zeros_like(bears), np.zeros(len(pairs)), 1.0, moving, none, none, mass, inertia, position,
+        rotation, before, twist, fall, jammed,
+    )  # fmt: skip
+    assert energy(twist, 1.0) == pytest.approx(began, abs=1e-12)
+    assert (twist[2:] == kept[2:]).all()
+    if fixed:
+        share = twist[0, 0] / kept[0, 0]
+        assert twist[:2] == pytest.approx(share * kept[:2], abs=1e-12)
+    else:
+        assert momentum(twist) == pytest.approx(momentum(before), abs=1e-12)

@@ -43,6 +43,21 @@ def test_one_domino_fells_all() -> None:
     assert max(frame.deepest for frame in frames) <= 1e-4
 
 
+@pytest.mark.parametrize("name", list(WORLD_SCENES))
+def test_energy_grows_by_no_more_than_the_figure_gives(name: str) -> None:
+    scene = build_world_scene(name)
+    world = World(scene.scene, scene.track.q[0], dt=scene.track.dt)
+    assert world.engine is not None
+    energy, worked = world.engine.energy(), 0.0
+    for q in scene.track.q:
+        made = world.step(q).engine
+        assert made is not None
+        # what a joint holds while the figure pushes it keeps what the program's tolerance adds
+        assert made.energy <= energy + made.work + {"door": 1e-6, "bag": 1e-2}.get(name, 1e-10)
+        energy, worked = made.energy, worked + made.work
+    assert worked > 0.0 or name == "stairs"
+
+
 def test_scenes_are_named_and_unknown_ones_are_not_built() -> None:
     assert {"flick", "dominoes", "stairs"} <= set(WORLD_SCENES)
     with pytest.raises(UnknownNameError, match="flick"):

@@ -89,11 +89,18 @@ class BodiesState:
     def energy(self, gravity: Array) -> float:
         """Kinetic and potential energy of the bodies that move by themselves, joules."""
         free = self.pieces.dynamic
-        mass = self.pieces.mass[free]
-        local = np.einsum("bij,bi->bj", self.rotation[free], self.spin[free])
-        turning = np.einsum("bi,bij,bj->b", local, self.pieces.inertia[free], local)
-        moving = mass * (self.velocity[free] ** 2).sum(axis=1)
-        return float(0.5 * (moving + turning).sum() - (mass * (self.position[free] @ gravity)).sum())
+        return self._kinetic(free) - float((self.pieces.mass[free] * (self.position[free] @ gravity)).sum())
+
+    def slow(self, bodies: Mask, energy: float) -> None:
+        """Take an energy [J] from the velocities of bodies (n,), or all that they have."""
+        kinetic = self._kinetic(bodies)
+        self.twist[bodies] *= np.sqrt(1.0 - energy / kinetic) if energy < kinetic else 0.0
+
+    def _kinetic(self, bodies: Mask) -> float:
+        mass = self.pieces.mass[bodies]
+        local = np.einsum("bij,bi->bj", self.rotation[bodies], self.spin[bodies])
+        turning = np.einsum("bi,bij,bj->b", local, self.pieces.inertia[bodies], local)
+        return 0.5 * float((mass * (self.velocity[bodies] ** 2).sum(axis=1) + turning).sum())
 
     def momentum(self) -> Array:
         """Momentum [kg m/s] and angular momentum about the world's origin [kg m2/s], (6,), of the same bodies."""

@@ -46,6 +46,8 @@ class EngineFrame(NamedTuple):
         contacts: contact points that bore a force in the last step.
         deepest: greatest depth of pieces in each other after any step, metres; 0 if none were.
         energy: kinetic and potential energy of the bodies that move by themselves, joules.
+        work: energy that they were given, joules: by what is moved, during the frame, and by pushes since the one
+            before. The energy grows by no more.
         signorini: largest residual of the programs, m/s; see `contact_kernel.residuals`.
         coulomb: likewise.
         steps: how many steps were made, those made again included.
@@ -57,6 +59,7 @@ class EngineFrame(NamedTuple):
     contacts: int
     deepest: float
     energy: float
+    work: float
     signorini: float
     coulomb: float
     steps: int
@@ -71,6 +74,7 @@ class FrameRecord:
         stops: early ends of steps that are left.
         time: since the start of the frame, seconds.
         impulse: (n, 3) of each body.
+        given_up: steps that were halved as often as they may be, and still led too deep.
     """
 
     stops: int
@@ -79,16 +83,18 @@ class FrameRecord:
     events: list[Event] = field(default_factory=list)
     contacts: int = 0
     deepest: float = 0.0
+    work: float = 0.0
     signorini: float = 0.0
     coulomb: float = 0.0
     steps: int = 0
+    given_up: int = 0
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
         """The frame, with the names of the bodies."""
         pushed = np.flatnonzero(self.impulse.any(axis=1)).tolist()
         return EngineFrame(
             tuple(self.events), {names[k]: self.impulse[k] for k in pushed}, self.contacts, self.deepest, energy,
-            self.signorini, self.coulomb, self.steps, sleeping,
+            self.work, self.signorini, self.coulomb, self.steps, sleeping,
         )  # fmt: skip
 
 

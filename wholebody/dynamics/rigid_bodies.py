@@ -22,6 +22,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.checks import TIME_STEP
 from wholebody.dynamics import (
     contact_kernel,
+    energy_kernel,
     impact_kernel,
     joint_kernel,
     motion_kernel,
@@ -49,6 +50,7 @@ INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again
 SHALLOW = 2e-5  # m: the same for the first try of a step; smaller = more steps made again, fewer pieces to part
 LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 HALVINGS = 6  # of a step, at most
+GIVEN_UP = 3  # steps of a frame that are too deep even so; then nothing helps, as where bodies are pushed together
 FORESEEN = 2  # times that a step is made again with the points where it led too deep, before it is halved
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
 STOPS = 8  # early ends of steps in a frame, at most ...
@@ -86,6 +88,7 @@ class RigidBodies:
         compiled_kernel()
         self._pieces, self.state = pieces, BodiesState(scene, pieces)
         self.names, self.notes, self.time = pieces.names, pieces.notes, 0.0
+        self._pushed = 0.0  # J: by pushes since the last frame
         self._joints = Joints(scene, pieces)
         self._finder, self._old = ContactFinder(pieces), Impulses.nothing(len(self._joints))
         self._sleepers = Sleepers(self.state, self._joints.together())
@@ -162,12 +165,13 @@ class RigidBodies:
         impulse = _bounded(impulse, STRONGEST, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        lever = point - self.state.position[number]
+        lever, before = point - self.state.position[number], self.energy()
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
         self.state.moving |= self._joints.linked(number)
         if self._joints.jointed[number]:
             self._joints.keep(self.state, self.state.twist, self.state.moving)
+        self._pushed += self.energy() - before
 
     def _inverse_inertia(self, number: int) -> Array:
         rotation = self.state.rotation[number]
@@ -203,7 +207,8 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
-        record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)))
+        record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
+        self._pushed = 0.0
         self._look(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
@@ -243,7 +248,10 @@ class RigidBodies:
             impulse = program.world_impulse()
             record.steps += 1
             least = self._look(SUBSTEP)
+            if record.given_up >= GIVEN_UP:
+                break
             if halvings == HALVINGS:
+                record.given_up += 1
                 break
             shares: tuple[float, ...] = (1.0,)
             if least >= -(INSIDE if foreseen else SHALLOW):
@@ -264,6 +272,7 @@ class RigidBodies:
         record.stops -= stopped
         record.time += time
         self._old = program.remembered(time)
+        record.work += program.work()
         self._joints.keep(state, state.twist, state.moving)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
@@ -317,6 +326,12 @@ class RigidBodies:
             first, second = points.bodies[number]
             record.impulse[second] += row[2:]
             record.impulse[first] -= row[2:]
+            for body, sign in ((first, 1.0), (second, -1.0)):
+                if self.state.given[body]:
+                    lever = points.point[number] - self.state.position[body]
+                    record.work += sign * float(
+                        row[2:] @ (self.state.velocity[body] + np.cross(self.state.spin[body], lever))
+                    )
             place = points.point[number], points.normal[number]
             names = self.names[first], self.names[second]
             record.events.append(Event(record.time, *names, *place, float(row[1]), row[2:]))
@@ -344,14 +359,21 @@ class RigidBodies:
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _part(self, least: float) -> float:
-        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then."""
+        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
+
+        Bodies that are lifted pay for it with their kinetic energy.
+        """
         state = self.state
+        before, position = self.energy(), state.position.copy()
         for _ in range(PARTINGS):
             program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
             motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
             least = self._look(SUBSTEP)
             if least >= LEAST_GAP:
                 break
+        gain = self.energy() - before
+        if gain > 0.0:
+            state.slow(state.moving & (state.position != position).any(axis=1), gain)
         return least
 
 
@@ -381,6 +403,9 @@ def compiled_kernel() -> Any:
     solve_kernel.solve(none, pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
     solve_kernel.solve_islands(pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
     solve_kernel.residuals(pairs, laid[1], laid[3], some, some, hold, twist, vectors)
+    energy_kernel.restrain(
+        pairs, vectors, vectors, some, 1.0, mask, mask, mask, mass, unit, one, unit, twist, twist, np.zeros(3), mask[:0]
+    )
     contact_kernel.rates(pairs, laid[1], twist, vectors)
     contact_kernel.apply(pairs, laid[2], twist, vectors)
     contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)

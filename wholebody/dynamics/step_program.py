@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
-from wholebody.dynamics import contact_kernel, impact_kernel, solve_kernel
+from wholebody.dynamics import contact_kernel, energy_kernel, impact_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.joints import JointRows, Joints
@@ -17,6 +17,7 @@ SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its 
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
 TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
+UNSOLVED = 5e-4  # m/s: of points that push against what is moved; their impulses are not started from again
 MOST, VISITS = 1000, 20_000  # sweeps of it, and points times sweeps: more is exacter and slower
 SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 MOST_EVENTS = 1000  # at one stop
@@ -83,6 +84,7 @@ class StepProgram:
         self._laid = self._lay(state.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
+        self._jammed = np.zeros(len(points.gap), dtype=bool)
         self._local = state.local(points.bodies[:, 0], points.point)
         self.look(state.moving)
 
@@ -132,6 +134,7 @@ class StepProgram:
         self._local = np.concatenate([self._local, late._local])
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
+        self._jammed = np.zeros(count + len(gap), dtype=bool)
         self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
         self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
@@ -168,7 +171,7 @@ class StepProgram:
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
-        """Change the velocities to those at the end of a step of this time.
+        """Change the velocities to those at the end of a step of this time, which adds no energy.
 
         Args:
             time: seconds.
@@ -177,6 +180,7 @@ class StepProgram:
             hold: (j, 3) velocity of the joint points of B seen from those of A, m/s.
         """
         state, points = self.state, self.points
+        began = state.twist.copy()
         state.velocity[state.moving] += time * self.gravity
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / np.minimum(time, self._until), 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
@@ -190,11 +194,30 @@ class StepProgram:
                 rates = self._rates(0.5 * (before + state.twist))
                 rates[len(target) :] -= 0.5 * hold  # what closes joints is no work
                 if float((rates * self.impulse).sum()) <= 0.0:
+                    self._restrain(began, time, target)
                     return
                 state.twist[:] = before
         else:  # bodies that nothing bears move with the mean of both velocities
             target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - RELAXED, target)
         self._solve(target, start, hold)
+        self._restrain(began, time, target)
+
+    def _restrain(self, began: Array, time: float, target: Array) -> None:
+        """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
+        state = self.state
+        energy_kernel.restrain(
+            self._laid.bodies, self.impulse, self._rates(state.twist), target, UNSOLVED, state.moving, state.given,
+            self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation, began,
+            state.twist, time * self.gravity, self._jammed,
+        )  # fmt: skip
+
+    def work(self) -> float:
+        """Work that bodies whose motion is given did by the impulses of the program, joules."""
+        given = self.state.given
+        if not given.any():
+            return 0.0
+        moved = np.where(given[:, None], self.state.twist, 0.0)
+        return -float((self._rates(moved) * self.impulse).sum())
 
     def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
         state, points, laid, count = self.state, self.points, self._laid, len(self.points.gap)
@@ -226,8 +249,11 @@ class StepProgram:
         return found
 
     def remembered(self, time: float) -> Impulses:
-        """What the next program starts from."""
-        kept, count = np.flatnonzero(self._bearing()), len(self.points.gap)
+        """What the next program starts from.
+
+        Bodies between two that are pushed together have no solution: started from the last one, it would grow for ever.
+        """
+        kept, count = np.flatnonzero(self._bearing() & ~self._jammed), len(self.points.gap)
         return Impulses(
             self.points.pair[kept], self._local[kept], self.world_impulse()[kept], self.impulse[count:].copy(), time
         )

@@ -27,7 +27,9 @@ WAYS = (
     (-1, -1, 0),
 )
 PROGRAMS = 16  # from one start, at most
-WORTH = 0.5  # share of the depth that a program must leave at most for one more to follow
+WORTH = (
+    0.8  # share of the depth that a program must leave at most for one more to follow; larger is slower and finds more
+)
 
 
 def free_end(
