@@ -35,14 +35,14 @@ from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
-DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
+DAMPING = 2.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
 CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
 LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
-BENT = 2e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
-STRAIGHT = 1e-6  # m, rad: by which what is held may be curved other than as foreseen without another program
+BENT = 5e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
+STRAIGHT = 1.5e-6  # m, rad: by which what is held may be curved other than as foreseen without another program
 AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
