@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.figures.state import State
 from wholebody.linearisation import Passing
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
@@ -34,14 +35,14 @@ from wholebody.problem import Problem
 from wholebody.workspace import Workspace
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
-DAMPING = 1.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
+DAMPING = 2.0  # of the pull of goals out of reach: larger = slower to close in, smaller = limbs rattle at obstacles
 SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
 CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
 LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
-BENT = 2e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
-STRAIGHT = 5e-7  # m, rad: by which what is held may be curved other than as foreseen without another program
+BENT = 5e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
+STRAIGHT = 1.5e-6  # m, rad: by which what is held may be curved other than as foreseen without another program
 AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
@@ -94,6 +95,7 @@ class StepProgram:
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
         self._settled, self._curving, self._bend = False, False, 0.0
         self._constraints, self._held = problem.constraints, np.flatnonzero(self._subproblem.kind == 0)
+        self._there = State(state.model)
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
         self._joints = np.concatenate(
@@ -214,10 +216,9 @@ class StepProgram:
         Returns:
             Whether that is another curve than the last program ran ahead of.
         """
-        state, before, first = self._workspace.state, self._before, len(at.q)
+        state, before, first = self._there, self._before, len(at.q)
         state.update(pin.integrate(state.model, at.q, displacement))
         values = np.concatenate([np.atleast_1d(constraint.value(state)) for constraint in self._constraints])
-        state.update(at.q)
         error, held = self._soft_values[0], slice(first + self.goals, -2)
         there = (values - self._subproblem.bound[0])[self._held]
         curved = there - error[self.goals :] - self._soft_rows[self.goals :] @ displacement

@@ -104,7 +104,7 @@ class SplitFormSolver(NativeSolver):
         if self._workspace is None:
             self._form = empty_form(n, m, slots)
         found = self.answer(scaled_split(program, self._form), n, m)
-        return None if found is None else Native(found.x[:n] / SCALE, found.box, found.push, found.iterations)
+        return None if found is None else with_values(found, x=found.x[:n] / SCALE)
 
     @abstractmethod
     def answer(self, form: SplitForm, n: int, m: int) -> Native | None:
