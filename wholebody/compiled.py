@@ -14,7 +14,7 @@ from importlib import import_module
 from typing import Any, TypeVar
 
 LOOPS = (
-    "wholebody.dynamics.rigid_bodies",
+    "wholebody.dynamics.loops",
     "wholebody.geometry.contact_rows",
     "wholebody.geometry.continuous.moved_pairs",
     "wholebody.geometry.continuous.swept_depth",

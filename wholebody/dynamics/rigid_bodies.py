@@ -11,8 +11,6 @@ its program.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -20,19 +18,12 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.arrays import Array, Mask
 from wholebody.checks import TIME_STEP
-from wholebody.dynamics import (
-    contact_kernel,
-    energy_kernel,
-    impact_kernel,
-    joint_kernel,
-    motion_kernel,
-    passing_kernel,
-    solve_kernel,
-)
+from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_ways
 from wholebody.dynamics.joints import CLOSED, Joints
+from wholebody.dynamics.loops import compiled_kernel
 from wholebody.dynamics.passing import Before, way_of
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
@@ -383,36 +374,3 @@ def _bounded(value: object, most: float, what: str) -> Array:
     if np.abs(numbers).max() > most:
         raise InputError(f"{what} is {checks.shown(value)}; give at most {most:g}")
     return numbers
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back with three others: not in the middle of a frame."""
-    one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
-    unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
-    some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)
-    motion_kernel.drift(one, unit.copy(), twist, unit, unit, mask, mask, mask, np.zeros(3), 1.0)
-    motion_kernel.displace(one, unit.copy(), twist, mask)
-    motion_kernel.world_inverses(unit, unit, mask, unit.copy())
-    motion_kernel.place_pieces(one, unit, one, np.zeros(1, dtype=np.intp), turned, turned.copy())
-    laid = np.zeros((0, 3, 3)), np.zeros((0, 3, 2, 6)), np.zeros((0, 3, 2, 6)), np.zeros((0, 2))
-    held, hold, levers = np.zeros((0, 3, 3)), vectors, np.zeros((0, 2, 3))
-    contact_kernel.lay(pairs, vectors, vectors, one, mass, unit, *laid)
-    joint_kernel.place(pairs, levers, mask[:0], one, unit, levers, vectors)
-    joint_kernel.lay(pairs, mask[:0], levers, mass, unit, *laid[1:], held)
-    solve_kernel.solve(none, pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
-    solve_kernel.solve_islands(pairs, *laid[1:], some, some, held, hold, twist, vectors, 1.0, 1, 1)
-    solve_kernel.residuals(pairs, laid[1], laid[3], some, some, hold, twist, vectors)
-    energy_kernel.restrain(
-        pairs, vectors, vectors, some, 1.0, mask, mask, mask, mass, unit, one, unit, twist, twist, np.zeros(3), mask[:0]
-    )
-    contact_kernel.rates(pairs, laid[1], twist, vectors)
-    contact_kernel.apply(pairs, laid[2], twist, vectors)
-    contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
-    impact_kernel.resolve(none, none, pairs, *laid, some, some, held, mask, twist, 1.0, 1, vectors, np.zeros((1, 5)))
-    passing_kernel.doubtful(
-        pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
-        none, none, some, vectors, np.zeros((0, 4)), mask[:0],
-    )  # fmt: skip
-    passing_kernel.join(none, none, none, none)
-    return motion_kernel
