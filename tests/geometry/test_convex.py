@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-import time
+from itertools import count
 from pathlib import Path
 
 import numpy as np
@@ -62,7 +62,7 @@ def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh
             60.0,
             "CoACD cannot cut it into convex pieces; mend the mesh",
         ),
-        (lambda *_: time.sleep(60.0), 2.0, "CoACD found no convex pieces in 2 s; mend the mesh"),
+        (lambda *_: all(True for _ in count()), 2.0, "CoACD found no convex pieces in 2 s of the processor; mend"),
     ],
     ids=["crashes", "hangs"],
 )
