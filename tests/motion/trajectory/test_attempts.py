@@ -30,8 +30,8 @@ def test_each_needle_passed_in_a_gap_is_told_where_the_arm_meets_it(planar_arm: 
     assert sorted(found[0]) == pytest.approx([0.27, 0.71], abs=3e-3)
 
 
-def test_needles_met_at_the_same_share_are_told_once(planar_arm: Callable[..., Figure]) -> None:
-    assert among_needles(planar_arm, [(0.6, 0.9), (0.6, 0.7)])[0] == pytest.approx([0.6], abs=3e-3)
+def test_needles_met_at_nearly_the_same_share_are_told_once(planar_arm: Callable[..., Figure]) -> None:
+    assert among_needles(planar_arm, [(0.6, 0.9), (0.604, 0.7)])[0] == pytest.approx([0.602], abs=5e-3)
 
 
 def test_attempts_that_end_early_are_begun_again(
