@@ -225,6 +225,7 @@ class ClipRun:
             if number:  # what is free already is to stay where it is, or it dips elsewhere
                 largest = max(SHORTER * min(largest, NEARLY), SHORTEST)
                 radius = largest
+                hasty = False  # it is nearly free: what is missed now is seldom on the wrong side
             self._programs += found.programs
             if found.cancelled:
                 return None
