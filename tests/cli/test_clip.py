@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody import view
 from wholebody.cli import main
 
 
@@ -56,9 +58,39 @@ def test_play_writes_a_page(walk: Path, tmp_path: Path) -> None:
     assert page.stat().st_size > 100_000
 
 
+def test_play_shows_what_the_body_wears_on_a_floor_below_it(
+    walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The floor is where the soles are, however high the recording is."""
+    shown: list[wb.Scene] = []
+
+    class Seen(view.Viewer):
+        def __init__(self, scene: wb.Scene, **given: Any) -> None:
+            shown.append(scene)
+            super().__init__(scene, **given)
+
+    monkeypatch.setattr(view, "Viewer", Seen)
+    clip = wb.read_clip(walk, wb.load("human"))
+    q = clip.q.copy()
+    q[:, 2] -= 0.25
+    clip.with_q(q).write(tmp_path / "low.npz")
+    for file in (walk, tmp_path / "low.npz"):
+        given = ["clip", "play", str(file), "--equipment", "pack+torus", "--out", str(tmp_path / "bend.html")]
+        assert main(given) == 0
+    assert sorted(shown[0].objects) == ["floor", "pack", "torus"]
+    for scene, posture in zip(shown, (clip.q[0], q[0]), strict=True):
+        near = scene.contacts(posture, 0.01)
+        floor = [
+            gap for gap, pair in zip(near.distance, near.pair, strict=True)
+            if "floor" in (scene.piece_owner[piece] for piece in pair)
+        ]  # fmt: skip
+        assert min(floor) == pytest.approx(0.0, abs=1e-6)
+
+
 @pytest.mark.parametrize(
     ("arguments", "sentence"),
     [
+        (["play", "bend.npz", "--equipment", "pakc", "--out", "out.html"], "pakc"),
         (["info", "none.npz"], "there is no such file"),
         (["convert", "bend.npz", "out.xyz"], "cannot be written as .xyz"),
         (["convert", "bend.npz", "none/out.bvh"], "there is no such folder"),

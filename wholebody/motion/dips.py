@@ -18,14 +18,16 @@ NEAR = 2e-4  # m: what is nearer than this between frames gets rows as soon as s
 FAR = 0.1  # m: in place of a distance that coal does not find
 BEHIND = 2e-3  # share of a gap behind the first contact of a sweep at which it is looked at
 HALVINGS = 8  # of the search for the deepest place: to a fiftieth of what is between two places
+PAIRS = 6  # of a gap whose deepest places are told; more = fewer rounds where a thing of many pieces is passed
+SAME = 0.01  # share of a gap: places nearer to each other are one
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 FEW = tuple(float(k) / 6.0 for k in range(1, 6))
 MANY = tuple(float(k) / 64.0 for k in range(1, 64))
 """Shares of a gap at which it is looked at."""
 
 
-def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, int]:
-    """Gaps that dip, and the number of the pair that is deepest in each.
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[int]]:
+    """Gaps that dip, and the numbers of the pairs that do so in each, the deepest first.
 
     Args:
         workspace: of this run alone.
@@ -33,14 +35,15 @@ def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, in
         gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
     """
     swept = SweptDepth(workspace.table, workspace.geometry, DIP)
-    found, last = {}, -1
+    found, last = dict[int, list[int]](), -1
     for gap in sorted(gaps):
         if gap != last:
             swept.start(q[gap])
         last = gap + 1
         passing = swept.advance(q[last])[1]
         if passing.depth.max(initial=0.0) > DIP:
-            found[gap] = int(passing.number[np.argmax(passing.depth)])
+            deepest_first = np.argsort(-passing.depth, kind="stable")
+            found[gap] = [int(passing.number[place]) for place in deepest_first if passing.depth[place] > DIP]
     return found
 
 
@@ -51,10 +54,13 @@ def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     return float(swept.advance(after)[1].depth.max(initial=0.0))
 
 
-def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
-    """Gaps that dip, and the share of each at which it is deepest; see `dipping`."""
+def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
+    """Gaps that dip, and the shares of each at which its pairs are deepest; see `dipping`.
+
+    Pairs that are deepest at nearly the same share are told once: a share has rows of all that is near there.
+    """
     found = dipping(workspace, q, gaps)
-    return {gap: _deepest(workspace, q[gap], q[gap + 1], number) for gap, number in found.items()}
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:PAIRS]) for gap, numbers in found.items()}
 
 
 def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
@@ -73,15 +79,22 @@ def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tu
     return near if dipping else []
 
 
-def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> float:
-    """Share of the way between two postures (nq,) at which a pair is nearest: a corner dips in a hundredth of a gap."""
-    model, data, geometry = workspace.model, workspace.model.createData(), workspace.geometry
-    pieces = [geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[number]]
-    request, result = coal.DistanceRequest(), coal.DistanceResult()
+def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
+    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers.
 
-    def distance(share: float) -> float:
-        pin.forwardKinematics(model, data, pin.interpolate(model, before, after, share))
-        at = [data.oMi[piece.parentJoint] * piece.placement for piece in pieces]
+    A corner dips in a hundredth of a gap, so many places are looked at, and between the nearest ones by golden section.
+    """
+    model, data = workspace.model, workspace.model.createData()
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    pairs = [[workspace.geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[k]] for k in numbers]
+    joints = {piece.parentJoint for pieces in pairs for piece in pieces}
+    posed: dict[float, dict[int, pin.SE3]] = {}
+
+    def distance(pieces: list[pin.GeometryObject], share: float) -> float:
+        if share not in posed:
+            pin.forwardKinematics(model, data, pin.interpolate(model, before, after, share))
+            posed[share] = {joint: data.oMi[joint].copy() for joint in joints}
+        at = [posed[share][piece.parentJoint] * piece.placement for piece in pieces]
         places = [coal.Transform3s(one.rotation, one.translation) for one in at]
         result.clear()
         found = coal.distance(pieces[0].geometry, places[0], pieces[1].geometry, places[1], request, result)
@@ -90,12 +103,17 @@ def _deepest(workspace: Workspace, before: Array, after: Array, number: int) -> 
     contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
     begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + BEHIND)
     shares = sorted({0.0, *MANY, *begun, 1.0})
-    place = 1 + int(np.argmin([distance(share) for share in shares[1:-1]]))
-    low, high = shares[place - 1], shares[place + 1]
-    for _ in range(HALVINGS):
-        first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
-        low, high = (low, second) if distance(first) < distance(second) else (first, high)
-    return float(0.5 * (low + high))
+    told: list[float] = []
+    for pieces in pairs:
+        place = 1 + int(np.argmin([distance(pieces, share) for share in shares[1:-1]]))
+        low, high = shares[place - 1], shares[place + 1]
+        for _ in range(HALVINGS):
+            first, second = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+            low, high = (low, second) if distance(pieces, first) < distance(pieces, second) else (first, high)
+        deepest = float(0.5 * (low + high))
+        if all(abs(deepest - other) > SAME for other in told):
+            told.append(deepest)
+    return told
 
 
 def _depths(

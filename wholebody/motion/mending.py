@@ -47,11 +47,11 @@ class _Left(NamedTuple):
 
     Attributes:
         wrong: number of frames with something wrong, and of gaps that dip between others.
-        dipping: these gaps, and the share of each at which it is deepest.
+        dipping: these gaps, and the shares of each at which it is deepest.
     """
 
     wrong: int
-    dipping: dict[int, float]
+    dipping: dict[int, list[float]]
 
 
 class _Looking(Looking):
@@ -141,7 +141,8 @@ class Mender:
         found = chart.original.copy()
         before = best = left = self._left(found, window)
         for number in range(ADDED):
-            program.add([Node(gap, float(np.clip(at, NEAREST, 1.0 - NEAREST))) for gap, at in left.dipping.items()])
+            places = [(gap, at) for gap, shares in left.dipping.items() for at in shares]
+            program.add([Node(gap, float(np.clip(at, NEAREST, 1.0 - NEAREST))) for gap, at in places])
             for gap in left.dipping:
                 looking.ask(gap)
             answer = program.run(x, lambda count, worst: False, RADIUS)

@@ -4,17 +4,24 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from wholebody.cli.arguments import Commands
 from wholebody.cli.clip.arguments import add_command, bar, clip_of
 
+if TYPE_CHECKING:
+    from wholebody.motion.clip import Clip
+
 DESCRIPTION = """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
-without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its ghost."""
+without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its ghost. With
+--equipment the body is shown with what it wears."""
 EPILOG = """\
 examples:
   wholebody clip play walk.bvh
-  wholebody clip play free.npz --ghost walk.npz --out before-after.html"""
+  wholebody clip play free.npz --ghost walk.npz --out before-after.html
+  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack"""
+NOTHING = "nothing"
 PICTURES = 8
 VIEW = (1.6, 1.0, 0.5)
 """Direction from the figure to the camera: from in front, from the left and from above."""
@@ -24,6 +31,10 @@ def add_to(commands: Commands) -> None:
     """Add the command."""
     parser = add_command(commands, "play", "show a motion", DESCRIPTION, EPILOG)
     parser.add_argument("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent")
+    parser.add_argument(
+        "--equipment", default=NOTHING, metavar="WHAT",
+        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
+    )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png")
     parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)")
     parser.set_defaults(run=run)
@@ -40,7 +51,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.files import check_writable
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
-    from wholebody.scene import Scene
+    from wholebody.motion.ready_equipment import dressed
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
 
@@ -54,13 +65,13 @@ def run(arguments: argparse.Namespace) -> int:
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):
         raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
-    scene = Scene(clip.figure)
+    scene = dressed(clip.figure, arguments.equipment)
     if clip.figure.root == "free":
-        scene.add(HalfSpace(), name="floor")
+        scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, _lowest(clip)))
     with Viewer(scene, title=clip.name) as viewer:
         if clip.figure.root == "free":
             middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
-            away = 1.3 + 0.6 * float(np.ptp(clip.q[:, :2], axis=0).max())
+            away = 1.3 + 0.9 * float(np.ptp(clip.q[:, :2], axis=0).max())
             viewer.look(tuple(middle + away * np.array(VIEW)), tuple(middle))
         if out is not None and out.suffix.lower() == ".png":
             frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
@@ -79,3 +90,21 @@ def run(arguments: argparse.Namespace) -> int:
                 )
             print(f"wrote {written}")
     return 0
+
+
+def _lowest(clip: Clip) -> float:
+    """Height of the lowest point of the figure in any frame, metres: recordings do not all have their floor at 0."""
+    import pinocchio as pin
+
+    from wholebody.tasks.support import low_points
+
+    model, pieces = clip.figure.model, clip.figure.geometry.geometryObjects
+    data, lowest = model.createData(), 0.0
+    for frame, q in enumerate(clip.q):
+        pin.forwardKinematics(model, data, q)
+        here = min(
+            float(low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)[:, 2].min())
+            for piece in pieces
+        )
+        lowest = here if frame == 0 else min(lowest, here)
+    return lowest

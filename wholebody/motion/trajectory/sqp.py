@@ -43,7 +43,7 @@ RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 EARLY = 10  # steps after which a hasty run ends; more = longer where normals mislead, fewer = more other starts
-SHRUNK = 0.5 * RADIUS  # a hasty run also ends once its trust region is smaller
+SHRUNK = 0.5  # of its first trust region: a hasty run also ends once its own is smaller
 FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
 ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
 MARGIN = 1e-2  # of a shortfall: by how much a step must be better than the filter
@@ -61,6 +61,7 @@ class Found(NamedTuple):
         met: whether it is at most `MET`.
         programs: how many programs were solved.
         cancelled: whether the caller ended it.
+        early: whether it ended early, with much missed still.
     """
 
     x: Array
@@ -69,6 +70,7 @@ class Found(NamedTuple):
     met: bool
     programs: int
     cancelled: bool
+    early: bool = False
 
 
 class _At(NamedTuple):
@@ -131,10 +133,10 @@ class WindowProgram:
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)
-        programs = 0
+        programs, smallest = 0, SHRUNK * radius
         for number in range(self._iterations):
-            if hasty and here.worst > FAR and (number >= EARLY or radius < SHRUNK):
-                break
+            if hasty and here.worst > FAR and (number >= EARLY or radius < smallest):
+                return Found(here.x, here.objective, here.worst, False, programs, False, True)
             if cancel(number, here.worst):
                 return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
             if not counts.any():

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from enum import Enum
+from itertools import chain
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -26,6 +27,8 @@ ROUNDS = 12  # of sweeping and adding places between frames
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
+SHORTER = 0.3  # of the largest step: from the second round on, each round takes shorter ones
+SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger = more that dips elsewhere
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
@@ -58,7 +61,7 @@ class Freed(NamedTuple):
 
 
 class _Way(Enum):
-    """How an attempt goes: from deviations that are free but for dips, from usual ones, or with others left to try."""
+    """How an attempt goes: from deviations that are free but for dips, to its end, or with others left to try."""
 
     CAREFUL = "careful"
     USUAL = "usual"
@@ -66,12 +69,13 @@ class _Way(Enum):
 
 
 class _Attempt(NamedTuple):
-    """Deviations that one attempt ended with."""
+    """Deviations that one attempt ended with, and whether it ended early."""
 
     x: Array
     worst: float
     dipping: int
     objective: float
+    early: bool = False
 
     @property
     def rank(self) -> tuple[bool, bool, float]:
@@ -163,15 +167,18 @@ class ClipRun:
         looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
+        ended_early: list[Array] = []
         if begun is None:
-            starts = self._starts(window, chart, limits, depths, always)
+            starts = ((start, _Way.HASTY) for start in self._starts(window, chart, limits, depths, always))
         else:
-            starts = [_deviations(chart, begun, limits)]
-        for number, start in enumerate(starts):
-            way = _Way.CAREFUL if begun is not None else _Way.USUAL if number else _Way.HASTY
+            starts = ((start, _Way.CAREFUL) for start in [_deviations(chart, begun, limits)])
+        for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
             if attempt is None:
                 return Freed(chart.original, "")
+            if attempt.early:
+                ended_early.append(start)
+                continue
             best = attempt if best is None or attempt.rank < best.rank else best
             if best.worst <= MET and not best.dipping:
                 break
@@ -189,7 +196,7 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends; none once more, for the first attempt is ended early.
+        and both ends. Attempts that end early are begun again after all others.
         """
         none = np.zeros((len(window), self._workspace.model.nv))
         yield none
@@ -203,7 +210,6 @@ class ClipRun:
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
         for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
             yield _deviations(chart, self._carried.outwards(window, middle), limits)
-        yield none
 
     def _attempt(
         self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
@@ -213,17 +219,23 @@ class ClipRun:
         careful, hasty = way is _Way.CAREFUL, way is _Way.HASTY
         found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
         most, dipped = self._settings.iterations, set[int]()
-        for _ in range(ROUNDS):
+        for number in range(ROUNDS):
             found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, hasty)
-            radius, hasty = NEARLY, False
+            radius = NEARLY
+            if number:  # what is free already is to stay where it is, or it dips elsewhere
+                largest = max(SHORTER * min(largest, NEARLY), SHORTEST)
+                radius = largest
+                hasty = False  # it is nearly free: what is missed now is seldom on the wrong side
             self._programs += found.programs
             if found.cancelled:
                 return None
             x = found.x
+            if found.early:
+                return _Attempt(x, found.worst, 0, found.objective, early=True)
             q = chart.postures(x)
             gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
             swept = dips(self._workspace, q, gaps)
-            near = [(gap, share + side) for gap, share in swept.items() for side in SIDES]
+            near = [(gap, share + side) for gap, shares in swept.items() for share in shares for side in SIDES]
             near += [(gap, share) for gap in swept if gap in dipped for share in FEW]  # what dips again, everywhere
             dipped |= swept.keys()
             if near and found.met:
