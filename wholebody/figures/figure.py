@@ -20,7 +20,7 @@ from wholebody.records import as_dict
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
 
-HEAVIEST = 1e12
+HEAVIEST = 1e9
 """Kilograms: greatest mass carried by one joint."""
 
 _LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")

@@ -20,7 +20,7 @@ MOST_BYTES = 64 * 2**20
 """Largest file that is accepted as a description of a robot."""
 
 
-MOST = 1e12
+MOST = 1e9
 """Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
 
 
