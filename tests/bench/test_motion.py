@@ -89,9 +89,9 @@ def test_a_clip_that_misses_what_is_held_is_not_free(tmp_path: Path, monkeypatch
         return dataclasses.replace(found, report=dataclasses.replace(found.report, missed=missed))
 
     monkeypatch.setattr(avoidance, "avoid", avoid)
-    assert measuring.measured(row, str(path)).outcome == "free"
+    assert measuring.measured(row, str(path), 600.0).outcome == "free"
     missed = 5e-3
-    assert measuring.measured(row, str(path)).outcome == "left"
+    assert measuring.measured(row, str(path), 600.0).outcome == "left"
 
 
 def rows() -> list[MotionRow]:

@@ -15,7 +15,7 @@ from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.errors import InputError, WholebodyError
 from wholebody.files import make_folder
-from wholebody.runner import Job
+from wholebody.runner import Job, allow
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck
@@ -24,8 +24,9 @@ if TYPE_CHECKING:
 FIGURE = "human"
 CHECKED = "check"  # in place of a method: the clip as it is
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
-START = 300.0  # s of the deadline of a case beside those for its length: imports, compilation, other work
-SLOWEST = 60.0  # s for a second of motion, after which a method is ended
+START = 120.0  # s of the processor that a case has beside those for its length: imports, compilation
+SLOWEST = 60.0  # s of the processor for a second of motion, after which a method is ended
+BY_THE_CLOCK = 10.0  # the deadline by the clock in units of that one
 MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 LIMIT = 1e-6  # rad, m: by which a limit may be missed
@@ -128,18 +129,20 @@ def kept_length(path: str) -> tuple[int, float]:
     return len(clip), clip.duration
 
 
-def measured(row: MotionRow, path: str) -> MotionRow:
+def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     """Measure one case; a job of a process of its own.
 
     Args:
         row: the case.
         path: of the clip.
+        most: seconds of the processor that it has.
     """
     from wholebody.figures import load
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
 
+    allow(BY_THE_CLOCK * most, most)
     figure = load(FIGURE)
     scene, clip = dressed(figure, row.equipment), read_clip(path, figure)
     check(clip[:MIDDLE], scene)  # compiles or reads back what is needed
@@ -268,7 +271,8 @@ def clip_file(name: str, folder: Path) -> Path:
 
 
 def _job(row: MotionRow, duration: float, folder: Path) -> Job:
-    return Job(row, measured, (row, str(clip_file(row.clip, folder))), START + SLOWEST * duration)
+    most = START + SLOWEST * duration
+    return Job(row, measured, (row, str(clip_file(row.clip, folder)), most), BY_THE_CLOCK * most)
 
 
 def _clips(
