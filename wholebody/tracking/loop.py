@@ -99,6 +99,7 @@ class FrameLoop(OfOneRun):
         for name in listed(touching, "FrameLoop: touching", "['ball']"):
             known(name, scene.objects, "object", "touching")
         self.scene, self.overlap, self.count, self._touching = scene, overlap, 0, tuple(touching)
+        self._inside = False  # whether the posture that is shown overlaps something
         q = array(start, "start", f"a posture of {scene.figure.name}").copy()
         reason = unreadable(scene, q)
         if reason:
@@ -133,9 +134,14 @@ class FrameLoop(OfOneRun):
     def _shown(
         self, resolution: Resolution, collisions: tuple[Collision, ...] = (), *, began: tuple[float, float]
     ) -> Frame:
-        note = "; ".join(part for part in (self._note, resolution.note) if part)
+        self.shown = np.array(resolution.candidates[0])
+        left = ""
+        if self._inside or any(one.inside for one in collisions):
+            left = deepest_overlap(self.scene, self.shown)
+            self._inside = bool(left)
+        note = "; ".join(part for part in (self._note, resolution.note, left) if part)
         note = f"frame {self.count}: {note}" if note else ""
-        self.shown, self._note, self.count = np.array(resolution.candidates[0]), "", self.count + 1
+        self._note, self.count = "", self.count + 1
         wall, cpu = (now - then for now, then in zip(_clocks(), began, strict=True))
         return Frame(
             self.shown, wall, cpu, resolution.contact_seconds, resolution.solve_seconds,
