@@ -121,7 +121,7 @@ def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
         solve_from(broken, lacking(whole), 50)
 
 
-@pytest.mark.parametrize("jump", [(0.05, 0.0, -0.08), (0.0, 0.0, 0.1), (0.05, 0.05, 0.05)])
+@pytest.mark.parametrize("jump", [(0.1, 0.0, -0.16), (0.0, 0.0, 0.2), (0.1, 0.1, 0.1)])
 def test_a_hold_comes_back_in_the_step_after_a_jump(jump: tuple[float, float, float]) -> None:
     """A long step turns far and misses what is held. The next is short and turns little: it asks for what is missed."""
     hand = wb.load("hand", side="left")
