@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
@@ -32,6 +33,7 @@ from wholebody.methods.qp.subproblem import (
 from wholebody.methods.qp.subproblem import compiled_kernel as compiled_subproblem
 from wholebody.methods.qp.working_set import LIMITS, WorkingSet
 from wholebody.problem import Problem
+from wholebody.tasks.base import Constraint
 from wholebody.workspace import Workspace
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
@@ -94,7 +96,8 @@ class StepProgram:
         self._soft = self.goals + int((self._subproblem.kind == 0).sum())
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
         self._settled, self._curving, self._bend = False, False, 0.0
-        self._constraints, self._held = problem.constraints, np.flatnonzero(self._subproblem.kind == 0)
+        self._held = np.flatnonzero(self._subproblem.kind == 0)
+        self._holds, self._among = _holding(problem, state, self._held)
         self._there = State(state.model)
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
@@ -218,9 +221,9 @@ class StepProgram:
         """
         state, before, first = self._there, self._before, len(at.q)
         state.update(pin.integrate(state.model, at.q, displacement))
-        values = np.concatenate([np.atleast_1d(constraint.value(state)) for constraint in self._constraints])
+        values = np.concatenate([np.atleast_1d(constraint.value(state)) for constraint in self._holds])
         error, held = self._soft_values[0], slice(first + self.goals, -2)
-        there = (values - self._subproblem.bound[0])[self._held]
+        there = values[self._among] - self._subproblem.bound[0, self._held]
         curved = there - error[self.goals :] - self._soft_rows[self.goals :] @ displacement
         known = before[-1] > 0.0 and np.array_equal(before[:first], at.q)
         foreseen = np.clip(error[self.goals :] - before[held], -CURVED, CURVED) if known else 0.0
@@ -244,6 +247,14 @@ class StepProgram:
         self._soft_values = floats[ends[3] : ends[4]].reshape(2, m)
         self._entries = floats[ends[4] : ends[5]].reshape(4, n)
         self._soft_rows = floats[ends[5] : ends[6]].reshape(m, n)
+
+
+def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[Constraint], NDArray[np.intp]]:
+    """The constraints with equalities, and where these rows, `held` among those of all, are among theirs."""
+    sizes = [np.size(constraint.value(state)) for constraint in problem.constraints]
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    holding = np.unique(owner[held])
+    return [problem.constraints[k] for k in holding], np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
 def numbers_of(scale: float, gain: float) -> Array:
