@@ -22,25 +22,14 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.dynamics.motion_kernel import angular_momentum
 
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
 @compiled()
-def momentum(rotation: Array, inertia: Array, spin: Array, result: Array) -> None:
-    """Write the angular momentum R I R^T w (3,) of a body about its centre of mass."""
-    local, turned = np.empty(3), np.empty(3)
-    for i in range(3):
-        local[i] = rotation[0, i] * spin[0] + rotation[1, i] * spin[1] + rotation[2, i] * spin[2]
-    for i in range(3):
-        turned[i] = inertia[i, 0] * local[0] + inertia[i, 1] * local[1] + inertia[i, 2] * local[2]
-    for i in range(3):
-        result[i] = rotation[i, 0] * turned[0] + rotation[i, 1] * turned[1] + rotation[i, 2] * turned[2]
-
-
-@compiled()
 def _kinetic(mass: float, rotation: Array, inertia: Array, twist: Array, turning: Array) -> float:
-    momentum(rotation, inertia, twist[3:], turning)
+    angular_momentum(rotation, inertia, twist[3:], turning)
     total = 0.0
     for k in range(3):
         total += mass * twist[k] * twist[k] + twist[3 + k] * turning[k]
@@ -240,7 +229,7 @@ def _as_one(
     lever = np.empty(3)
     for b in range(len(root)):
         if chosen[b] and root[b] == island:
-            momentum(rotation[b], inertia[b], twist[b, 3:], column)
+            angular_momentum(rotation[b], inertia[b], twist[b, 3:], column)
             square = 0.0
             for k in range(3):
                 lever[k] = position[b, k] - centre[k]
@@ -251,7 +240,7 @@ def _as_one(
             for i in range(3):
                 spin[:] = 0.0
                 spin[i] = 1.0
-                momentum(rotation[b], inertia[b], spin, column)
+                angular_momentum(rotation[b], inertia[b], spin, column)
                 for k in range(3):
                     gathered[k, i] += column[k] - mass[b] * lever[k] * lever[i]
                 gathered[i, i] += mass[b] * square

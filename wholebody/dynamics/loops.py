@@ -20,7 +20,7 @@ from wholebody.dynamics import (
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back with three others: not in the middle of a frame."""
+    """The loops of motion; those of all other modules named above are compiled or read back with them."""
     one, none, mask = np.zeros((1, 3)), np.zeros(0, dtype=np.intp), np.ones(1, dtype=bool)
     unit, vectors, turned, twist = np.eye(3)[None].copy(), np.zeros((0, 3)), np.zeros((1, 4, 3)), np.zeros((1, 6))
     some, mass, pairs = np.zeros(0), np.zeros(1), np.zeros((0, 2), dtype=np.intp)

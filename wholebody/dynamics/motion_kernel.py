@@ -59,9 +59,9 @@ def _spin(rotation: Array, inverse: Array, momentum: Array, spin: Array) -> None
 
 
 @compiled()
-def _momentum(rotation: Array, inertia: Array, spin: Array, momentum: Array) -> None:
-    """Write the angular momentum R I R^T w."""
-    _spin(rotation, inertia, spin, momentum)
+def angular_momentum(rotation: Array, inertia: Array, spin: Array, result: Array) -> None:
+    """Write the angular momentum R I R^T w (3,) of a body about its centre of mass."""
+    _spin(rotation, inertia, spin, result)
 
 
 @compiled()
@@ -80,7 +80,7 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
         return
     momentum, turn, middle, now = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     pull = np.empty(3)
-    _momentum(rotation, inertia, spin, momentum)
+    angular_momentum(rotation, inertia, spin, momentum)
     energy = momentum[0] * spin[0] + momentum[1] * spin[1] + momentum[2] * spin[2]
     steps = int(speed * time / LARGEST_TURN) + 1
     h = time / steps

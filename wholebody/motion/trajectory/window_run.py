@@ -27,7 +27,7 @@ ROUNDS = 12  # of sweeping and adding places between frames
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
-SHORTER = 0.3  # of the largest step: from the second round on, each round takes shorter ones
+SHORTER = 0.3  # of the largest step: after the second round, each round takes shorter ones
 SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger = more that dips elsewhere
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
