@@ -117,6 +117,7 @@ class Lineariser:
         measures: Sequence[Measure],
         clearances: Array,
         dt: float | None = None,
+        plan: TermPlan | None = None,
     ) -> None:
         """Take the resolved terms of a problem.
 
@@ -129,12 +130,14 @@ class Lineariser:
             measures: resolved measures.
             clearances: (pairs,) least distance asked of every collision pair, metres.
             dt: step in seconds for bounds that need one.
+            plan: of the same constraints, bounds, measures and step, and of any goals; None to make it here.
         """
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
         self._kernel = compiled_kernel()
         self.goals: Sequence[Goal] = goals
-        self._plan = self._planned(goals)
+        self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
+        self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
         self._passing: Passing | None = None
         self._grow(64)
         self._approach = self._largest_approach()
@@ -150,11 +153,9 @@ class Lineariser:
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
         if goals is not self.goals:
-            again = self._plan.with_goals(goals, self.state.model)
-            if again is None or any(np.size(term.value(self.state)) != term.rows for term in again.others):
-                self._plan, self._passing = self._planned(goals), None
-            else:
-                self._plan = again
+            before, self._plan = self._plan, self._again(self._plan, goals)
+            if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
+                self._term_wrench, self._passing = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
         self._most = None if self._approach is None else clearances + self._approach
@@ -244,9 +245,14 @@ class Lineariser:
             self._measure(plan.other_measures, measure)
 
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
-        plan = make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
-        self._term_wrench = np.empty((plan.goal_rows + plan.value_rows, 6))
-        return plan
+        return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+
+    def _again(self, plan: TermPlan, goals: Sequence[Goal]) -> TermPlan:
+        """The plan with other goals; made anew where they, or terms of one's own, have other rows than before."""
+        again = plan.with_goals(goals, self.state.model)
+        if again is None or any(np.size(term.value(self.state)) != term.rows for term in again.others):
+            return self._planned(goals)
+        return again
 
     def _largest_approach(self) -> Array | None:
         """Most by which every pair (pairs,) can come nearer in a step; None where speeds are not bounded."""

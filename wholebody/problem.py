@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import cache
+from operator import is_
 from typing import Any
 
 import numpy as np
@@ -22,6 +23,7 @@ from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.tasks.defaults import default_constraints, default_measures
+from wholebody.term_plan import TermPlan, make_plan
 from wholebody.workspace import Workspace
 
 UNIT_TOLERANCE = 1e-3  # largest deviation of a start's quaternion from unit length; more is refused as a mistake
@@ -125,6 +127,8 @@ class Problem(checks.Settled):
             _check_goals(self.goals, state)
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
+            self._plan = self._planned(state)
+            """The terms as arrays, and the terms that they were made of; every solve begins with it."""
 
     def __repr__(self) -> str:
         asked = [*self.goals, *self.constraints, *self.bounds]
@@ -232,6 +236,8 @@ class Problem(checks.Settled):
             workspace: from this problem's `borrow` or `workspace`.
             dt: time step in seconds, for bounds that need one.
         """
+        terms, plan = self._plan
+        known = dt is None and all(map(is_, terms, (self.constraints, self.bounds, self.measures)))
         return Lineariser(
             workspace,
             self.scene.figure.limits,
@@ -241,7 +247,12 @@ class Problem(checks.Settled):
             self.measures,
             self.clearances,
             dt,
+            plan if known else None,
         )
+
+    def _planned(self, state: State) -> tuple[tuple[Any, Any, Any], TermPlan]:
+        terms = (self.constraints, self.bounds, self.measures)
+        return terms, make_plan(self.scene.figure.limits, self.goals, *terms, None, state)
 
     def check_fresh(self) -> None:
         """Raise InputError if objects were added or removed after the problem was made, or if clearances are wrong.
