@@ -160,3 +160,11 @@ class Measure(Term, ABC):
     def curvature(self, state: State) -> Array:
         """(nv,) positive diagonal that approximates the second derivative."""
         return np.ones(state.model.nv)
+
+    def squares(self, state: State) -> tuple[Array, Array] | None:
+        """The value as a sum of squares: residuals r (k,) and their derivatives R (k, nv), always as many.
+
+        None, as here, where `curvature` says all. A diagonal that bounds ``2 R' R`` makes steps short where joints move
+        together; methods that take rows use the rows in its place (Gauss and Newton), the others use the diagonal.
+        """
+        return None

@@ -138,6 +138,14 @@ class Rhythm(Measure):
             result[places] += 2.0 * weight * steep * steep.sum()
         return result
 
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residuals (k,) and their derivatives (k, nv): of each clavicle and knee, then of the lumbar spine."""
+        parts = self.parts(state.q)
+        residuals, rows = np.zeros(len(parts)), np.zeros((len(parts), state.model.nv))
+        for row, (weight, excess, places, slopes) in enumerate(parts):
+            residuals[row], rows[row, places] = math.sqrt(weight) * excess, math.sqrt(weight) * slopes
+        return residuals, rows
+
     def parts(self, q: Array) -> list[tuple[float, float, list[int], Array]]:
         """Weight, excess, places in the tangent and slopes there of each square."""
         found: list[tuple[float, float, list[int], Array]] = []

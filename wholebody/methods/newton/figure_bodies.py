@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
@@ -91,6 +91,11 @@ class FigureBodies:
             self._state_of = x
         return self.start_state
 
+    def state_of(self, q: Array) -> State:
+        """The same at the posture q (nq,)."""
+        self._state_of = None
+        return self.start_state.update(q)
+
     def tangent_rows(self, x: Array) -> Array:
         """Derivative (nv, 7 count) of the tangent displacement of postures by the bodies x (count + 1, 7)."""
         result = np.zeros((self.model.nv, 7 * (self.count + 1)))
@@ -101,6 +106,16 @@ class FigureBodies:
             result[:3, :3] = pin.Quaternion(x[0, 3:]).toRotationMatrix().T
             # the rotation is 2 vec(conj(e) de), in the root's own axes
             result[3:6, 3:7] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+        return result[:, : 7 * self.count]
+
+    @property
+    def chart(self) -> Mask:
+        """(nv, 7 count) the variables of bodies that each degree of freedom is a function of."""
+        result = np.zeros((self.model.nv, 7 * (self.count + 1)), dtype=bool)
+        columns = 7 * self.angles.bodies[:, :, None] + np.arange(7)
+        result[self._tangent[:, None], columns.reshape(len(columns), 14)] = self.angles.pattern
+        if self.floating:
+            result[:3, :3] = result[3:6, 3:7] = True
         return result[:, : 7 * self.count]
 
     def bound_step(self, q: Array, lower: Array, upper: Array) -> None:

@@ -58,9 +58,7 @@ class FigureSystem(ActiveSystem):
         self._goals: list[tuple[Batch, Key]] = []
         self.retarget()
         self.objective = Objective(problem, self.bodies, workspace.state)
-        for rows in (self.objective.rows, self.objective.root):
-            if rows is not None:
-                self._fixed.append((rows, Key(OBJECTIVE, False, False, 1.0)))
+        self._fixed += [(rows, Key(OBJECTIVE, False, False, 1.0)) for rows in self.objective.batches()]
         self.q = self._left = problem.start
         self.patterns = Patterns(count, self.bodies.weight, algebra)
         self._ordered = np.zeros(0)

@@ -2,8 +2,10 @@
 
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
 angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
-measure of the revolute joints, and of a free root that one of these measures counts. A measure that depends on
-other joints is only reported, and the solution's message names it.
+measure of the revolute joints, and of a free root that one of these measures counts. A measure that says of which
+squares it is the sum, `Rhythm`, has a row for each of them: beside a diagonal that bounds their second derivative the
+steps are many times as many. A measure that depends on other joints is only reported, and the solution's message names
+it.
 """
 
 from __future__ import annotations
@@ -13,9 +15,11 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
+from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.root_motion import RootMotion
 from wholebody.methods.newton.system import System
+from wholebody.methods.newton.tangent_rows import TangentRows, square_rows
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm
 from wholebody.tasks.base import Measure
@@ -32,6 +36,7 @@ class Objective:
     Attributes:
         rows: the joints' angles, each relative to its minimiser.
         root: the root's motion relative to its minimiser; None where it is fixed, or counts nothing.
+        squares: the rows of measures that are sums of squares.
         minimised: the measures that are minimised.
         reported: names of the others.
     """
@@ -50,13 +55,22 @@ class Objective:
         self._tangent = tangent if self.root is None else np.concatenate([tangent, np.arange(6)])
         self.minimised: list[Measure] = []
         self.reported: list[str] = []
+        self.squares: list[TangentRows] = []
+        self._curved: list[Measure] = []  # those without squares
         for term in problem.measures:
             if isinstance(term, CAN) or _depends_on(term, self._tangent, problem.start, state):
                 self.minimised.append(term)
+                rows = None if bodies.uncharted else square_rows(bodies, term, type(term).__name__)
+                self._curved += [term] if rows is None else []
+                self.squares += [] if rows is None else [rows]
             else:
                 self.reported.append(type(term).__name__)
         self._follows = True
         self.stiffness = np.full(len(self._tangent), STIFFNESS * LEAST_STIFFNESS)
+
+    def batches(self) -> list[Batch]:
+        """All rows, in the order of their factors."""
+        return [self.rows, *([] if self.root is None else [self.root]), *self.squares]
 
     def value(self, x: Array) -> float:
         """The minimised measures at the bodies x (7 n,)."""
@@ -67,10 +81,14 @@ class Objective:
         """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
         self._model_at(q)
         self._aim(q, np.zeros(len(self._tangent)))
+        for rows in self.squares:
+            rows.count_from(q)
         self._follows = False
 
     def follow(self) -> None:
         """Model the measures anew at every posture."""
+        for rows in self.squares:
+            rows.count_from(None)
         self._follows = True
 
     def renew(self, q: Array) -> None:
@@ -80,12 +98,13 @@ class Objective:
 
     def enter(self, system: System) -> None:
         """Write the present factors into a system."""
-        system.stiffness[system.objective] = self.stiffness
+        squares = np.full(sum(rows.size for rows in self.squares), STIFFNESS)
+        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
 
     def _model_at(self, q: Array) -> None:
         state = self._state.update(q)
         gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
-        for term in self.minimised:
+        for term in self._curved:
             gradient += term.weight * term.gradient(state)
             curvature += term.weight * term.curvature(state)
         half = np.maximum(0.5 * curvature[self._tangent], LEAST_STIFFNESS)

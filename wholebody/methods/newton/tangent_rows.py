@@ -1,4 +1,6 @@
-"""Users' goals and constraints, whose derivatives are with respect to the tangent space of postures, as rows of bodies.
+"""Terms whose derivatives are with respect to the tangent space of postures, as rows of bodies.
+
+They are users' goals and constraints, and measures that are sums of squares.
 
 A term gives its derivative J with respect to the tangent displacement (nv,) of a posture. Every degree of freedom of
 revolute joints and of a free root is a function of one or two bodies, with derivative D (nv, 7 n), so the term's rows
@@ -7,15 +9,19 @@ are J D.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
+from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.base import Constraint, Goal, Measure
+
+SAMPLES = 3  # postures that tell which degrees of freedom a residual depends on
 
 
 class TangentRows(Batch):
@@ -30,6 +36,7 @@ class TangentRows(Batch):
         chosen: Indices,
         sign: Array,
         bound: Array,
+        depends: Mask | None = None,
     ) -> None:
         """Take a function with its derivative.
 
@@ -41,12 +48,19 @@ class TangentRows(Batch):
             chosen: (size,) indices of the used rows among the m.
             sign: (size,) 1 or -1.
             bound: (size,) subtracted from the value.
+            depends: (size, nv) the degrees of freedom that each used row depends on; None for all.
         """
         super().__init__(np.arange(bodies.count)[None], [label])
         self._figure, self._value, self._slope = bodies, value, jacobian
         self.chosen, self.sign, self.bound = chosen, sign, bound
         self.size = len(chosen)
         self.pattern = np.tile(_reads(bodies), (self.size, 1))
+        if depends is not None:
+            self.pattern &= depends @ bodies.chart
+
+    def count_from(self, q: Array | None) -> None:
+        """Count the values from those at the posture q (nq,), or from zero."""
+        self.bound = np.zeros(self.size) if q is None else self._value(self._figure.state_of(q))[self.chosen]
 
     def residual(self, x: Array) -> Array:  # noqa: D102
         value = np.atleast_1d(self._value(self._figure.state_at(x)))[self.chosen]
@@ -65,6 +79,26 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
     return TangentRows(
         bodies, label, goal.error, lambda state: _dense(goal.jacobian(state), state),
         np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
+    )  # fmt: skip
+
+
+def square_rows(bodies: FigureBodies, measure: Measure, label: str) -> TangentRows | None:
+    """Rows of the residuals whose squares a measure is the sum of, with its weight; None if it is no such sum."""
+    root = math.sqrt(measure.weight)
+
+    def squares(state: State) -> tuple[Array, Array]:
+        found = measure.squares(state)
+        assert found is not None
+        return root * found[0], root * found[1]
+
+    if measure.squares(bodies.start_state) is None:
+        return None
+    postures = random_postures(bodies.model, SAMPLES, seed=1)
+    depends = np.any([squares(bodies.state_of(q))[1] != 0.0 for q in postures], axis=0)
+    count = len(depends)
+    return TangentRows(
+        bodies, label, lambda state: squares(state)[0], lambda state: squares(state)[1], np.arange(count),
+        np.ones(count), np.zeros(count), depends,
     )  # fmt: skip
 
 
