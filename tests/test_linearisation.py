@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from tests.reference.linearisation import ReferenceLineariser
-from wholebody.tasks.base import Goal
+from wholebody.tasks.base import Goal, Measure
 from wholebody.term_plan import make_plan
 
 
@@ -238,6 +238,47 @@ def test_reach_cones_roots_and_heights_are_in_the_plan(problem):
         assert_same(lineariser.at(q, 0.0), plain.at(q, 0.0))
 
 
+class Sway(Measure):
+    """A measure of one's own that is the square of a sum of two angles."""
+
+    weight = 3.0
+
+    def value(self, state):
+        return float((state.q[10] + state.q[11]) ** 2)
+
+    def gradient(self, state):
+        return 2.0 * (state.q[10] + state.q[11]) * self.row(state)
+
+    def curvature(self, state):
+        return 4.0 * self.row(state)
+
+    def squares(self, state):
+        return np.array([state.q[10] + state.q[11]]), self.row(state)[None]
+
+    def row(self, state):
+        row = np.zeros(state.model.nv)
+        row[9:11] = 1.0
+        return row
+
+
+@pytest.mark.parametrize("measures", [[wb.Rhythm(2.0)], [wb.Rhythm(2.0), Sway()], [Sway()]])
+def test_squares_are_the_second_derivative_where_they_vanish(problem, measures):
+    """Where all angles are zero; beside the squares nothing is left of the curvature."""
+    scene = problem.scene
+    model, q = scene.model, pin.neutral(scene.model)
+    asked = wb.Problem(scene, q, measures=measures)
+    lineariser, step = asked.lineariser(asked.workspace()), 1e-4
+    at = lineariser.at(q, 0.0)
+    assert at.measure == pytest.approx(0.0, abs=1e-9)
+    second = []
+    for k in range(model.nv):
+        ends = [lineariser.at(pin.integrate(model, q, side * step * np.eye(model.nv)[k]), 0.0) for side in (1, -1)]
+        second.append((ends[0].gradient - ends[1].gradient) / (2.0 * step))
+    np.testing.assert_allclose(at.squares.T @ at.squares, second, atol=2e-4 * np.abs(second).max())
+    least = sum(term.weight for term in measures) * 1e-6
+    np.testing.assert_allclose(at.curvature - at.squared, 0.0, atol=1.01 * least)
+
+
 def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
     """Targets alone are written anew; another class, frame or number of goals is another plan."""
     q = posture(problem, 5)
@@ -254,6 +295,22 @@ def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
         asked.retarget(goals)
         lineariser.take(asked.goals, asked.clearances)
         assert_same(lineariser.at(q, 0.05), reference(asked, asked.workspace()).at(q, 0.05))
+
+
+def test_the_plan_of_a_problem_is_made_once_and_follows_what_is_set(problem, monkeypatch):
+    """A solve makes no plan; terms that were replaced are evaluated as they are now."""
+    scene, q = problem.scene, posture(problem, 5)
+    asked = wb.Problem(scene, goals=[wb.Point("left_palm", (0.4, 0.2, 1.0))], constraints=[wb.Hold("left_foot")])
+    other = wb.Problem(scene, constraints=[wb.Hold("right_foot"), wb.Freeze("neck")], measures=[wb.Displacement(3.0)])
+    copies = [asked.with_start(q) for _ in range(3)]
+    copies[0].constraints, copies[1].bounds, copies[2].measures = other.constraints, other.bounds, other.measures
+    for each in (asked, *copies):
+        each.retarget([wb.Point("left_palm", (0.5, 0.1, 1.2))])
+        assert_same(each.lineariser(each.workspace()).at(q, 0.05), reference(each, each.workspace()).at(q, 0.05))
+    monkeypatch.setattr("wholebody.linearisation.make_plan", None)
+    asked.lineariser(asked.workspace()).at(q, 0.05)
+    with pytest.raises(TypeError):
+        copies[0].lineariser(asked.workspace())
 
 
 def test_joints_that_follow_others_and_round_joints(tmp_path):

@@ -135,9 +135,15 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
 
 @compiled()
 def rhythms(
-    elevations: Array, elevation_places: Integers, lumbars: Array, lumbar_places: Integers, q: Array, measure: Array
+    elevations: Array,
+    elevation_places: Integers,
+    lumbars: Array,
+    lumbar_places: Integers,
+    q: Array,
+    measure: Array,
+    squares: Array,
 ) -> None:
-    """See `tasks.Rhythm`."""
+    """See `tasks.Rhythm`; `squares` is as for `term_kernel.linearise`."""
     if not len(elevations) + len(lumbars):
         return
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
@@ -150,7 +156,7 @@ def rhythms(
         slopes[2] = -rise * np.cos(flexion) * np.sin(abduction)
         for k in range(3):
             at[k] = elevation_places[e, 3 + k]
-        _square(elevations[e, 0], excess, slopes[:3], at[:3], measure)
+        _square(elevations[e, 0], excess, slopes[:3], at[:3], measure, squares, e)
     for e in range(len(lumbars)):
         x, y, z, w = q[3], q[4], q[5], q[6]
         share = np.tanh(-lumbars[e, 2] * 2.0 * (x * z - y * w))
@@ -161,11 +167,13 @@ def rhythms(
             slopes[k], at[k] = 1.0, lumbar_places[e, 3 + k]
         slopes[3], at[3] = -steep * (1.0 - 2.0 * (x * x + y * y)), 4
         slopes[4], at[4] = steep * 2.0 * (y * z + x * w), 5
-        _square(lumbars[e, 0], excess, slopes, at, measure)
+        _square(lumbars[e, 0], excess, slopes, at, measure, squares, len(elevations) + e)
 
 
 @compiled()
-def _square(weight: float, excess: float, slopes: Array, at: Integers, measure: Array) -> None:
+def _square(
+    weight: float, excess: float, slopes: Array, at: Integers, measure: Array, squares: Array, row: int
+) -> None:
     """Add a weighted square with slopes (k,) at these places of the tangent; row sums bound its second derivative."""
     steep = 0.0
     for k in range(len(slopes)):
@@ -174,6 +182,11 @@ def _square(weight: float, excess: float, slopes: Array, at: Integers, measure: 
     for k in range(len(slopes)):
         measure[0, at[k]] += 2.0 * weight * excess * slopes[k]
         measure[1, at[k]] += 2.0 * weight * abs(slopes[k]) * steep
+    if row < len(squares):
+        squares[row] = 0.0
+        for k in range(len(slopes)):
+            squares[row, at[k]] += np.sqrt(2.0 * weight) * slopes[k]
+            measure[2, at[k]] += 2.0 * weight * abs(slopes[k]) * steep
 
 
 @compiled()

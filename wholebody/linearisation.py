@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from functools import lru_cache
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +47,9 @@ class Linearisation(NamedTuple):
         gradient: (nv,) its derivative.
         curvature: (nv,) its positive diagonal.
         lower, upper: (nv,) bounds on dq.
+        squares: (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative
+            S' S.
+        squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; empty without rows.
     """
 
     q: Array
@@ -63,6 +67,8 @@ class Linearisation(NamedTuple):
     curvature: Array
     lower: Array
     upper: Array
+    squares: Array = np.zeros((0, 0))
+    squared: Array = np.zeros(0)
 
 
 _NO_CONTACTS = Contacts(
@@ -135,6 +141,7 @@ class Lineariser:
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
         self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
         self._kernel = compiled_kernel()
+        self._no_squares = np.zeros((0, self.state.model.nv))
         self.goals: Sequence[Goal] = goals
         self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
         self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
@@ -185,13 +192,20 @@ class Lineariser:
         contacts, clearance, count = self._contacts(q, within)
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         value, jacobian = np.empty(rows), np.empty((rows + count, nv))
-        box, measure = np.empty((2, nv)), np.empty((2, nv + 1))
-        self._terms(count, value, jacobian, box, measure)
+        squares = np.empty((self._plan.squares, nv))
+        box, measure = np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
+        self._terms(count, value, jacobian, box, measure, squares)
+        squared = measure[2, :nv] if len(squares) else np.zeros(nv)
+        for term in self._plan.other_measures:
+            part = term.squares(self.state)
+            if part is not None:
+                squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
+                squared = squared + term.weight * term.curvature(self.state)
         goals, contact = self._plan.goal_rows, self._contact[:count].copy()
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
             self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1],
+            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared,
         )  # fmt: skip
 
     def passing(self, q: Array, within: float) -> Passing:
@@ -205,7 +219,7 @@ class Lineariser:
             self._passing = self._made()
         room = self._passing
         jacobian = room.jacobian[: len(room.value) + count]
-        self._terms(count, room.value, jacobian, room.box, room.measure)
+        self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
         contact = self._contact[:count]
         return Passing(
             self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
@@ -230,12 +244,12 @@ class Lineariser:
         count = workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
         return contacts, clearance, count
 
-    def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array) -> None:
+    def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
         """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
         state, plan = self.state, self._plan
         self._kernel.linearise(
             state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure,
+            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure, squares,
         )  # fmt: skip
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
@@ -306,6 +320,6 @@ def compiled_kernel() -> Any:
     term_kernel.linearise(
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
         np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp), 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
-        np.zeros((2, nv)), np.zeros((2, nv + 1)),
+        np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
     )  # fmt: skip
     return term_kernel

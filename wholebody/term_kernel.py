@@ -76,6 +76,7 @@ def linearise(
     jacobian: Array,
     box: Array,
     measure: Array,
+    squares: Array,
 ) -> None:
     """Values and Jacobian rows of all terms of a plan, then the Jacobian rows of contacts; bounds and measures.
 
@@ -94,7 +95,10 @@ def linearise(
         value: (terms' rows,) room for the values.
         jacobian: (terms' rows + gaps, nv) room for all rows.
         box: (2, nv) room for the bounds on the displacement.
-        measure: (2, nv + 1) room for the gradient and the value, and for the curvature.
+        measure: (2, nv + 1) room for the gradient and the value, and for the curvature; with squares a third row is
+            for their part of the curvature.
+        squares: (s, nv) room for the rows S of measures that are sums of squares, whose second derivative is S' S;
+            (0, nv) if they are not asked for.
     """
     nv = jacobian.shape[1]
     terms = len(value)
@@ -142,6 +146,8 @@ def linearise(
         measure[0, v] = 0.0
         measure[1, v] = constant[0, v]
     measure[0, nv] = measure[1, nv] = 0.0
+    if len(squares):
+        measure[2] = 0.0
     _measures(
         _floats(floats, layout, DISTANCE), _integers(integers, layout, DISTANCE), _floats(floats, layout, DISCOMFORT),
         _integers(integers, layout, DISCOMFORT), q, measure,
@@ -149,7 +155,7 @@ def linearise(
     root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
     rhythms(
         _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
-        _integers(integers, layout, LUMBAR), q, measure,
+        _integers(integers, layout, LUMBAR), q, measure, squares,
     )  # fmt: skip
     heights(
         _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column, measure

@@ -87,6 +87,11 @@ class TermPlan(NamedTuple):
     other_measures: tuple[Measure, ...]
     goals: tuple[list[Entry] | None, ...]
 
+    @property
+    def squares(self) -> int:
+        """Number of squares that built-in measures are the sum of."""
+        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1])
+
     def with_goals(self, goals: Sequence[Goal], model: pin.Model) -> TermPlan | None:
         """The plan with other goals, or None where they are not of the same classes for the same frames.
 

@@ -156,3 +156,17 @@ def test_both_arms_overhead_extend_the_thorax_as_people_do(scene: wb.Scene) -> N
     angles = scene.figure.joint_values(solution.q)
     thorax = -math.degrees(sum(angles[f"spine{level}_flexion"] for level in (3, 4)))
     assert 12.8 - 7.6 < thorax < 12.8 + 7.6
+
+
+def test_its_squares_are_its_value_and_their_rows_their_derivatives(scene: wb.Scene) -> None:
+    figure, rng, step = scene.figure, np.random.default_rng(5), 1e-6
+    term, state = wb.Rhythm(2.0).resolve(scene, figure.posture("standing")), State(figure.model)
+    for _ in range(3):
+        q = pin.integrate(figure.model, figure.posture("sitting"), 0.5 * rng.normal(size=figure.model.nv))
+        residuals, rows = term.squares(state.update(q))
+        assert len(residuals) == 5  # two clavicles, two knees, one lumbar spine
+        assert residuals @ residuals == pytest.approx(term.value(state))
+        np.testing.assert_allclose(2.0 * residuals @ rows, term.gradient(state), atol=1e-12)
+        way = rng.normal(size=figure.model.nv)
+        ends = [term.squares(state.update(pin.integrate(figure.model, q, side * step * way)))[0] for side in (1, -1)]
+        np.testing.assert_allclose((ends[0] - ends[1]) / (2.0 * step), rows @ way, atol=1e-6)

@@ -138,6 +138,11 @@ class EmbeddedMeasure(Measure):
         """(small nv,)."""
         return np.asarray(self.term.curvature(self.embedding.whole(state))[self.embedding.idx_v])
 
+    def squares(self, state: State) -> tuple[Array, Array] | None:
+        """(k,) and (k, small nv)."""
+        found = self.term.squares(self.embedding.whole(state))
+        return None if found is None else (found[0], np.asarray(found[1][:, self.embedding.idx_v]))
+
 
 class EmbeddedBound(Bound):
     """A bound of the whole figure."""

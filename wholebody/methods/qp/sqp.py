@@ -143,8 +143,7 @@ class SQP:
             answer = working_set.solve(program, here.rows.key)
             predicted = PredictedReduction(
                 here.violation.total - self.subproblem.violation(here.rows, answer.x).total,
-                -float(program.linear @ answer.x + 0.5 * (program.diagonal * answer.x) @ answer.x)
-                / self.subproblem.scale,
+                self.subproblem.saving(program, here.rows, answer.x),
             )
             if self._settled(here, answer, predicted):
                 if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
@@ -272,7 +271,8 @@ class SQP:
         """
         self._memory.went(way)
         self._anchor = None
-        residual = program.rows @ dq - program.target
+        asked = len(self._shift)
+        residual = program.rows[:asked] @ dq - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
         return there
 

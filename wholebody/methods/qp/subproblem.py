@@ -181,6 +181,12 @@ class Subproblem:
             )
         )  # fmt: skip
 
+    def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
+        """By how much the measures of a program lessen, to second order, with the displacement x (nv,)."""
+        turned = program.rows[len(rows.soft_error) :] @ x
+        bent = (program.diagonal * x) @ x + (program.weight[len(rows.soft_error) :] * turned) @ turned
+        return -float(program.linear @ x + 0.5 * bent) / self.scale
+
     def program(
         self,
         at: Linearisation,
@@ -202,9 +208,12 @@ class Subproblem:
             damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever; where all
                 is asked for, how much of the squared error (Sugihara 2011, as in `DampedLeastSquares`).
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
-            measures: whether the measures count; without them the nearest posture to the goals is sought.
+            measures: whether the measures count; without them the nearest posture to the goals is sought. The squares
+                that they are the sum of are soft rows, after those of `rows`.
             gain: share of the way to the least measures that the step is to go.
         """
+        squares = at.squares if measures else at.squares[:0]
+        curvature = at.curvature - at.squared if len(squares) else at.curvature
         numbers = np.array(
             [self.scale, LEAST_CURVATURE, PROXIMAL_SHARE, radius, 0.0 if pull is None else pull, damping, LEVER]
             + [BOX * radius, ERROR_CLAMP * radius, gain]
@@ -212,16 +221,20 @@ class Subproblem:
         columns = np.empty((4, len(at.gradient)))
         target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
         self._kernel.program(
-            at.gradient, at.curvature, at.lower, at.upper, rows.soft_error, rows.soft_weight,
+            at.gradient, curvature, at.lower, at.upper, rows.soft_error, rows.soft_weight,
             rows.goals, rows.elastic_violation, shift,
             measures, pull is not None, numbers, columns, target, least,
         )  # fmt: skip
+        soft, weight = rows.soft, rows.soft_weight
+        if len(squares):
+            soft, target = np.vstack([soft, squares]), np.concatenate([target, np.zeros(len(squares))])
+            weight = np.concatenate([weight, np.full(len(squares), self.scale / gain)])
         return QuadraticProgram(
             diagonal=columns[0],
             linear=columns[1],
-            rows=rows.soft,
+            rows=soft,
             target=target,
-            weight=rows.soft_weight,
+            weight=weight,
             elastic=rows.elastic,
             least=least,
             elastic_weight=np.full(len(least), ELASTIC_WEIGHT),
