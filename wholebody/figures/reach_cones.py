@@ -8,7 +8,7 @@ one wedge contains a direction L: ``S_i . L >= 0 > S_{i+1} . L`` with ``S_i = V 
 
 from __future__ import annotations
 
-from math import atan2, sqrt
+from math import atan2, inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 
 PARALLEL = 1e-12  # shorter than this a projection onto the plane of an edge has no direction
+SHORTEST = 1e-9  # a vector shorter than this has no direction
 TOUCHING = 1e-9  # rad: a direction nearer to an edge than this is on it
 
 
@@ -81,6 +82,10 @@ class ReachCone:
         Returns:
             (angle, gradient): float and (3,), or (n,) and (n, 3).
         """
+        if type(direction) is np.ndarray and direction.shape == (3,):
+            length = sqrt(direction @ direction)
+            if SHORTEST <= length < inf:
+                return self._signed_angle_of_one(direction / length)
         one, rows = _rows(direction)
         if one:
             return self._signed_angle_of_one(rows[0])
@@ -166,6 +171,6 @@ def _rows(direction: Any) -> tuple[bool, Array]:
 def _unit(vectors: Any, what: str) -> Array:
     vectors = np.asarray(vectors, dtype=float)
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
-    if not np.isfinite(length).all() or (length < 1e-9).any():
+    if not np.isfinite(length).all() or (length < SHORTEST).any():
         raise InputError(f"a {what} is zero or not finite; give directions other than zero")
     return np.asarray(vectors / length)
