@@ -101,5 +101,6 @@ def test_what_fell_short_is_said() -> None:
     assert "p95 1.200 [1.000, 1.000] of placo's (at most 0.1: missed)" in line
     assert "1.5 mm short of the clearance (at most 0.001: missed)" in line
     assert "acceleration 1.00 rad/s² (at most 1: reached)" in line
+    assert not goal_lines([step_row(tool="wholebody/piqp", reach="free", ratio=0.5)])
     alone = step_row(tool="wholebody", reach="alone", ratio=math.nan, ratio_p95=math.nan)
     assert "nothing to compare with" in goal_lines([alone])[0]
