@@ -106,10 +106,10 @@ def _loop_type() -> Any:
     numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
     number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
     """
-    from numba.core import types
     from numba.core.caching import FunctionCache
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
+    from numba.core.types.misc import unliteral
 
     class Kept(FunctionCache):  # type: ignore[misc]
         def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -121,8 +121,8 @@ def _loop_type() -> Any:
             self._cache = Kept(self.py_func)
 
         def get_call_template(self, args: Any, kws: Any) -> Any:
-            args = tuple(types.unliteral(kind) for kind in args)
-            return super().get_call_template(args, {name: types.unliteral(kind) for name, kind in kws.items()})
+            args = tuple(unliteral(kind) for kind in args)
+            return super().get_call_template(args, {name: unliteral(kind) for name, kind in kws.items()})
 
     return Loop
 
