@@ -22,6 +22,13 @@ def twice(x):
 @compiled()
 def of_another(x):
     return twice(x) + 1.0
+
+@compiled()
+def of_constants(x):
+    return twice(2) + twice(3) + x
+
+def compiled_kernel():
+    of_constants(1.0)
 """
 USE = """
 import logging, sys
@@ -57,7 +64,7 @@ def test_the_first_compilation_is_told_once_and_kept_until_the_loop_changes(run,
     kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
     assert run(**kept) == (
         ["3.0", "4.0", "True", "True"],
-        ["compiling the inner loops: a minute or two, once on a machine"],
+        ["compiling the inner loops: about a minute, once on a machine"],
     )
     # Read back without what numba needs to compile; where this fails, look how numba keeps things now (`_loop_type`).
     others = "print(loop_of_a_test.twice(1j), loop_of_a_test.of_another(2.0))"
@@ -84,6 +91,30 @@ def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
         answers, told = run(NUMBA_CACHE_DIR=nowhere, HOME=nowhere, XDG_CACHE_HOME=nowhere)
         assert answers == ["3.0", "4.0", "True", "True"]
         assert len(told) == 1
+
+
+IN_PROCESSES = """
+import sys
+from wholebody import compiled
+
+if __name__ == "__main__":
+    names = ("wholebody.loop_of_a_test", "wholebody.loop_of_another_test")
+    compiled.compile_in_processes(int(sys.argv[1]), [(name,) for name in names])
+    print(compiled.compile_seconds() > 0.0)
+"""
+
+
+def test_processes_compile_beside_each_other_and_constants_are_numbers(run: object, tmp_path: Path) -> None:
+    """What two processes compiled one reads back, and `twice` of 2 and of 3 is one loop."""
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(LOOP)
+    path = tmp_path / "asks.py"
+    path.write_text(IN_PROCESSES)
+    for processes in (2, 1):
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+        command = [sys.executable, str(path), str(processes)]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
+        assert done.stdout.split() == ["False"]
+        assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
 
 
 def test_all_loops_are_compiled_by_one_call() -> None:

@@ -8,6 +8,7 @@ import pytest
 
 import wholebody as wb
 from tests.reference.linearisation import ReferenceLineariser
+from wholebody.linearisation import ConstraintValues
 from wholebody.tasks.base import Goal, Measure
 from wholebody.term_plan import make_plan
 
@@ -83,6 +84,16 @@ def test_goals_constraints_and_measures(problem, seed):
         assert at.gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-5)
 
 
+def test_values_of_some_constraints_are_their_own(problem):
+    state = problem.workspace().state
+    values = ConstraintValues(problem.constraints, state)
+    for seed in range(5):
+        state.update(posture(problem, seed))
+        expected = [np.atleast_1d(constraint.value(state)) for constraint in problem.constraints]
+        assert values.at(state) == pytest.approx(np.concatenate(expected), abs=1e-12)
+    assert ConstraintValues([], state).at(state).shape == (0,)
+
+
 def test_gaps_of_the_contacts(problem):
     """The first rows are the distances; pairs whose nearest places jump within the step are left out."""
     lineariser, step = problem.lineariser(problem.workspace()), 1e-5
@@ -125,8 +136,10 @@ def test_bounds_are_limits_frozen_joints_and_speed(problem):
     assert np.array_equal(free.lower[others], lower[others])
     assert np.array_equal(free.upper[others], upper[others])
     timed = problem.lineariser(problem.workspace(), 0.01).at(q, 0.1)
-    assert np.array_equal(timed.upper[others], np.minimum(upper[others], 0.02))
-    assert np.array_equal(timed.lower[others], np.maximum(lower[others], -0.02))
+    share = 1.0 - np.exp(-0.01 / 0.05)  # joints brake before their limits
+    assert np.allclose(timed.upper[others], np.minimum(share * upper[others], 0.02), atol=1e-15)
+    assert np.allclose(timed.lower[others], np.maximum(share * lower[others], -0.02), atol=1e-15)
+    assert not np.array_equal(timed.upper[others], np.minimum(upper[others], 0.02))
 
 
 def test_a_problem_without_anything():

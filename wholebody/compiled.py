@@ -1,36 +1,46 @@
 """Compilation by numba: compiled code is cached, the first compilation is logged, and its time is counted.
 
-``python -m wholebody.compiled`` compiles all loops, so that no solve has to.
+``python -m wholebody.compiled`` compiles all loops, on as many cores as there are, so that no solve has to.
 """
 
 from __future__ import annotations
 
 import logging
+import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
 from typing import Any, TypeVar
 
-LOOPS = (
-    "wholebody.dynamics.loops",
-    "wholebody.geometry.contact_rows",
-    "wholebody.geometry.continuous.moved_pairs",
-    "wholebody.geometry.continuous.swept_depth",
-    "wholebody.geometry.proximity",
-    "wholebody.linearisation",
-    "wholebody.methods.ccd.limbs",
-    "wholebody.methods.newton.linear_algebra.normal_equations",
-    "wholebody.methods.qp.active_set",
-    "wholebody.methods.qp.curved_reach",
-    "wholebody.methods.qp.solvers.osqp_solver",
-    "wholebody.methods.qp.solvers.split_form",
-    "wholebody.methods.qp.step_program",
-    "wholebody.methods.qp.subproblem",
-    "wholebody.methods.qp.turning",
+TOGETHER = (
+    ("wholebody.dynamics.loops",),
+    (
+        "wholebody.methods.qp.active_set",
+        "wholebody.methods.qp.step_program",
+        "wholebody.methods.qp.subproblem",
+        "wholebody.methods.qp.curved_reach",
+        "wholebody.methods.qp.turning",
+        "wholebody.methods.qp.solvers.osqp_solver",
+        "wholebody.methods.qp.solvers.split_form",
+    ),
+    ("wholebody.linearisation",),
+    (
+        "wholebody.geometry.contact_rows",
+        "wholebody.geometry.proximity",
+        "wholebody.geometry.continuous.moved_pairs",
+        "wholebody.geometry.continuous.swept_depth",
+        "wholebody.methods.ccd.limbs",
+        "wholebody.methods.newton.linear_algebra.normal_equations",
+    ),
 )
-"""Modules with compiled loops; each has a function `compiled_kernel`, which compiles or loads them."""
+"""Modules with compiled loops, in groups that call no loops of each other, those first that take longest to compile.
+
+Each module has a function `compiled_kernel`, which compiles or loads its loops.
+"""
+
+LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -50,7 +60,8 @@ def compiled(**options: Any) -> Callable[[F], F]:
     _watch()
 
     def decorate(function: F) -> F:
-        loop: F = loop_type(function, targetoptions={"nopython": True, "boundscheck": None, **options})
+        target = {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options}
+        loop: F = loop_type(function, targetoptions=target)
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
         return loop
@@ -58,10 +69,27 @@ def compiled(**options: Any) -> Callable[[F], F]:
     return decorate
 
 
-def compile_all() -> None:
-    """Compile all loops, or load them from the cache."""
-    for name in LOOPS:
+def compile_all(names: Sequence[str] = LOOPS) -> None:
+    """Compile all loops of these modules, or load them from the cache."""
+    for name in names:
         import_module(name).compiled_kernel()
+
+
+def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGETHER) -> None:
+    """Compile groups of modules in processes beside each other, as far as they are not in the cache, and load them.
+
+    A process that ends early, for want of memory say, leaves its loops to this one.
+    """
+    if processes > 1:
+        from concurrent.futures import ProcessPoolExecutor
+        from concurrent.futures.process import BrokenProcessPool
+        from multiprocessing import get_context
+
+        logging.getLogger(__name__).info("compiling the inner loops in %d processes, unless they are kept", processes)
+        with suppress(BrokenProcessPool), ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+            list(pool.map(compile_all, groups))
+    for names in groups:
+        compile_all(names)
 
 
 def compile_seconds() -> float:
@@ -74,10 +102,14 @@ def _loop_type() -> Any:
     """A compiled function of numba, read back from what is kept without all that compiling needs.
 
     numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
+
+    numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
+    number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
     """
     from numba.core.caching import FunctionCache
     from numba.core.registry import CPUDispatcher
     from numba.core.runtime import rtsys
+    from numba.core.types.misc import unliteral
 
     class Kept(FunctionCache):  # type: ignore[misc]
         def load_overload(self, sig: Any, target_context: Any) -> Any:
@@ -87,6 +119,10 @@ def _loop_type() -> Any:
     class Loop(CPUDispatcher):  # type: ignore[misc]
         def enable_caching(self) -> None:
             self._cache = Kept(self.py_func)
+
+        def get_call_template(self, args: Any, kws: Any) -> Any:
+            args = tuple(unliteral(kind) for kind in args)
+            return super().get_call_template(args, {name: unliteral(kind) for name, kind in kws.items()})
 
     return Loop
 
@@ -105,7 +141,7 @@ def _watch() -> None:
             _compiling["depth"] += 1
             if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
                 self.told = True
-                logging.getLogger(__name__).info("compiling the inner loops: a minute or two, once on a machine")
+                logging.getLogger(__name__).info("compiling the inner loops: about a minute, once on a machine")
 
         def on_end(self, event: Any) -> None:
             _compiling["depth"] -= 1
@@ -117,4 +153,5 @@ def _watch() -> None:
 
 if __name__ == "__main__":
     logging.basicConfig(level=logging.INFO, format="%(message)s")
-    compile_all()
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    compile_in_processes(min(cores, len(TOGETHER)))

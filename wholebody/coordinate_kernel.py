@@ -124,7 +124,8 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
     at, target, error, slope = np.zeros((1, 3), dtype=np.int64), np.empty((1, 12)), np.zeros(6), np.zeros((6, 6))
     last = measure.shape[1] - 1
     for e in range(len(tables)):
-        target[0] = tables[e, :12]
+        for k in range(12):
+            target[0, k] = tables[e, k]
         roots(target, at, q, error, slope)
         for i in range(6):
             force = tables[e, 12 + i] * error[i]

@@ -77,6 +77,10 @@ _NO_CONTACTS = Contacts(
 )  # fmt: skip
 
 
+_NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
+_NO_WRENCHES, _NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
+
+
 class Passing(NamedTuple):
     """A linearisation in as few arrays as can be; `Linearisation` says what they mean.
 
@@ -309,17 +313,40 @@ class Lineariser:
             measure[1, :-1] += term.weight * term.curvature(state)
 
 
+class ConstraintValues:
+    """Values of some constraints, and of nothing else, at any state of one model."""
+
+    def __init__(self, constraints: Sequence[Constraint], state: State) -> None:
+        """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
+        self._kernel = compiled_kernel()
+        self._plan = plan = make_plan(_NO_LIMITS, (), constraints, (), (), None, state)
+        rows, nv = plan.value_rows, state.model.nv
+        self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
+        self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
+
+    def at(self, state: State) -> Array:
+        """The values (c,) where a state is; overwritten by the next call."""
+        plan, value = self._plan, self._value
+        self._kernel.linearise(
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            _NO_WRENCHES, _NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
+        )  # fmt: skip
+        for _, evaluate, row, rows in plan.others:
+            value[row : row + rows] = evaluate(state)
+        return value
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody import term_kernel
 
     state = State(pin.buildSampleModelManipulator())
-    plan = make_plan(Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))), (), (), (), (), None, state)
+    plan = make_plan(_NO_LIMITS, (), (), (), (), None, state)
     nv = state.model.nv
     term_kernel.linearise(
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-        np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp), 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
+        _NO_WRENCHES, _NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
         np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
     )  # fmt: skip
     return term_kernel

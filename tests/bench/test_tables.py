@@ -91,13 +91,16 @@ def step_row(**changes: object) -> StepRow:
 
 def test_what_fell_short_is_said() -> None:
     rows = [
-        step_row(tool="wholebody", reach="contact", ratio=0.4, ratio_p95=1.2, least_mm=8.5),
+        step_row(
+            tool="wholebody", reach="contact", ratio=0.4, ratio_low=0.39, ratio_high=0.42, ratio_p95=1.2, least_mm=8.5
+        ),
         step_row(tool="placo", reach="contact"),
     ]
     (line,) = goal_lines(rows)
-    assert "median 0.400 of placo's (at most 0.08: missed)" in line
-    assert "p95 1.200 of placo's (at most 0.1: missed)" in line
+    assert "median 0.400 [0.390, 0.420] of placo's (at most 0.08: missed)" in line
+    assert "p95 1.200 [1.000, 1.000] of placo's (at most 0.1: missed)" in line
     assert "1.5 mm short of the clearance (at most 0.001: missed)" in line
     assert "acceleration 1.00 rad/s² (at most 1: reached)" in line
+    assert not goal_lines([step_row(tool="wholebody/piqp", reach="free", ratio=0.5)])
     alone = step_row(tool="wholebody", reach="alone", ratio=math.nan, ratio_p95=math.nan)
     assert "nothing to compare with" in goal_lines([alone])[0]

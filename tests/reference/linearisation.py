@@ -11,6 +11,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.linearisation import Linearisation, Lineariser
+from wholebody.tasks import StepLimit
 from wholebody.tasks.base import Constraint, Goal
 
 
@@ -97,6 +98,12 @@ class ReferenceLineariser(Lineariser):
         lower, upper = np.full(nv, -np.inf), np.full(nv, np.inf)
         limits = self._limits
         lower[limits.idx_v], upper[limits.idx_v] = limits.lower - q[limits.idx_q], limits.upper - q[limits.idx_q]
+        for bound in self.bounds:
+            if isinstance(bound, StepLimit) and self.dt is not None:  # brakes before limits, and not on the way back
+                bounded = np.isfinite(bound.bounds(self.state, self.dt)[1])
+                share = -np.expm1(-self.dt / 0.05)
+                lower[bounded & (lower < 0.0)] *= share
+                upper[bounded & (upper > 0.0)] *= share
         return lower, upper
 
     def _box(self, state: State) -> tuple[Array, Array]:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from wholebody import InputError, UnknownNameError
+from wholebody import QP, InputError, Posture, Problem, Scene, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.tasks import Freeze, StepLimit
 
@@ -43,6 +43,23 @@ def test_without_time_or_velocity_nothing_is_bounded(humanoid: Any) -> None:
         assert np.isneginf(lower).all()
         assert np.isposinf(upper).all()
     assert np.isposinf(StepLimit(2.0).resolve(humanoid, humanoid.figure.neutral).bounds(state, 0.1)[1][:6]).all()
+
+
+@pytest.mark.parametrize(("named", "share"), [("turn1", np.exp(-0.02 / 0.05)), ("turn0", 0.0)])
+def test_only_joints_of_bounded_velocity_brake_before_their_limits(named: str, share: float, planar_arm: Any) -> None:
+    """A joint is asked to its limit: no step leaves less of the way than e^(-dt / 0.05 s), and it ends there."""
+    scene = Scene(planar_arm((0.5, 0.4)))
+    limit = float(scene.figure.limits.upper[1])
+    start = np.array([0.0, limit - 0.02])
+    goal = Posture(np.array([0.0, limit]))
+    tracker = QP().tracker(Problem(scene, start, goals=[goal], constraints=[StepLimit(joints={named: 3.0})]), 0.02)
+    left, q = [0.02], start
+    for _ in range(30):
+        q = tracker.step(q).q
+        left.append(limit - q[1])
+        assert left[-1] > share * left[-2] - 1e-12
+    assert left[1] == pytest.approx(share * left[0], abs=1e-5)
+    assert 0.0 <= left[-1] < 1e-6
 
 
 def test_mistakes_are_named(humanoid: Any) -> None:

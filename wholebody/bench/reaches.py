@@ -17,6 +17,8 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.adapters import adapters
+from wholebody.bench.compare import statistics
+from wholebody.bench.compare.statistics import Interval
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
@@ -111,7 +113,16 @@ def run(seeds: range, method: str, jobs: int = 1) -> Iterator[ReachRow]:
 
 def reaches_report(rows: Sequence[ReachRow], facts: Mapping[str, str], jobs: int) -> str:
     """Table of the random reaches, and what was not solved."""
-    return render("reaches.md", rows=rows, facts=facts, jobs=jobs, things=THINGS, clearance=CLEARANCE)
+
+    def share(mine: Sequence[ReachRow]) -> Interval:
+        return statistics.share([row.status == "solved" for row in mine])
+
+    def time(mine: Sequence[ReachRow], part: float) -> Interval:
+        return statistics.quantile([row.milliseconds for row in mine], part)
+
+    return render(
+        "reaches.md", rows=rows, facts=facts, jobs=jobs, things=THINGS, clearance=CLEARANCE, share=share, time=time
+    )
 
 
 def reach_times(rows: Sequence[ReachRow], path: Path) -> tuple[Path, Path]:

@@ -19,6 +19,7 @@ from wholebody.bench import track as setting
 from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
+from wholebody.bench.compare.statistics import BLOCK, NOTHING, quantile_ratio
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
@@ -29,6 +30,9 @@ GREY = "#666666"
 THICK = "wholebody"  # drawn wide and first: with other solvers the same programs have the same answers, and hide it
 JUDGED = ("free", "contact")  # reaches whose result is judged, beside their time
 HOT = ("wholebody", "wholebody/active_set")  # tools that begin from the last active set
+NOT_ASKED = (np.inf, np.inf)
+ASKED = {**dict.fromkeys(HOT, (0.08, 0.10)), "wholebody/osqp": (0.35, 1.0)}
+"""Shares of the reference's median and p95 that steps should take at most; of other solvers nothing is asked."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,8 @@ class StepRow:
         setup_ms: to set the tool up and make its first step, which is not among the others; median.
         median_us, p95_us, cpu_median_us, cpu_p95_us: of all steps, by the clock and by the processor's time.
         ratio, ratio_p95, cpu_ratio_p95: of median_us, p95_us and cpu_p95_us to the reference's in the same repeat,
-            median of the repeats; nan without the reference.
+            median of the repeats; nan without the reference. Each has its interval of 95 %, from `low` to `high`; see
+            `statistics.quantile_ratio`.
         least_mm: least distance of any pair after any step.
         penetrating: steps after which some pair overlapped.
         final_error_mm, mean_error_mm: distance of the fingertip from its target.
@@ -65,8 +70,14 @@ class StepRow:
     cpu_median_us: float
     cpu_p95_us: float
     ratio: float
+    ratio_low: float
+    ratio_high: float
     ratio_p95: float
+    ratio_p95_low: float
+    ratio_p95_high: float
     cpu_ratio_p95: float
+    cpu_ratio_p95_low: float
+    cpu_ratio_p95_high: float
     least_mm: float
     penetrating: int
     final_error_mm: float
@@ -188,9 +199,9 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         p95_us=float(np.quantile(wall, 0.95)),
         cpu_median_us=float(np.median(cpu)),
         cpu_p95_us=float(np.quantile(cpu, 0.95)),
-        ratio=_ratio(mine, reference, "wall", 0.5),
-        ratio_p95=_ratio(mine, reference, "wall", 0.95),
-        cpu_ratio_p95=_ratio(mine, reference, "cpu", 0.95),
+        **_ratio("ratio", mine, reference, "wall", 0.5),
+        **_ratio("ratio_p95", mine, reference, "wall", 0.95),
+        **_ratio("cpu_ratio_p95", mine, reference, "cpu", 0.95),
         least_mm=1e3 * float(verdict.least_distance.min()),
         penetrating=int((verdict.least_distance < 0.0).sum()),
         final_error_mm=1e3 * float(verdict.error[-1]),
@@ -205,29 +216,28 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
     )
 
 
-def _ratio(mine: list[_Run], reference: list[_Run] | None, clock: str, share: float) -> float:
-    """Quantile of a clock over that of the reference in the same repeat, median of the repeats."""
-    if reference is None:
-        return float("nan")
-    pairs = zip(mine, reference, strict=True)
-    return float(
-        np.median([np.quantile(getattr(a, clock), share) / np.quantile(getattr(b, clock), share) for a, b in pairs])
-    )
+def _ratio(name: str, mine: list[_Run], reference: list[_Run] | None, clock: str, share: float) -> dict[str, float]:
+    """Quantile of a clock over that of the reference in the same repeat, and its interval, as fields of a row."""
+    found = NOTHING
+    if reference is not None:
+        one, other = (np.array([getattr(run, clock) for run in runs]) for runs in (mine, reference))
+        found = quantile_ratio(one, other, share)
+    return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
 
 
 def goal_lines(rows: Sequence[StepRow]) -> list[str]:
-    """What was to be reached and what was: one line for each of our solvers on each reach."""
+    """What was to be reached and what was: a line for each of our solvers that something is asked of, on each reach."""
     lines = []
     for row in rows:
         if not row.tool.startswith("wholebody"):
             continue
         hot = row.tool in HOT
-        median, p95 = (0.08, 0.10) if hot else (0.35, 1.0)
+        median, p95 = ASKED.get(row.tool, NOT_ASKED)
         if row.reach not in JUDGED:
-            median, p95 = (0.25, np.inf) if hot else (np.inf, np.inf)
+            median, p95 = (0.25, np.inf) if hot else NOT_ASKED
         asked = [
-            (f"median {row.ratio:.3f} of {REFERENCE}'s", row.ratio, median),
-            (f"p95 {row.ratio_p95:.3f} of {REFERENCE}'s", row.ratio_p95, p95),
+            (f"median {_span(row, 'ratio')} of {REFERENCE}'s", row.ratio, median),
+            (f"p95 {_span(row, 'ratio_p95')} of {REFERENCE}'s", row.ratio_p95, p95),
         ]
         if hot and row.reach in JUDGED:
             others = [other for other in rows if other.reach == row.reach and not other.tool.startswith("wholebody")]
@@ -247,6 +257,11 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
         if parts or hot:
             lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
     return lines
+
+
+def _span(row: StepRow, name: str) -> str:
+    value, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low", "_high"))
+    return f"{value:.3f} [{low:.3f}, {high:.3f}]"
 
 
 def step_report(
@@ -270,7 +285,7 @@ def step_report(
     goals = goal_lines(rows) if refusals is None else []
     return render(
         "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goals, track=setting,
-        refusals=refusals, person=person,
+        refusals=refusals, person=person, block=BLOCK,
     )  # fmt: skip
 
 

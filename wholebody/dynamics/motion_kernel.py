@@ -105,10 +105,17 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
             for k in range(3):
                 turn[k] = 0.5 * change / square * pull[k]
             _turned(turn, now, middle)
-            now[:] = middle
+            _write(middle, now)
             _spin(now, inverse, momentum, spin)
         _orthonormal(now)
-        rotation[:] = now
+        _write(now, rotation)
+
+
+@compiled()
+def _write(rotation: Array, result: Array) -> None:
+    for i in range(3):
+        for j in range(3):
+            result[i, j] = rotation[i, j]
 
 
 @compiled()
@@ -156,7 +163,7 @@ def drift(
         gravity: (3,) m/s2.
         time: seconds.
     """
-    now = np.empty((3, 3))
+    now, turn = np.empty((3, 3)), np.empty(3)
     for b in range(len(position)):
         if not moving[b] and not given[b]:
             continue
@@ -166,8 +173,10 @@ def drift(
         if moving[b]:
             turn_freely(rotation[b], inertia[b], inverse[b], twist[b, 3:], time)
         else:
-            _turned(time * twist[b, 3:], rotation[b], now)
-            rotation[b] = now
+            for k in range(3):
+                turn[k] = time * twist[b, 3 + k]
+            _turned(turn, rotation[b], now)
+            _write(now, rotation[b])
 
 
 @compiled()
@@ -179,7 +188,7 @@ def displace(position: Array, rotation: Array, way: Array, moving: Mask) -> None
             for k in range(3):
                 position[b, k] += way[b, k]
             _turned(way[b, 3:], rotation[b], now)
-            rotation[b] = now
+            _write(now, rotation[b])
 
 
 @compiled()

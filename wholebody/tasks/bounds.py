@@ -15,6 +15,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Bound, Surroundings, filled
 
 SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: least and greatest velocity limit
+BRAKING = 0.05  # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
 
 
 class Freeze(Bound):
@@ -55,6 +56,9 @@ class Freeze(Bound):
 @dataclass(frozen=True, eq=False)
 class StepLimit(Bound):
     """Bound the displacement of a step by velocity times dt. It does not bound a solve without a time step.
+
+    A joint whose velocity is bounded brakes before its limits too: a step of dt goes at most the share
+    1 - exp(-dt / 0.05 s) of the way that is left to them.
 
     Attributes:
         velocity: limit of the joints [rad/s; m/s for prismatic joints].
@@ -102,6 +106,11 @@ class StepLimit(Bound):
         """Plus and minus velocity times dt; no bounds if dt is None."""
         reach = np.full_like(self._velocity, np.inf) if dt is None else self._velocity * dt
         return -reach, reach
+
+    def braking(self, dt: float | None) -> Array:
+        """(nv,) largest share of the way to its limit that each freedom goes in a step of dt seconds."""
+        share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / BRAKING))
+        return np.where(np.isfinite(self._velocity), share, 1.0)
 
 
 def _speed(value: object, where: str) -> float:

@@ -15,7 +15,7 @@ from tests.bench.following import followed
 from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
-from wholebody.bench.track import Track, judge
+from wholebody.bench.track import CLEARANCE, Track, judge, track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 LIMIT = {"pink": 1e-4}
@@ -70,6 +70,16 @@ def test_our_step_keeps_the_speed_of_the_root_too(name: str, short_contact: Trac
     verdict = judge(replace(short_contact, targets=short_contact.targets[:12]), np.array(postures))
     assert verdict.fastest_root <= 1.0 + 1e-9
     assert 0.0 <= tool.remarks()["exact"] <= 1.0
+
+
+@pytest.mark.parametrize(("name", "most"), [("free", 0.26), ("contact", 0.6)])
+def test_our_steps_jolt_joints_no_more_than_the_best_peers(name: str, most: float) -> None:
+    """In rad/s^2; pink has 0.255 and 0.594, and ours had 0.29 and 0.62 before joints braked before their limits."""
+    _, verdict = followed("wholebody", track(name, 200))
+    assert verdict.acceleration < most
+    assert verdict.foot_drift < 2e-6
+    assert verdict.error[-1] < 1e-6
+    assert verdict.least_distance.min() > 0.9999 * CLEARANCE
 
 
 def test_unknown_and_missing_tools_are_named() -> None:

@@ -63,6 +63,24 @@ def test_the_bootstrap_is_scipys_up_to_its_own_chance() -> None:
         assert (found.low, found.high) == pytest.approx((expected.low, expected.high), abs=0.1 * width)
 
 
+def test_nine_in_ten_intervals_of_a_quantiles_ratio_hold_the_truth() -> None:
+    """Steps are slow or quick in runs of seven, alike in all repeats and for both tools; the ratio is 0.25."""
+    rng, held = np.random.default_rng(3), {0.5: 0, 0.95: 0}
+    for _ in range(60):
+        course = np.repeat(np.exp(rng.normal(0.0, 0.5, 30)), 7)
+        one, other = (course * scale * np.exp(rng.normal(0.0, 0.2, (5, 210))) for scale in (0.25, 1.0))
+        for part in held:
+            found = statistics.quantile_ratio(one, other, part)
+            assert found.low <= found.value <= found.high
+            held[part] += found.low <= 0.25 <= found.high
+    assert min(held.values()) >= 54
+
+
+def test_both_tools_of_a_quantiles_ratio_have_the_same_draws() -> None:
+    times = np.random.default_rng(4).exponential(size=(3, 50))
+    assert statistics.quantile_ratio(0.5 * times, times, 0.95)[:3] == pytest.approx((0.5, 0.5, 0.5))
+
+
 def test_the_interval_of_a_ratio_is_students_where_logarithms_are_normal() -> None:
     logs = np.random.default_rng(7).normal(0.3, 0.5, 80)
     ones = {("a", k): 1.0 for k in range(80)}

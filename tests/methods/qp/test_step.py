@@ -206,11 +206,10 @@ def test_a_tracker_is_kept_from_step_to_step(planar_arm):
     closed = []
     for _ in range(10):
         step = tracker.step(q)
-        closed.append(step.by)
-        assert sum(step.programs.values()) >= 1
+        closed.append(set(step.programs))
         q = step.q
-    assert closed[0] == "osqp"
-    assert "active set" in closed[1:]
+    assert "osqp" in closed[0]
+    assert {"active set"} in closed[1:]
 
 
 def test_moved_objects_count_in_the_next_step(free_bodies, least_distance):

@@ -1,7 +1,8 @@
 """Intervals and tests that a comparison rests on. Every interval is of 95 %.
 
 Shares have Wilson's interval (1927, "Probable inference, the law of succession, and statistical inference"); medians
-and ratios the bootstrap's percentiles (Efron 1979), problems drawn with replacement, and ratios paired by problem.
+and ratios the bootstrap's percentiles (Efron 1979), problems drawn with replacement, and ratios paired by problem or by
+step.
 Rankings are Friedman's (1937), with Nemenyi's critical difference (Demsar 2006, "Statistical comparisons of
 classifiers over multiple data sets").
 """
@@ -22,6 +23,7 @@ RESAMPLES = 2000  # of a bootstrap: the ends of its intervals then vary by about
 LEVEL = 0.95
 SEED = 0  # of the bootstrap: the same figures have the same interval
 SHIFT = 1e-3  # s: added to times before their geometric mean, so that the shortest do not rule it
+BLOCK = 10  # steps that are drawn together: as many as slow steps follow each other
 LEAST = 5  # problems below which nothing is said of a ratio
 
 
@@ -66,11 +68,16 @@ def share(flags: Sequence[bool]) -> Interval:
 
 def median(values: Sequence[float]) -> Interval:
     """Median of values, infinite ones too, with its interval."""
+    return quantile(values, 0.5)
+
+
+def quantile(values: Sequence[float], part: float) -> Interval:
+    """A quantile of values, infinite ones too, with its interval."""
     known = np.asarray(values, dtype=float)
     if not len(known):
         return NOTHING
-    drawn = _quantile(known[_draws(len(known))], 0.5)
-    return Interval(float(_quantile(known[None], 0.5)[0]), *_ends(drawn), len(known))
+    drawn = _quantile(known[_draws(len(known))], part)
+    return Interval(float(_quantile(known[None], part)[0]), *_ends(drawn), len(known))
 
 
 def shifted_geometric_mean(values: Sequence[float], shift: float = SHIFT) -> Interval:
@@ -93,6 +100,31 @@ def ratio(one: Mapping[tuple[str, int], float], other: Mapping[tuple[str, int], 
         return with_values(NOTHING, low=0.0, cases=len(logs))
     drawn = np.exp(logs[_draws(len(logs))].mean(axis=1))
     return Interval(exp(float(logs.mean())), *_ends(drawn), len(logs))
+
+
+def quantile_ratio(one: Array, other: Array, part: float) -> Interval:
+    """A quantile of one tool's steps over that of another's in the same run: the median of the runs.
+
+    Runs are drawn with replacement, and steps in blocks, since neighbours are alike: the circular block bootstrap
+    (Politis & Romano 1992). Both tools have the same draws.
+
+    Args:
+        one: (runs, steps) times.
+        other: (runs, steps) times of the same steps, in runs beside these.
+        part: of the quantile.
+    """
+    runs, steps = one.shape
+    random, block = np.random.default_rng(SEED), min(BLOCK, steps)
+    chosen = random.integers(0, runs, (RESAMPLES, runs, 1))
+    begins = random.integers(0, steps, (RESAMPLES, 1, -(-steps // block), 1))
+    places = ((begins + np.arange(block)) % steps).reshape(RESAMPLES, 1, -1)[:, :, :steps]
+    drawn = _run_ratio(one[chosen, places], other[chosen, places], part)
+    return Interval(float(_run_ratio(one, other, part)), *_ends(drawn), runs * steps)
+
+
+def _run_ratio(one: Array, other: Array, part: float) -> Array:
+    """Median over the runs of what a quantile is to the other's (..., runs, steps)."""
+    return np.asarray(np.median(np.quantile(one, part, axis=-1) / np.quantile(other, part, axis=-1), axis=-1))
 
 
 def _draws(count: int) -> NDArray[np.int64]:

@@ -122,7 +122,8 @@ def lower_bounds(
                 if along > most:
                     face, most = f, along
             if face >= 0 and radius[carrier] == 0.0:
-                normal[:] = faces[face, :3]
+                for i in range(3):
+                    normal[i] = faces[face, i]
                 at0 = _above(carrier, other, normal, faces[face, 3], place0, points, first_point, radius, radii)
                 at1 = _above(carrier, other, normal, faces[face, 3], place1, points, first_point, radius, radii)
                 best = max(best, min(at0, at1) - sag - accuracy)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.linearisation import Passing
+from wholebody.linearisation import ConstraintValues, Passing
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import (
@@ -42,7 +42,7 @@ DAMPING = 2.0
 into a block at four places: accelerations of 0.58 to 0.63 rad/s^2 with 2, and 1 step of 800 short by more than 1e-3
 mm; 0.54 to 0.60 and 3 steps with 2.5; 0.53 to 0.57 and 3 steps with 3. At one of them 0.80 with 1, 0.71 with 1.5."""
 
-SETTLING = 0.5  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = joints swing about the optimum
+SETTLING = 1.0  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = jolts at bounds, then swinging
 RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
 CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
 LITTLE = 0.01  # damping that makes no difference to how a step looks
@@ -101,7 +101,9 @@ class StepProgram:
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
         self._settled, self._curving, self._bend = False, False, 0.0
         self._held = np.flatnonzero(self._subproblem.kind == 0)
-        self._holds, self._among = _holding(problem, state, self._held)
+        holding, self._among = _holding(problem, state, self._held)
+        self._holds = ConstraintValues(holding, state)
+        self._asked = self._subproblem.bound[0, self._held]
         self._there = State(state.model)
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
@@ -223,19 +225,12 @@ class StepProgram:
         Returns:
             Whether that is another curve than the last program ran ahead of.
         """
-        state, before, first = self._there, self._before, len(at.q)
-        state.update(pin.integrate(state.model, at.q, displacement))
-        values = np.concatenate([np.atleast_1d(constraint.value(state)) for constraint in self._holds])
-        error, held = self._soft_values[0], slice(first + self.goals, -2)
-        there = values[self._among] - self._subproblem.bound[0, self._held]
-        curved = there - error[self.goals :] - self._soft_rows[self.goals :] @ displacement
-        known = before[-1] > 0.0 and np.array_equal(before[:first], at.q)
-        foreseen = np.clip(error[self.goals :] - before[held], -CURVED, CURVED) if known else 0.0
-        if not known:  # its goals are asked for as without a step before
-            before[:first], before[-2:] = at.q, (0.0, 1.0)
-            before[first : first + self.goals] = error[: self.goals] + 2.0 * RESTING
-        before[held] = error[self.goals :] - curved
-        return bool(np.abs(np.clip(curved, -CURVED, CURVED) - foreseen).max() > STRAIGHT)
+        state = self._there.update(pin.integrate(self._there.model, at.q, displacement))
+        other: bool = self._kernel.run_ahead(
+            self._holds.at(state)[self._among], self._asked, self._soft_values[0], self._soft_rows, displacement, at.q,
+            self.goals, 2.0 * RESTING, CURVED, STRAIGHT, self._before,
+        )  # fmt: skip
+        return other
 
     def _ends(self) -> Any:
         """See `tracking_kernel.parts`."""
@@ -301,4 +296,6 @@ def compiled_kernel() -> Any:
         np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), index,
         np.zeros(2, dtype=bool), numbers_of(1.0, 1.0), True, False, 0.0,
     )  # fmt: skip
+    ahead = np.zeros((2, 0))
+    tracking_kernel.run_ahead(none, none, ahead[0], np.zeros((0, 1)), none, none, 0, 0.0, 0.0, 0.0, np.zeros(2))
     return tracking_kernel

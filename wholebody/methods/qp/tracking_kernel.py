@@ -181,6 +181,59 @@ def solve(
 
 
 @compiled()
+def run_ahead(
+    there: Array,
+    asked: Array,
+    error: Array,
+    soft: Array,
+    x: Array,
+    q: Array,
+    goals: int,
+    moved: float,
+    most: float,
+    straight: float,
+    before: Array,
+) -> bool:
+    """Write into `before` what makes the next program run ahead of what is held as the displacement x curves it.
+
+    Args:
+        there: (held,) values where the displacement ends.
+        asked: (held,) what they are to be.
+        error: (m,) errors of the soft rows; first those of goals, then of what is held.
+        soft: (m, n) their rows.
+        x: (n,) the displacement.
+        q: (nq,) the posture.
+        goals: how many rows goals have.
+        moved: how much a goal that was not known has moved at least, so that it does not count as one that rests.
+        most: how far it is run ahead at most.
+        straight: see the answer.
+        before: (nq + m + 2,) see `solve`.
+
+    Returns:
+        Whether a row is to run ahead by more than `straight` farther, or less far, than it did.
+    """
+    last = len(q)
+    known = before[-1] > 0.0
+    for i in range(last):
+        known = known and before[i] == q[i]
+    if not known:  # its goals are asked for as without a step before
+        for i in range(last):
+            before[i] = q[i]
+        for r in range(goals):
+            before[last + r] = error[r] + moved
+        before[-2], before[-1] = 0.0, 1.0
+    largest = 0.0
+    for r in range(goals, len(error)):
+        foreseen = min(max(error[r] - before[last + r], -most), most) if known else 0.0
+        curved = there[r - goals] - asked[r - goals] - error[r]
+        for i in range(len(x)):
+            curved -= soft[r, i] * x[i]
+        largest = max(largest, abs(min(max(curved, -most), most) - foreseen))
+        before[last + r] = error[r] - curved
+    return largest > straight
+
+
+@compiled()
 def parts(n: int, m: int, k: int, columns: int) -> Ends:
     """Where the parts of the room end for n variables, m soft and k elastic rows.
 

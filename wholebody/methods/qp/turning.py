@@ -54,7 +54,7 @@ class Turning:
         state, contacts = self._workspace.state, at.contacts
         share: float = self._kernel.bent(
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
-            self._reach, self._point, contacts.placements, contacts.pair, contacts.distance,
+            self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
             at.clearance[: len(unseen)], unseen, displacement, rows.elastic, rows.elastic_violation, rows.contact,
             rows.contacts - len(unseen), self._lengths,
         )  # fmt: skip
@@ -69,8 +69,8 @@ def compiled_kernel() -> Any:
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
     turning_kernel.bent(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
-        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none, none,
-        none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
+        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
+        np.zeros((0, 3)), none, none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
     )  # fmt: skip
     return turning_kernel
 

@@ -20,6 +20,7 @@ def bent(
     placement: Array,
     pair: Indices,
     distance: Array,
+    normal: Array,
     asked: Array,
     unseen: Array,
     step: Array,
@@ -32,7 +33,8 @@ def bent(
     """Largest share of its `unseen` by which a pair that may end too near can be nearer than its rows say; 0 for none.
 
     The distance of a pair is at least that of its points to a plane that moves with one of its pieces. To second order
-    a point leaves its tangent by half of its acceleration at constant joint speeds, as seen from the plane.
+    a point leaves its tangent by half of its acceleration at constant joint speeds, as seen from the plane; only what
+    points at the plane brings it nearer, and what lies along it as far as the plane turns meanwhile.
 
     Args:
         displacement: (n,) spread over the columns.
@@ -45,6 +47,7 @@ def bent(
         placement: (pieces, 4, 3) see `Contacts.placements`.
         pair: (k, 2) pieces of the contacts.
         distance: (k,) of the contacts.
+        normal: (k, 3) from the first piece of each to the second.
         asked: (k,) clearances.
         unseen: (k,) by which each may end nearer than its rows say.
         step: (nv,) the displacement.
@@ -91,8 +94,9 @@ def bent(
             if round_piece and not point[p]:
                 continue
             gone, bend = _seen_from(
-                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier], vectors
-            )
+                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier],
+                normal[c], 1.0 - 2.0 * side, lengths[3], vectors,
+            )  # fmt: skip
             if bend < nearer:
                 nearer, way = bend, gone
         nearer += lengths[3] * way
@@ -107,15 +111,26 @@ def bent(
 
 @compiled()
 def _seen_from(
-    place: Array, reach: float, own: Array, own_change: Array, carrier: Array, carrier_change: Array, vectors: Array
+    place: Array,
+    reach: float,
+    own: Array,
+    own_change: Array,
+    carrier: Array,
+    carrier_change: Array,
+    normal: Array,
+    sign: float,
+    off: float,
+    vectors: Array,
 ) -> tuple[float, float]:
-    """Longest way of the points of a piece as seen from another body, and by how much it can bow.
+    """Longest way of the points of a piece as seen from another body, and by how much it can bow towards it.
 
     `place` (3,) is the piece's and `reach` its points' distance from there; twists (6,) at the world's origin and their
-    changes are those of the piece's body and of the body from which it is seen. `vectors` (5, 3) is room.
+    changes are those of the piece's body and of the body from which it is seen. `normal` (3,) times `sign` points from
+    the piece to that body and may be `off` by so many radians. `vectors` (5, 3) is room.
     """
     speed, bow, spin, own_speed, carrier_speed = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0
+    towards, own_square, carrier_square = 0.0, 0.0, 0.0
     for i in range(3):
         j, k = (i + 1) % 3, (i + 2) % 3
         speed[i] = (
@@ -140,7 +155,12 @@ def _seen_from(
         )  # fmt: skip
         speed_square += speed[i] * speed[i]
         bow_square += bow[i] * bow[i]
+        towards += sign * normal[i] * bow[i]
+        own_square += own[3 + i] * own[3 + i]
+        carrier_square += carrier[3 + i] * carrier[3 + i]
         spin_square += spin[i] * spin[i]
     far = reach if turn_square + spin_square > 0.0 else 0.0
     way = np.sqrt(speed_square) + np.sqrt(turn_square) * far
-    return way, 0.5 * (np.sqrt(bow_square) + (np.sqrt(spin_square) + turn_square) * far)
+    # the bow itself turns with the bodies on the way
+    aside = (off + np.sqrt(own_square) + np.sqrt(carrier_square)) * np.sqrt(bow_square)
+    return way, 0.5 * (max(towards, 0.0) + aside + (np.sqrt(spin_square) + turn_square) * far)
