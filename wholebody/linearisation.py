@@ -323,6 +323,7 @@ class ConstraintValues:
         rows, nv = plan.value_rows, state.model.nv
         self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
         self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
+        self._no_squares = np.zeros((0, nv))
 
     def at(self, state: State) -> Array:
         """The values (c,) where a state is; overwritten by the next call."""
@@ -330,6 +331,7 @@ class ConstraintValues:
         self._kernel.linearise(
             state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
             _NO_WRENCHES, _NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
+            self._no_squares,
         )  # fmt: skip
         for _, evaluate, row, rows in plan.others:
             value[row : row + rows] = evaluate(state)
