@@ -33,6 +33,7 @@ REACHED = 10.0  # tolerances: relaxed probes that end farther from the goals are
 NEARER = 0.02  # share of what is left by which a probe is nearer
 REACH_TRIALS = 10  # most descents without contacts that tell whether goals are out of reach
 REACH_TRIAL_PROGRAMS = 60  # most programs of each
+RESTING_PROGRAMS = 6  # most programs that tell whether a descent was held up by things; more: later where it was
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
@@ -106,7 +107,9 @@ class Search:
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
-        if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
+        if least is None or self._at_rest_out_of_reach(first):
+            return
+        if self._accept(self._feasibility_first(start), "by feasibility first"):
             return
         if self._known_out_of_reach(self.best.q):
             return
@@ -192,12 +195,12 @@ class Search:
         tolerance = self.settings.tolerance
         if self.control.over:
             return
+        if self._out_of_reach:
+            self._come_near()
         if not _held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
             self._leave_from_named_postures()
-        if self._out_of_reach:
-            self._come_near()
-        elif self.best.violation.worst > tolerance:
+        if not self._out_of_reach and self.best.violation.worst > tolerance:
             self._near_best()
         if self.best.violation.left <= tolerance:
             return
@@ -222,6 +225,16 @@ class Search:
         left = self.best.violation.left
         return bool(self._least) and _held(self.best, self.settings.tolerance) and left <= NEAREST * self._least
 
+    def _at_rest_out_of_reach(self, first: LocalSolution) -> bool:
+        """Whether nothing but limits and constraints held the first descent up, and the goals are out of reach.
+
+        Then a few programs in which nothing else is in the way come hardly nearer than it did.
+        """
+        enough = max(first.violation.worst / AGREE, REACHED * self.settings.tolerance)
+        local = self._curved().through_everything(first.q, enough, self._at_most(RESTING_PROGRAMS))
+        self.spent += local.iterations
+        return local.converged and local.violation.worst > enough and self._known_out_of_reach(local.q)
+
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
@@ -244,7 +257,7 @@ class Search:
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance and begin is not q:
                 self._through = [local.q]
-            if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
+            if local.violation.worst <= REACHED * tolerance or self.control.over:
                 return False
             if local.violation.hold > HELD:
                 continue  # from there the constraints alone are too far

@@ -32,6 +32,7 @@ class WorkingSet:
         self.solver = solver
         self._kernel = compiled_kernel()
         self._work, self._places = np.empty(0), np.empty(0, dtype=np.intp)
+        self.held: Mask | None = None
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
@@ -47,11 +48,12 @@ class WorkingSet:
             answer = self._from_the_last(program, key)
             if answer is not None:
                 return answer
+            self.held = None  # correcting the same set once more would end the same
         return self._round_by_round(program, key)
 
     def reset(self) -> None:
         """Drop the guess."""
-        self.held: Mask | None = None
+        self.held = None
         self.pushing = np.zeros(0, dtype=np.intp)
 
     @property
