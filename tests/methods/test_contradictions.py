@@ -195,10 +195,8 @@ def test_a_frozen_joint_that_no_angle_of_the_other_allows():
 
 def test_a_frozen_neck_beyond_its_ellipse(standing):
     """Two of its angles at their limits are more than the neck does, whether the third is free or not."""
-    scene = standing().scene
-    ends = {
-        name: np.degrees(upper_limit(scene, name)) for name in ("neck1_lateral", "neck1_rotation", "neck2_rotation")
-    }
+    scene, names = standing().scene, ("neck1_lateral", "neck1_rotation", "neck2_rotation")
+    ends = {name: np.degrees(upper_limit(scene, name)) for name in names}
     start = bent(scene.figure, **ends)
     for frozen in (("neck",), names):
         texts = [entry.text for entry in found(wb.Problem(scene, start, constraints=[wb.Freeze(*frozen)]))]
