@@ -18,6 +18,7 @@ TOGETHER = (
     ("wholebody.dynamics.loops",),
     (
         "wholebody.methods.qp.active_set",
+        "wholebody.methods.qp.semismooth_newton",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
         "wholebody.methods.qp.curved_reach",

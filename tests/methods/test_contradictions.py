@@ -9,7 +9,9 @@ import pytest
 import wholebody as wb
 from tests.needs import each
 from wholebody.bench.problem_sets.registry import SETS
+from wholebody.figures.state import State
 from wholebody.methods.contradictions import contradictions
+from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
 
 METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
 
@@ -148,6 +150,91 @@ def _facing(normal):
     """A rotation that turns z to a normal (3,)."""
     aside = np.cross(normal, [0.0, 0.0, 1.0])
     return np.column_stack([aside, np.cross(normal, aside), normal])
+
+
+def upper_limit(scene, name, sign=1.0):
+    """Upper limit of a joint of one degree of freedom, radians; with sign -1 the negative of the lower one."""
+    place = scene.model.joints[scene.figure.joint_id(name)].idx_q
+    return float(scene.model.upperPositionLimit[place] if sign > 0.0 else -scene.model.lowerPositionLimit[place])
+
+
+def cone_texts(problem):
+    return [entry.text for entry in found(problem) if "'right_shoulder' is left" in entry.text]
+
+
+def bent(figure, **angles):
+    q = figure.posture("standing")
+    for name, degrees in angles.items():
+        joint = figure.model.joints[figure.joint_id(name)]
+        q[joint.idx_q] = np.radians(degrees)
+    return q
+
+
+def test_a_frozen_leg_that_its_hamstrings_do_not_allow(standing):
+    """Hip - 0.9 knee <= 62 degrees: at 110 degrees of the hip a straight knee is 48 degrees beyond it."""
+    scene = standing().scene
+    start = bent(scene.figure, left_hip_flexion=110.0, left_knee_flexion=0.0)
+    (only,) = found(wb.Problem(scene, start, constraints=[wb.Freeze("left_leg")]))
+    assert only.status == "infeasible"
+    assert "RangeOfMotion (by default), 'left_hamstrings' is left by 48 degrees" in only.text
+    assert "Freeze('left_leg')" in only.text
+    apart = [wb.Freeze("left_hip_flexion"), wb.Freeze("left_knee_flexion")]
+    (only,) = found(wb.Problem(scene, start, constraints=apart))
+    assert "Freeze('left_hip_flexion') and Freeze('left_knee_flexion')" in only.text
+    assert found(wb.Problem(scene, start, constraints=[wb.Freeze("left_hip_flexion")])) == ()  # the knee can bend
+    assert found(wb.Problem(scene, start, constraints=[wb.Freeze("right_leg")])) == ()
+    assert found(wb.Problem(scene, start)) == ()
+
+
+def test_a_frozen_joint_that_no_angle_of_the_other_allows():
+    """A range of a frozen and of a free joint is left for good where the free joint's limit does not suffice."""
+    row = CoupledRow((Coordinate(0, 0, 1.0), Coordinate(1, 1, -0.5)), 0.2)
+    least, most = np.array([0.8, -1.0]), np.array([0.8, 1.0])
+    assert row.largest(least, most) == pytest.approx(0.2 - (0.8 - 0.5))
+
+
+def test_a_frozen_neck_beyond_its_ellipse(standing):
+    """Two of its angles at their limits are more than the neck does, whether the third is free or not."""
+    scene, names = standing().scene, ("neck1_lateral", "neck1_rotation", "neck2_rotation")
+    ends = {name: np.degrees(upper_limit(scene, name)) for name in names}
+    start = bent(scene.figure, **ends)
+    for frozen in (("neck",), names):
+        texts = [entry.text for entry in found(wb.Problem(scene, start, constraints=[wb.Freeze(*frozen)]))]
+        assert len(texts) == 1
+        assert "'neck' is left" in texts[0]
+    assert found(wb.Problem(scene, start, constraints=[wb.Freeze("neck1_lateral", "neck1_rotation")])) == ()
+
+
+def test_the_largest_value_of_a_range_is_that_of_the_best_posture(standing):
+    scene = standing().scene
+    term = next(term for term in standing().constraints if isinstance(term, wb.RangeOfMotion))
+    row, state, rng = term.rows[term.row_names.index("neck")], State(scene.model), np.random.default_rng(1)
+    for _ in range(20):
+        ends = np.sort(rng.uniform(-1.5, 1.5, (2, scene.model.nq)), axis=0)
+        ends[:, :7] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0  # the root
+        values = [row.value(state.update(rng.uniform(*ends))) for _ in range(2000)]
+        assert max(values) <= row.largest(*ends)
+        assert max(values) == pytest.approx(row.largest(*ends), abs=0.2)
+
+
+def test_a_frozen_arm_out_of_its_reach_cone(standing):
+    """All the joints between the trunk and the upper arm are frozen; with one of them free nothing is said."""
+    scene = standing().scene
+    figure, rng, state = scene.figure, np.random.default_rng(3), State(scene.model)
+    joints = [name for name in figure.model.names if name.startswith(("right_clavicle", "right_shoulder"))]
+    cones = next(term for term in standing().constraints if isinstance(term, wb.ReachCones))
+    row, seen = list(figure.cones).index("right_shoulder"), set()
+    for _ in range(30):
+        ends = [(-upper_limit(scene, name, -1.0), upper_limit(scene, name)) for name in joints]
+        angles = {name: np.degrees(rng.uniform(*pair)) for name, pair in zip(joints, ends, strict=True)}
+        start = bent(figure, **angles)
+        value = float(cones.value(state.update(start))[row])
+        said = cone_texts(wb.Problem(scene, start, constraints=[wb.Freeze(*joints)]))
+        assert bool(said) == (value < -1e-4)
+        assert all("Freeze('right_clavicle" in text for text in said)
+        assert cone_texts(wb.Problem(scene, start, constraints=[wb.Freeze(*joints[:-1])])) == []
+        seen.add(bool(said))
+    assert seen == {True, False}
 
 
 def test_a_hold_where_the_start_is_not_is_taken_at_its_word(free_bodies):

@@ -1,9 +1,9 @@
 """Contradictions: infeasibility of a problem that is proven before any search.
 
 Joints that cannot turn join segments into rigid groups, and a hold of a frame fixes the placement of its whole group.
-Three kinds of contradictions hold for all values of the other joints: two holds that fix one group at different
-placements; a fixed group that penetrates something that does not move; and a goal for a point of a fixed group at a
-different position.
+Four kinds of contradictions hold for all values of the other joints: two holds that fix one group at different
+placements; a fixed group that penetrates something that does not move; a range of motion or a reach cone that joints
+which cannot turn leave, wherever the others turn; and a goal for a point of a fixed group at a different position.
 
 A goal inside of something that does not move is unreachable if the point that is to reach it lies inside a piece: then
 the point stays outside by the clearance, and the error is at least the clearance plus the goal's depth.
@@ -11,6 +11,8 @@ the point stays outside by the clearance, and the error is at least the clearanc
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
 import coal
@@ -18,14 +20,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
+from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
 from wholebody.solution import Status
+from wholebody.tasks.base import Bound
 from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
-from wholebody.tasks.inputs import find_place
+from wholebody.tasks.inputs import Place, find_place
 from wholebody.tasks.point import Point
+from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, TwistRow
+from wholebody.tasks.reach_cones import ReachCones
 from wholebody.workspace import Workspace
 
 CLEAR = 1e-4  # m, rad: smaller differences are left to the search
@@ -64,6 +70,7 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
     finder = _Finder(problem, workspace)
     finder.holds()
     finder.pairs()
+    finder.ranges()
     finder.goals()
     finder.goals_inside()
     return tuple(finder.found)
@@ -78,9 +85,11 @@ class _Finder:
         state = workspace.state.update(problem.start)
         model = problem.scene.model
         stuck = np.zeros(model.nv, dtype=bool)
+        self._stuck: list[tuple[Bound, Mask]] = []  # each bound, and the degrees of freedom (nv,) that it keeps
         for bound in problem.bounds:
             low, high = bound.bounds(state, None)
-            stuck |= (low == 0.0) & (high == 0.0)
+            self._stuck.append((bound, (low == 0.0) & (high == 0.0)))
+            stuck |= self._stuck[-1][1]
         self._group = list(range(model.njoints))
         for joint in range(1, model.njoints) if stuck.any() else ():
             if stuck[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]].all():
@@ -123,6 +132,55 @@ class _Finder:
             if distance < asked - CLEAR:
                 self.found.append(Contradiction("infeasible", self._overlap(a, b, distance, asked)))
                 return  # one is enough: such parts mostly overlap in many pieces
+
+    def ranges(self) -> None:
+        """Find ranges of motion and reach cones that are left wherever the joints turn that can."""
+        if not any(mask.any() for _, mask in self._stuck):
+            return
+        least, most = self._reachable()
+        for number, term in enumerate(self._problem.constraints):
+            name = self._problem.constraint_names[number]
+            if isinstance(term, RangeOfMotion):
+                for row, range_name in zip(term.rows, term.row_names, strict=True):
+                    if isinstance(row, TwistRow):
+                        self._turned(f"{name}, {range_name!r}", row.limb, row.reference, row.value)
+                    else:
+                        axes = (row.coordinates,) if isinstance(row, CoupledRow) else row.axes
+                        dofs = [coordinate.idx_v for axis in axes for coordinate in axis]
+                        self._left(f"{name}, {range_name!r}", row.largest(least, most), dofs)
+            elif isinstance(term, ReachCones):
+                cones = self._problem.scene.figure.cones if term.names is None else term.names
+                for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
+                    value = partial(_entry, term.value, place)
+                    self._turned(f"{name}, {cone_name!r}", limb.limb, limb.reference, value)
+
+    def _reachable(self) -> tuple[Array, Array]:
+        """Least and largest entries (nq,) of postures; infinite but for joints of one angle with limits."""
+        limits, start = self._problem.scene.figure.limits, self._problem.start
+        least, most = np.full(len(start), -np.inf), np.full(len(start), np.inf)
+        least[limits.idx_q], most[limits.idx_q] = limits.lower, limits.upper
+        for joint in list(self._problem.scene.model.joints)[1:]:
+            if joint.nq == 1 and any(mask[joint.idx_v] for _, mask in self._stuck):
+                least[joint.idx_q] = most[joint.idx_q] = start[joint.idx_q]
+        return least, most
+
+    def _turned(self, name: str, limb: Place, reference: Place, value: Callable[[State], float]) -> None:
+        """Report a range of one frame in another where the two are in one rigid group."""
+        if self._group[limb.joint] == self._group[reference.joint]:
+            model, dofs = self._problem.scene.model, list[int]()
+            for end in (limb.joint, reference.joint):
+                while end and end != self._group[limb.joint]:
+                    dofs += range(model.idx_vs[end], model.idx_vs[end] + model.nvs[end])
+                    end = model.parents[end]
+            self._left(name, value(self._workspace.state.update(self._problem.start)), dofs)
+
+    def _left(self, name: str, largest: float, dofs: list[int]) -> None:
+        """Report a range whose largest value is negative, with the bounds that keep some of its degrees of freedom."""
+        if largest < -CLEAR:
+            keepers = " and ".join(repr(bound) for bound, mask in self._stuck if mask[dofs].any())
+            if keepers:
+                text = f"{name} is left by {np.degrees(-largest):.3g} degrees where {keepers} keeps the joints"
+                self.found.append(Contradiction("infeasible", text))
 
     def goals(self) -> None:
         """Find goals that contradict the placement of their group, or another goal on the same group."""
@@ -231,6 +289,10 @@ class _Finder:
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
         return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are asked" if asked else "")
+
+
+def _entry(value: Callable[[State], Array], row: int, state: State) -> float:
+    return float(value(state)[row])
 
 
 def in_words(found: tuple[Contradiction, ...]) -> str:

@@ -39,6 +39,10 @@ class CoupledRow(NamedTuple):
         """Radians, positive inside."""
         return self.bound - sum(factor * float(state.q[q]) for q, _, factor in self.coordinates)
 
+    def largest(self, least: Array, most: Array) -> float:
+        """Largest value that any posture between two postures (nq,) gives, radians."""
+        return self.bound - _between(self.coordinates, least, most)[0]
+
     def write(self, state: State, row: Array) -> None:
         """Write the derivative into a row (nv,) of zeros."""
         for _, v, factor in self.coordinates:
@@ -64,6 +68,15 @@ class EllipticRow(NamedTuple):
         """Radians, positive inside."""
         shares = [angle / limit for angle, limit in self._angles(state)]
         return 0.5 * self.size * (1.0 - sum(share * share for share in shares))
+
+    def largest(self, least: Array, most: Array) -> float:
+        """Largest value that any posture between two postures (nq,) gives, radians; no joint is in two of the axes."""
+        total = 0.0
+        for k, axis in enumerate(self.axes):
+            low, high = _between(axis, least, most)
+            angle = min(max(0.0, low + float(self.offset[k])), high + float(self.offset[k]))
+            total += (angle / float(self.limits[int(angle > 0.0), k])) ** 2
+        return 0.5 * self.size * (1.0 - total)
 
     def write(self, state: State, row: Array) -> None:
         """Write the derivative into a row (nv,) of zeros."""
@@ -185,6 +198,12 @@ class RangeOfMotion(Constraint):
         for row, into in zip(self.rows, result, strict=True):
             row.write(state, into)
         return result
+
+
+def _between(coordinates: tuple[Coordinate, ...], least: Array, most: Array) -> tuple[float, float]:
+    """Least and largest weighted sum of joint angles between two postures (nq,)."""
+    low = sum(min(factor * float(least[q]), factor * float(most[q])) for q, _, factor in coordinates)
+    return low, sum(max(factor * float(least[q]), factor * float(most[q])) for q, _, factor in coordinates)
 
 
 def _row(part: MotionRange, scene: Surroundings) -> Row:

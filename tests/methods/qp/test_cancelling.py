@@ -27,6 +27,19 @@ def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
     assert q == pytest.approx([-0.12, 0.0, 0.5], abs=2e-3)
 
 
+def test_no_place_of_the_fork_is_nearer_to_its_goal() -> None:
+    """All boxes stand along the axes: intervals tell, on a grid of 4 mm, where the fork is off the plate."""
+    solution = wb.solve(cancelling().problem)
+    assert solution.status == "unreachable"
+    assert solution.assessment.goal_error == pytest.approx(0.12, abs=1e-4)
+    middles = np.array([(-0.15, 0.0, 0.06), (-0.15, 0.0, -0.06), (-0.33, 0.0, 0.0)])  # two prongs and the handle
+    halves = np.array([(0.15, 0.06, 0.03), (0.15, 0.06, 0.03), (0.03, 0.06, 0.09)])
+    ways = np.stack(np.meshgrid(*3 * [np.arange(-0.16, 0.161, 0.004)], indexing="ij"), axis=-1).reshape(-1, 3)
+    apart = np.abs(ways[:, None] + middles - (0.38, 0.0, 0.0)) - halves - (0.5, 0.5, 0.045)
+    free = (apart.max(axis=2) > -1e-9).all(axis=1)
+    assert np.linalg.norm(ways[free], axis=1).min() == pytest.approx(0.12, abs=1e-9)
+
+
 def test_one_prong_alone_does_not_cancel() -> None:
     problem = cancelling().problem
     with problem.borrow() as workspace:

@@ -56,13 +56,16 @@ def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
     assert local.violation.hold < 1e-2
 
 
-def test_what_is_out_of_reach_is_known_soon(standing, honest):
-    """The work is counted in programs; it was 279."""
-    problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", (0.2, -0.3, 2.585))], constraints=FEET)
+@pytest.mark.parametrize(
+    ("target", "left", "most"), [((0.2, -0.3, 2.585), 0.3104, 180), ((2.2, -1.5, 1.0), 1.2386, 190)]
+)
+def test_what_is_out_of_reach_is_known_soon(standing, honest, target, left, most):
+    """The work is counted in programs; it was 279, and 239 while ends with feet off by mm did not count."""
+    problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", target)], constraints=FEET)
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"
-    assert solution.assessment.goal_error == pytest.approx(0.3104, abs=1e-3)
-    assert solution.iterations < 240
+    assert solution.assessment.goal_error == pytest.approx(left, abs=5e-3)
+    assert solution.iterations < most
 
 
 def test_the_nearest_posture_holds_what_must_hold(standing, honest):

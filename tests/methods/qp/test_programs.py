@@ -10,7 +10,7 @@ import pytest
 
 from tests.reference import active_set as reference
 from wholebody import UnknownNameError
-from wholebody.methods.qp.active_set import guess_active_set, minimise_on_face, solve_from
+from wholebody.methods.qp.active_set import guess_active_set, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
@@ -38,7 +38,7 @@ def by_enumeration(program):
     for state in itertools.product((0, 1, 2), repeat=n):
         lower, upper = np.array(state) == 1, np.array(state) == 2
         for pushing in itertools.product((False, True), repeat=k):
-            point = minimise_on_face(program, ActiveSet(lower, upper, np.array(pushing, dtype=bool)))
+            point = reference.minimise_on_face(program, ActiveSet(lower, upper, np.array(pushing, dtype=bool)))
             candidate = np.clip(point.x, program.lower, program.upper)
             if program.value(candidate) < best:
                 best, x = program.value(candidate), candidate

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from tests.methods.qp.test_programs import by_quadprog
-from wholebody.methods.qp.active_set import lacking, minimise_on_face, solve_from
+from tests.reference import active_set as reference
+from tests.reference import semismooth_newton
+from wholebody.methods.qp.active_set import lacking, solve_from
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
 from wholebody.methods.qp.solvers.registry import make_solver
@@ -54,6 +56,23 @@ def test_quadprog_agrees():
         assert np.array_equal(active.elastic, mild.elastic @ x < mild.least)
 
 
+@pytest.mark.parametrize("k", [0, 20, 100, 400])
+def test_the_compiled_loop_is_the_array_code(k):
+    rng = np.random.default_rng(k)
+    for _ in range(5):
+        program = crowded(rng, k=k)
+        start = rng.normal(size=program.size)
+        for iterations in (1, 2, 5):
+            x, active, used = minimise(program, start, iterations)
+            expected, its_active, its_used = semismooth_newton.minimise(program, start, iterations)
+            assert used == its_used
+            assert x == pytest.approx(expected, abs=1e-10)
+            assert active.same(its_active)
+        assert minimise(program, start, 300)[0] == pytest.approx(
+            semismooth_newton.minimise(program, start, 300)[0], abs=1e-10
+        )
+
+
 def test_correcting_a_set_takes_the_smaller_system():
     rng = np.random.default_rng(8)
     for _ in range(5):
@@ -74,7 +93,7 @@ def test_rows_that_repeat_each_other_have_multipliers_that_belong_to_their_resid
         elastic_weight=np.full(8, 1e10),
     )
     none = np.zeros(12, dtype=bool)
-    point = minimise_on_face(program, ActiveSet(none, none, np.ones(8, dtype=bool)))
+    point = reference.minimise_on_face(program, ActiveSet(none, none, np.ones(8, dtype=bool)))
     lack = program.least - program.elastic @ point.x
     assert point.push == pytest.approx(1e10 * lack, rel=1e-3, abs=1e-3)
     assert np.abs(point.gradient).max() < 1e-3

@@ -15,11 +15,11 @@ such as OSQP thereby end in answers exact to rounding.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
@@ -91,62 +91,3 @@ def compiled_kernel() -> Any:
         *program, index, index, mask, mask.copy(), row, row, np.ones(6), work, np.zeros(1, dtype=np.intp), np.zeros(1)
     )
     return active_set_kernel
-
-
-class FacePoint(NamedTuple):
-    """Stationary point for one active set: x, derivative of the Lagrangian in x, push of every active elastic row."""
-
-    x: Array
-    gradient: Array
-    push: Array
-
-
-def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint | None:
-    """Minimiser with the bounds of the set held and the elastic rows of the set pushing; None if it is not finite.
-
-    Signs are read off the multipliers: weight times residual would drown them in rounding where weights are large.
-    """
-    from scipy.linalg.lapack import dposv
-
-    rows = np.vstack([program.rows, program.elastic[active.elastic]])
-    target = np.concatenate([program.target, program.least[active.elastic]])
-    weight = np.concatenate([program.weight, program.elastic_weight[active.elastic]])
-    x = np.where(active.lower, program.lower, np.where(active.upper, program.upper, 0.0))
-    free = ~(active.lower | active.upper)
-    inverse = np.where(free, 1.0 / program.diagonal, 0.0)
-    multiplier, in_columns = np.zeros(len(rows)), len(rows) > program.size
-    if len(rows) and not in_columns:
-        scaled = rows * inverse
-        system = scaled @ rows.T
-        system.flat[:: len(rows) + 1] += 1.0 / weight
-        _, multiplier, info = dposv(system, rows @ x - scaled @ program.linear - target)
-        trial = x - inverse * (program.linear + multiplier @ rows)
-        # rows that repeat each other to rounding leave multipliers that do not belong to their residuals
-        in_columns = info != 0 or not np.abs(rows @ trial - target - multiplier / weight).max() <= ROW_TOLERANCE
-    if in_columns:
-        x[free] = _in_columns(program, rows[:, free], target - rows @ x, weight, free)
-        multiplier = weight * (rows @ x - target)
-    pull = program.linear + multiplier @ rows
-    x = x if in_columns else x - inverse * pull
-    if not np.isfinite(x).all():
-        return None
-    return FacePoint(x, program.diagonal * x + pull, -multiplier[len(program.target) :])
-
-
-def _in_columns(program: QuadraticProgram, rows: Array, target: Array, weight: Array, free: Mask) -> Array:
-    """Free entries (f,) of the minimiser on a face with more rows than variables.
-
-    They minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their weights, for which
-    Householder's QR is stable row by row (Cox and Higham 1998).
-    """
-    from scipy.linalg import qr_multiply, solve_triangular
-
-    if not free.any():
-        return np.zeros(0)
-    heavy = np.argsort(-weight, kind="stable")
-    root, own = np.sqrt(weight[heavy]), np.sqrt(program.diagonal[free])
-    table = np.vstack([rows[heavy] * root[:, None], np.diag(own)])
-    right = np.concatenate([target[heavy] * root, -program.linear[free] / own])
-    turned, factor = qr_multiply(table, right, mode="right")
-    result: Array = solve_triangular(factor, turned)
-    return result

@@ -6,7 +6,8 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
-from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
+from wholebody.methods.qp.dense_kernel import dot
+from wholebody.methods.qp.face_kernel import minimise_on_face
 
 
 @compiled(error_model="numpy")
@@ -149,45 +150,11 @@ def primal_dual_active_set(
                 compliance[m + count] = 1.0 / elastic_weight[j]
                 count += 1
         size = m + count
-        for i in range(n):
-            held = at_lower[i] or at_upper[i]
-            x[i] = lower[i] if at_lower[i] else (upper[i] if at_upper[i] else 0.0)
-            inverse[i] = 0.0 if held else 1.0 / diagonal[i]
-            gradient[i] = linear[i]
-        in_columns = size > n
-        if 0 < size <= n:
-            system = table[: size * size].reshape((size, size))
-            for r in range(size):
-                for i in range(n):
-                    scaled[r, i] = stacked[r, i] * inverse[i]
-                multiplier[r] = dot(stacked[r], x) - dot(scaled[r], linear) - right[r]
-            gram(scaled, stacked, size, system)
-            for r in range(size):
-                system[r, r] += compliance[r]
-            in_columns = not solve(system, multiplier[:size])
-            if not in_columns:
-                for i in range(n):
-                    trial[i] = linear[i]
-                for r in range(size):
-                    add(multiplier[r], stacked[r], trial)
-                for i in range(n):
-                    trial[i] = x[i] - inverse[i] * trial[i]
-                worst = 0.0
-                for r in range(size):
-                    left = abs(dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
-                    if not left <= worst:
-                        worst = left
-                in_columns = not worst <= row_tolerance
-        if in_columns:
-            _minimise_in_columns(stacked, right, compliance, size, diagonal, linear, inverse, x, multiplier)
-        for r in range(size):
-            add(multiplier[r], stacked[r], gradient)
-        for i in range(n):
-            if not in_columns:
-                x[i] -= inverse[i] * gradient[i]
-            gradient[i] += diagonal[i] * x[i]
-            if not np.isfinite(x[i]):
-                return False
+        if not minimise_on_face(
+            diagonal, linear, lower, upper, at_lower, at_upper, stacked, right, compliance, size, row_tolerance, scaled,
+            table, inverse, trial, multiplier, gradient, x,
+        ):  # fmt: skip
+            return False
         same = True
         for i in range(n):
             if at_lower[i]:
@@ -251,94 +218,3 @@ def primal_dual_active_set(
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False
-
-
-@compiled(error_model="numpy")
-def _minimise_in_columns(
-    stacked: Array,
-    right: Array,
-    compliance: Array,
-    size: int,
-    diagonal: Array,
-    linear: Array,
-    inverse: Array,
-    x: Array,
-    multiplier: Array,
-) -> None:
-    """Minimiser on a face with more rows than variables, by Householder's QR of the weighted rows.
-
-    The free entries of x minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their
-    weights, for which the factorisation is stable row by row (Cox and Higham 1998): heavy rows lose no digits to light
-    ones, nor light ones to heavy.
-
-    Args:
-        stacked: (size or more, n) rows A.
-        right: (size or more,) b.
-        compliance: (size or more,) inverse weights.
-        size: how many rows count.
-        diagonal: (n,) D.
-        linear: (n,) g.
-        inverse: (n,) 1 / D of the free variables, 0 of the held ones.
-        x: (n,) with the held entries; the free ones are filled in.
-        multiplier: (size or more,) is filled with the weight times the residual of each row.
-    """
-    n = len(x)
-    free = inverse.nonzero()[0]
-    columns = len(free)
-    order = np.arange(size)
-    for place in range(1, size):  # few weights, and most of them in order: cheaper than a general sort, and stable
-        own, back = order[place], place - 1
-        while back >= 0 and compliance[order[back]] > compliance[own]:
-            order[back + 1] = order[back]
-            back -= 1
-        order[back + 1] = own
-    table = np.zeros((size + columns, columns + 1))
-    for place in range(size):
-        r = order[place]
-        root = 1.0 / np.sqrt(compliance[r])
-        total = right[r]
-        for i in range(n):
-            if inverse[i] == 0.0:
-                total -= stacked[r, i] * x[i]
-        for c in range(columns):
-            table[place, c] = root * stacked[r, free[c]]
-        table[place, columns] = root * total
-    for c in range(columns):
-        root = np.sqrt(diagonal[free[c]])
-        table[size + c, c] = root
-        table[size + c, columns] = -linear[free[c]] / root
-    work = np.empty(columns + 1)
-    for c in range(columns):
-        last = size + c + 1  # the rows of D below have nothing in this column yet
-        square = 0.0
-        for r in range(c, last):
-            square += table[r, c] * table[r, c]
-        norm = -np.sqrt(square) if table[c, c] > 0.0 else np.sqrt(square)
-        head = table[c, c] - norm  # Householder's vector: this, and the column below
-        scale = -1.0 / (norm * head)
-        for d in range(c + 1, columns + 1):
-            work[d] = head * table[c, d]
-        for r in range(c + 1, last):
-            entry = table[r, c]
-            if entry != 0.0:
-                for d in range(c + 1, columns + 1):
-                    work[d] += entry * table[r, d]
-        for d in range(c + 1, columns + 1):
-            work[d] *= scale
-            table[c, d] -= head * work[d]
-        for r in range(c + 1, last):
-            entry = table[r, c]
-            if entry != 0.0:
-                for d in range(c + 1, columns + 1):
-                    table[r, d] -= entry * work[d]
-        table[c, c] = norm
-    for c in range(columns - 1, -1, -1):
-        total = table[c, columns]
-        for d in range(c + 1, columns):
-            total -= table[c, d] * x[free[d]]
-        x[free[c]] = total / table[c, c]
-    for r in range(size):
-        total = -right[r]
-        for i in range(n):
-            total += stacked[r, i] * x[i]
-        multiplier[r] = total / compliance[r]

@@ -43,7 +43,7 @@ FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or t
 NEARLY_FLAT = 1e-2  # the same where only the size of what is left counts
 WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
 SHRINK = 0.3
-DAMPING = 1e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
+DAMPING = 3e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
 NEGLIGIBLE = 1e-2  # share of the largest curvature below which a direction is left out
 
 
@@ -84,14 +84,17 @@ class CurvedReach:
         here = self._iterate_at(lineariser, q, within)
         push = np.zeros(len(here.rows.soft_error))
         radius, used, converged = RADIUS, 0, False
+        bent: tuple[Array, Array] | None = None  # at this posture; it stays where a step is rejected
         while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
             used += 1
             rows = here.rows
             program = self._subproblem.program(
                 here.at, rows, 0.5 * radius, None, 0.0, np.zeros(len(rows.soft_error)), False
             )
-            lineariser.state.update(here.at.q)
-            bend, weight = self._curvature(rows, push if here.violation.hold <= HELD else np.zeros_like(push))
+            if bent is None:
+                lineariser.state.update(here.at.q)
+                bent = self._curvature(rows, push if here.violation.hold <= HELD else np.zeros_like(push))
+            bend, weight = bent
             lower, upper = program.lower.copy(), program.upper.copy()
             if not within:  # where nothing is in the way, and a translation bends nothing
                 lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
@@ -125,7 +128,7 @@ class CurvedReach:
                 radius = min(2.0 * radius, LARGEST_RADIUS)
             if ratio > WORTH and not blocked:
                 push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
-                here = there
+                here, bent = there, None
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, used)
 
     def _iterate_at(self, lineariser: Lineariser, q: Array, within: float) -> Iterate:

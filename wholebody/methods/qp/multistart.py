@@ -28,13 +28,13 @@ ALIKE = 1e-5  # share of a goal's error by which two descents may differ and cou
 JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
 PROBE_PROGRAMS = 40  # most programs of a probe; more = surer on curved ways, fewer starts within the budget
 RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; two limbs that cross need as much
-NO_NEARER = 20  # relaxed probes in a row that came no nearer: the goals are out of reach
+NO_NEARER = 20  # probes in a row that came no nearer: the goals are out of reach
 REACHED = 10.0  # tolerances: relaxed probes that end farther from the goals are given up
 NEARER = 0.02  # share of what is left by which a probe is nearer
 REACH_TRIALS = 10  # most descents without contacts that tell whether goals are out of reach
 REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
-HELD = 1e-3  # m, rad: by which constraints may be missed where such a descent ends
+HELD = 1e-2  # share of what is left of the goals by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
 FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
 AGREEING_FEW = 8  # the same for them
@@ -42,7 +42,8 @@ REACH_TRIALS_FEW = 16  # most descents for them
 AGREE = 1.1  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
-PUSHING_OUT = 15  # most programs of each
+STATIONARY = 0.01  # share of the error that they may still gain: they end where little more is foreseen
+PUSHING_OUT = 6  # most programs of each
 INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
 STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
@@ -72,7 +73,7 @@ class Search:
         self.trace: list[TraceEntry] = []
         self.spent = 0
         self._left = settings.budget  # programs that the ways after the first may still solve
-        self._without_gain = 0  # relaxed probes in a row that came no nearer
+        self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
         self.how = "directly"
         self.contradictions: tuple[Contradiction, ...] = ()
         self._least = 0.0  # what is known to be left of the goals at least, metres
@@ -146,7 +147,7 @@ class Search:
         """
         for q in starts:
             if (
-                self._without_gain == NO_NEARER
+                self._without_gain >= NO_NEARER
                 or self._minima.complete
                 or self._relaxed_minima.complete
                 or self._left <= 0
@@ -192,12 +193,12 @@ class Search:
         tolerance = self.settings.tolerance
         if self.control.over:
             return
+        if self._out_of_reach:
+            self._come_near()
         if not _held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
             self._leave_from_named_postures()
-        if self._out_of_reach:
-            self._come_near()
-        elif self.best.violation.worst > tolerance:
+        if not self._out_of_reach and self.best.violation.worst > tolerance:
             self._near_best()
         if self.best.violation.left <= tolerance:
             return
@@ -244,17 +245,19 @@ class Search:
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance and begin is not q:
                 self._through = [local.q]
-            if local.violation.worst <= REACHED * tolerance or not local.converged or self.control.over:
+            if local.violation.worst <= REACHED * tolerance or self.control.over:
                 return False
-            if local.violation.hold > HELD:
+            if local.violation.hold > HELD * local.violation.left:
                 continue  # from there the constraints alone are too far
             self._nearest.append(local)
             self._nearest.sort(key=lambda local: local.violation.total)
             most = AGREE * self._nearest[0].violation.total + tolerance
             if sum(local.violation.total <= most for local in self._nearest) == agreeing:
                 self._out_of_reach = True
-                break
-        return self._out_of_reach
+                return True
+        near = (1.0 - NEARER) * self.best.violation.left
+        self._without_gain = sum(local.violation.left >= near for local in self._nearest)  # as relaxed probes count
+        return False
 
     def _moving(self) -> int:
         """How many degrees of freedom move a goal at the best posture."""
@@ -272,16 +275,25 @@ class Search:
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
 
     def _come_near(self) -> None:
-        """Where the goals are out of reach, come as near as goes without passing through anything."""
-        reach, tolerance = self._curved(), self.settings.tolerance
-        starts = [self.best.q, *(self._pushed_out(local.q) for local in self._nearest[:PUSHED_OUT])]
-        for begin in starts:
-            if not self.control.over:
-                local = reach.among_things(begin, tolerance, self._at_most(COMING_NEAR))
-                self.spent += local.iterations
-                if not _held(local, tolerance) and local.violation.total < self.best.violation.total:
-                    local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
-                self._accept(local, self.how)
+        """Where the goals are out of reach, come as near as goes without passing through anything.
+
+        Ends of descents without contacts are left out where the best posture is nearer than they are already: among
+        things it goes no nearer from there.
+        """
+        self._approach(self.best.q)
+        for local in self._nearest[:PUSHED_OUT]:
+            nearer = (1.0 - STATIONARY) * local.violation.goal < self.best.violation.goal
+            if not self.control.over and (nearer or not _held(self.best, self.settings.tolerance)):
+                self._approach(self._pushed_out(local.q))
+
+    def _approach(self, begin: Array) -> None:
+        """Come as near as goes from a posture (nq,); where what must hold does not hold then, mend it."""
+        tolerance = self.settings.tolerance
+        local = self._curved().among_things(begin, tolerance, self._at_most(COMING_NEAR))
+        self.spent += local.iterations
+        if not _held(local, tolerance) and local.violation.total < self.best.violation.total:
+            local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
+        self._accept(local, self.how)
 
     def _pushed_out(self, q: Array) -> Array:
         """Where leaving what a posture (nq,) is inside of ends, with the goals' errors to stay as they are."""

@@ -9,14 +9,19 @@ correcting of active sets cannot promise; in return it changes one bound at a ti
 
 from __future__ import annotations
 
+from functools import lru_cache
+from typing import Any
+
 import numpy as np
 
-from wholebody.arrays import Array, Mask
-from wholebody.methods.qp.active_set import minimise_on_face
+from wholebody.arrays import Array
+from wholebody.methods.qp.active_set import ROW_TOLERANCE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 STILL = 1e-13  # rad, m: a step shorter than this is none
 WHOLE = 1e-9  # a step this near to the whole way is the whole way but for rounding
+LIMITS = np.array([STILL, WHOLE, ROW_TOLERANCE])
+"""What the compiled loop takes of these."""
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:
@@ -29,74 +34,29 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
 
     Returns:
         x (n,) inside the box, its active set, and the number of iterations used.
+
+    Raises:
+        ValueError: the sizes of the program do not fit together.
     """
-    x = np.clip(start, program.lower, program.upper)
-    gradient = program.gradient(x)
-    lower = (x <= program.lower) & (gradient >= 0.0)
-    upper = (x >= program.upper) & (gradient <= 0.0) & ~lower
-    used = 0
-    while used < iterations:
-        used += 1
-        active = ActiveSet(lower, upper, program.elastic @ x < program.least)
-        point = minimise_on_face(program, active)
-        if point is None:
-            break
-        way = np.where(lower | upper, 0.0, point.x - x)
-        step, hit = _longest(program, x, way, lower | upper)
-        best = _line_minimum(program, x, way, step)
-        x = np.clip(x + best * way, program.lower, program.upper)
-        if best == step and hit >= 0:  # a bound is in the way: it holds from now on
-            lower[hit], upper[hit] = way[hit] < 0.0, way[hit] > 0.0
-            continue
-        whole = best == 1.0 and np.array_equal(program.elastic @ x < program.least, active.elastic)
-        if best * float(np.abs(way).max(initial=0.0)) > STILL and not whole:
-            continue
-        # the minimum of the face: let the bound go that holds the most
-        pull = program.gradient(x) / program.diagonal
-        wrong = np.where(lower, -pull, np.where(upper, pull, 0.0))
-        worst = int(np.argmax(wrong))
-        if wrong[worst] <= STILL:
-            break
-        lower[worst] = upper[worst] = False
-    return x, ActiveSet(lower, upper, program.elastic @ x < program.least), used
+    x = np.array(start, dtype=float)
+    held = np.zeros((2, program.size), dtype=bool)
+    active = ActiveSet(held[0], held[1], np.zeros(len(program.least), dtype=bool))
+    program.check_shapes(active)
+    parts = (
+        program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
+        program.elastic_weight, program.lower, program.upper,
+    )  # fmt: skip
+    used = compiled_kernel().minimise(*map(np.ascontiguousarray, parts), iterations, LIMITS, *active, x)
+    return x, active, used
 
 
-def _longest(program: QuadraticProgram, x: Array, way: Array, held: Mask) -> tuple[float, int]:
-    """How far one may go before a bound, in units of the way (inf without one), and which bound that is."""
-    room = np.where(way > 0.0, program.upper - x, program.lower - x)
-    moving = ~held & (np.abs(way) > STILL)
-    share = np.where(moving, room / np.where(moving, way, 1.0), np.inf)
-    nearest = int(np.argmin(share))
-    return (float(share[nearest]), nearest) if np.isfinite(share[nearest]) else (np.inf, -1)
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import semismooth_kernel
 
-
-def _line_minimum(program: QuadraticProgram, x: Array, way: Array, longest: float) -> float:
-    """The step in [0, longest] with the least objective along the way.
-
-    The derivative along the way is a(t) = a + b t - sum over pushing rows of v_j s_j (l_j - c_j x - t s_j), with
-    s_j = c_j way; rows begin or cease to push where l_j - c_j x = t s_j.
-    """
-    slope = program.rows @ way
-    base = float(
-        (program.diagonal * x + program.linear) @ way + (program.weight * slope) @ (program.rows @ x - program.target)
+    none, one, rows, mask = np.zeros(0), np.ones(1), np.zeros((0, 1)), np.zeros(1, dtype=bool)
+    semismooth_kernel.minimise(
+        one, one, rows, none, none, rows, none, none, -one, one, 1, LIMITS, mask, mask.copy(), mask[:0], one.copy()
     )
-    rise = float((program.diagonal * way) @ way + (program.weight * slope) @ slope)
-    violated, speed = program.least - program.elastic @ x, program.elastic @ way
-    pushing = violated > 0.0
-    base -= float((program.elastic_weight * speed * violated)[pushing].sum())
-    rise += float((program.elastic_weight * speed**2)[pushing].sum())
-    moving = np.flatnonzero(np.abs(speed) > 0.0)
-    at = violated[moving] / speed[moving]
-    ahead = at > 0.0
-    order = moving[ahead][np.argsort(at[ahead], kind="stable")]
-    for j in order.tolist():
-        place = violated[j] / speed[j]
-        if place >= longest or base + rise * place >= 0.0:
-            break
-        sign = -1.0 if pushing[j] else 1.0
-        base -= sign * program.elastic_weight[j] * speed[j] * violated[j]
-        rise += sign * program.elastic_weight[j] * speed[j] ** 2
-    if rise <= 0.0:
-        return 0.0
-    best = min(max(-base / rise, 0.0), longest)
-    return 1.0 if abs(best - 1.0) < WHOLE else float(best)
+    return semismooth_kernel

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array, Mask
 from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE, compiled_kernel
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.semismooth_newton import compiled_kernel as semismooth_kernel
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.records import with_values
 
@@ -31,7 +32,9 @@ class WorkingSet:
         """Begin without a guess."""
         self.solver = solver
         self._kernel = compiled_kernel()
+        semismooth_kernel()  # which a program may need in the middle of a solve
         self._work, self._places = np.empty(0), np.empty(0, dtype=np.intp)
+        self.held: Mask | None = None
         self.reset()
 
     def solve(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
@@ -47,11 +50,12 @@ class WorkingSet:
             answer = self._from_the_last(program, key)
             if answer is not None:
                 return answer
+            self.held = None  # correcting the same set once more would end the same
         return self._round_by_round(program, key)
 
     def reset(self) -> None:
         """Drop the guess."""
-        self.held: Mask | None = None
+        self.held = None
         self.pushing = np.zeros(0, dtype=np.intp)
 
     @property
