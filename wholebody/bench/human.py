@@ -68,7 +68,7 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
     girths = human_sizes.circumferences(("M50",) if quick else ("F50", "M50"))
     ranges = human_sizes.ranges(figure)
     first = wb.solve(wb.Problem(wb.Scene(figure)))  # numba's loops are compiled or read back
-    contacts = human_contacts.contacts(figure)
+    contacts = human_contacts.contacts(figure, None if quick else pictures)
     yield f"{sum(row.reached for row in contacts)} of {len(contacts)} self-contacts ({first.status} at rest)"
     rows = []
     made = human_tasks.tasks(figure)
