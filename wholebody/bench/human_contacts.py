@@ -40,6 +40,11 @@ class ContactRow:
     gap: float
 
     @property
+    def drawn(self) -> bool:
+        """Whether it has a picture: all have that are made by the body alone."""
+        return self.contact not in ("palm flat on a table", "thighs on the seat")
+
+    @property
     def picture(self) -> str:
         """Its file's name."""
         return f"{self.contact.replace(' ', '_')}.png"
@@ -54,8 +59,8 @@ def contacts(figure: Figure, pictures: Path | None = None) -> list[ContactRow]:
     """Make every contact.
 
     The parts are asked to touch, or a frame to be on the other part. Legs are crossed by a goal inside the other thigh,
-    as near as they come, with all else at rest. An ankle is laid on several places of the other thigh; the first that it
-    touches counts.
+    as near as they come, with all else at rest. An ankle is laid on several places of the other thigh; the first one
+    that it touches counts.
 
     Args:
         figure: the person.

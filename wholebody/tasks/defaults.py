@@ -26,10 +26,10 @@ AS_AT_START = 1e-3
 """m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
 
 STEADY = 0.15
-"""Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width: 40
-mm of the median man with his feet side by side. Who leans as far as he can uses about 0.6 of the foot's length (King,
-Judge & Wolfson 1994, Journal of Gerontology 49(6): M258-M263, recalled), which is a share of 0.2; an ESTIMATE beside
-it."""
+"""Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width:
+41 mm of the median man with his feet side by side. Who leans as far as he can uses about 0.6 of the foot's length
+(King, Judge & Wolfson 1994, Journal of Gerontology 49(6): M258-M263, recalled), which is a share of 0.2; an ESTIMATE
+beside it."""
 
 
 def default_measures(scene: Surroundings, *, ranges: bool) -> list[Measure]:

@@ -34,7 +34,7 @@ spine of a bent person is free to do what a goal needs."""
 
 
 KNEE_SHARE, KNEE_ONSET, KNEE_WEIGHT = 0.9, 0.4, 25.0
-"""Flexion of a knee by that f of its hip, ``0.9 (f + sqrt(f^2 + 0.4^2) - 0.4) / 2`` in radians, and its weight, 1/rad^2.
+"""Flexion of a knee by that f of its hip, ``0.9 (f + sqrt(f^2 + 0.4^2) - 0.4) / 2`` [rad], and its weight, 1/rad^2.
 
 A man who bends down to the floor again and again and rises (recording 02_06 of the CMU Graphics Lab Motion Capture
 Database, 559 frames) has knees of 28, 47, 68 and 89 degrees beyond those of standing at hips of 25, 45, 75 and 95; this
