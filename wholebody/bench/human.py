@@ -57,7 +57,7 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
     """Measure the person: sentences on the way, and at the end what was measured.
 
     Args:
-        pictures: folder for a picture of each task; None draws none.
+        pictures: folder for a picture of each contact and task; None draws none.
         quick: one design case and three tasks.
     """
     import wholebody as wb
