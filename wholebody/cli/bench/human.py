@@ -50,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
         if drawn:
             folder = arguments.update_docs / "assets" / "human"
             make_folder(folder)
-            for row in (*(row for row in found.contacts if row.drawn), *found.tasks):
-                shutil.copyfile(pictures / row.picture, folder / row.picture)
+            names = [row.picture for row in found.contacts if row.drawn] + [row.picture for row in found.tasks]
+            for name in names:
+                shutil.copyfile(pictures / name, folder / name)
         print(f"wrote {arguments.update_docs / 'human.md'}")
     return 0
