@@ -150,11 +150,17 @@ def rhythms(
     slopes, at = np.empty(5), np.empty(5, dtype=np.int64)
     for e in range(len(elevations)):
         flexion, abduction = q[elevation_places[e, 1]], q[elevation_places[e, 2]]
-        rise = elevations[e, 1]
-        excess = q[elevation_places[e, 0]] - rise * (1.0 - np.cos(flexion) * np.cos(abduction)) - elevations[e, 2]
+        rise, onset = elevations[e, 1], elevations[e, 3]
+        if onset > 0.0:
+            root = np.sqrt(flexion * flexion + onset * onset)
+            share = 0.5 * (flexion + root - onset)
+            slopes[1], slopes[2] = -rise * 0.5 * (1.0 + flexion / root), 0.0
+        else:
+            share = 1.0 - np.cos(flexion) * np.cos(abduction)
+            slopes[1] = -rise * np.sin(flexion) * np.cos(abduction)
+            slopes[2] = -rise * np.cos(flexion) * np.sin(abduction)
+        excess = q[elevation_places[e, 0]] - rise * share - elevations[e, 2]
         slopes[0] = 1.0
-        slopes[1] = -rise * np.sin(flexion) * np.cos(abduction)
-        slopes[2] = -rise * np.cos(flexion) * np.sin(abduction)
         for k in range(3):
             at[k] = elevation_places[e, 3 + k]
         _square(elevations[e, 0], excess, slopes[:3], at[:3], measure, squares, e)

@@ -263,7 +263,7 @@ def _measures(
         elif type(term) is tasks.Rhythm:
             curvature += term.weight * LEAST_CURVATURE
             for part in (*term.girdles, *term.knees):
-                numbers = np.array([term.weight * part.weight, part.most, part.rest])
+                numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
                 parts[ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
             if term.lumbar is not None:
                 share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])

@@ -120,6 +120,16 @@ def test_a_power_grip_closes_every_finger_around_a_bar(figure):
         assert abs(min(at_bar[part] for part in outer)) < 2e-5
 
 
+@pytest.mark.parametrize("radius", [0.0125, 0.02])
+@pytest.mark.parametrize("shape", ["relaxed", "flat"])
+def test_a_power_grip_does_not_depend_on_how_the_hand_begins(figure, radius, shape):
+    scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="bar", at=(0.45, -0.25, 1.2))
+    bent = {"right_elbow_flexion": np.radians(80.0), **wb.finger_angles(shape, "right")}
+    start = figure.with_joints(figure.posture("standing"), bent)
+    grasp = wb.Grasp("right", "bar", "power")
+    assert wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET)).status == "solved"
+
+
 def test_a_hand_of_one_segment_cannot_take_by_all_fingertips():
     scene = wb.Scene(wb.load("human")).add(wb.Sphere(0.02), name="ball", at=(0.4, -0.2, 1.1))
     with pytest.raises(wb.InputError, match="hands='fingers'"):

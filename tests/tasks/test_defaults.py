@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 import wholebody as wb
+from wholebody.figures.state import State
 
 LEFT, RIGHT = wb.Hold("left_foot"), wb.Hold("right_foot")
 
@@ -76,3 +77,22 @@ def test_a_reach_that_would_fall_over_is_unreachable(scene: wb.Scene) -> None:
     )
     assert (kept.status, fallen.status) == ("unreachable", "solved")
     assert kept.assessment.constraint_violation < 1e-5
+
+
+def test_who_leans_keeps_the_centre_of_mass_away_from_the_edge_of_the_feet(scene: wb.Scene) -> None:
+    """Between a tenth of the base and the fifth that people can use at most on each side (King et al. 1994)."""
+    goal = wb.Point("right_index_tip", (0.45, -0.20, 0.30))
+    solution = wb.solve(wb.Problem(scene, goals=[goal], constraints=[LEFT, RIGHT]))
+    assert solution.status == "solved"
+    balance = wb.Balance().resolve(scene, scene.figure.posture("standing"))
+    inside = balance.value(State(scene.model).update(solution.q)).min()
+    assert 0.1 * 0.265 < inside < 0.2 * 0.275
+
+
+def test_feet_in_one_line_leave_room(scene: wb.Scene) -> None:
+    """The margin is a share of the polygon: nobody falls for standing on one line."""
+    figure = scene.figure
+    hips = {"left_hip_flexion": 0.3, "right_hip_flexion": -0.3, "left_hip_abduction": -0.1, "right_hip_abduction": -0.1}
+    problem = wb.Problem(scene, start=figure.with_joints(figure.posture("standing"), hips), constraints=[LEFT, RIGHT])
+    margins = [term.margin for term in problem.defaults if isinstance(term, wb.Balance)]
+    assert 0.0 < margins[0] < 0.04

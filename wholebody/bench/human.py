@@ -57,7 +57,7 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
     """Measure the person: sentences on the way, and at the end what was measured.
 
     Args:
-        pictures: folder for a picture of each task; None draws none.
+        pictures: folder for a picture of each contact and task; None draws none.
         quick: one design case and three tasks.
     """
     import wholebody as wb
@@ -68,7 +68,7 @@ def measure(pictures: Path | None, *, quick: bool) -> Iterator[str | Measured]:
     girths = human_sizes.circumferences(("M50",) if quick else ("F50", "M50"))
     ranges = human_sizes.ranges(figure)
     first = wb.solve(wb.Problem(wb.Scene(figure)))  # numba's loops are compiled or read back
-    contacts = human_contacts.contacts(figure)
+    contacts = human_contacts.contacts(figure, None if quick else pictures)
     yield f"{sum(row.reached for row in contacts)} of {len(contacts)} self-contacts ({first.status} at rest)"
     rows = []
     made = human_tasks.tasks(figure)

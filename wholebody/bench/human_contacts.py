@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import coal
@@ -11,12 +12,17 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.bench.human_tasks import draw
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
 
 TOUCHING = 5.0
 """mm: parts nearer than this touch."""
+
+
+STILL = ("spine", "neck", "left_arm", "right_arm")
+"""Parts that rest while legs are crossed."""
 
 
 @dataclass(frozen=True)
@@ -34,15 +40,31 @@ class ContactRow:
     gap: float
 
     @property
+    def drawn(self) -> bool:
+        """Whether it has a picture: all have that are made by the body alone."""
+        return self.contact not in ("palm flat on a table", "thighs on the seat")
+
+    @property
+    def picture(self) -> str:
+        """Its file's name."""
+        return f"{self.contact.replace(' ', '_')}.png"
+
+    @property
     def reached(self) -> bool:
         """Whether the parts touch."""
         return self.gap < TOUCHING
 
 
-def contacts(figure: Figure) -> list[ContactRow]:
-    """Make every contact, by a solve whose goal lies on or just inside the other part.
+def contacts(figure: Figure, pictures: Path | None = None) -> list[ContactRow]:
+    """Make every contact.
 
-    An ankle is laid on several places of the other thigh; the nearest counts.
+    The parts are asked to touch, or a frame to be on the other part. Legs are crossed by a goal inside the other thigh,
+    as near as they come, with all else at rest. An ankle is laid on several places of the other thigh; the first one
+    that it touches counts.
+
+    Args:
+        figure: the person.
+        pictures: folder for a picture of each contact; None draws none.
     """
     import wholebody as wb
 
@@ -58,19 +80,28 @@ def contacts(figure: Figure) -> list[ContactRow]:
             "folded arms",
             "standing",
             [
-                near("right_palm", "left_upper_arm", 0.03, 0.0, -0.11),
-                near("left_palm", "right_upper_arm", 0.0, 0.03, -0.12),
+                wb.Touch("right_hand", "left_upper_arm"),
+                wb.Touch("left_hand", "right_upper_arm"),
             ],
             [("right_hand", "left_upper_arm"), ("left_hand", "right_upper_arm")],
         ),
-        ("hand on hip", "standing", [near("right_palm", "pelvis", 0.0, -0.085, 0.05)], [("right_hand", "pelvis")]),
+        ("hand on hip", "standing", [wb.Touch("right_palm", "pelvis")], [("right_hand", "pelvis")]),
         (
             "hand behind the head",
             "standing",
             [near("right_palm", "head", -0.05, -0.01, 0.05)],
             [("right_hand", "head")],
         ),
-        ("palms together", "standing", [near("right_palm", "left_palm", 0.0, 0.0, 0.0)], [("right_hand", "left_hand")]),
+        (
+            "palms together",
+            "standing",
+            [
+                wb.Touch("right_palm", "left_hand"),
+                wb.Axis("right_palm", (0, 0, 1), direction=(0, 1, 0)),
+                wb.Axis("left_palm", (0, 0, 1), direction=(0, -1, 0)),
+            ],
+            [("right_hand", "left_hand")],
+        ),
         (
             "hand in the back pocket",
             "standing",
@@ -80,7 +111,7 @@ def contacts(figure: Figure) -> list[ContactRow]:
         (
             "hand on the other shoulder",
             "standing",
-            [near("right_palm", "left_upper_arm", 0.02, 0.0, -0.03)],
+            [wb.Touch("right_palm", "left_upper_arm:0")],
             [("right_hand", "left_upper_arm")],
         ),
         (
@@ -107,15 +138,22 @@ def contacts(figure: Figure) -> list[ContactRow]:
         ),
     ]
     found: dict[str, ContactRow] = {}
+    shown: dict[str, tuple[Any, Array]] = {}
     for name, start, goals, parts in solves:
         seated = start is chair
         kept = [wb.Hold("pelvis")] if seated else [wb.Hold("left_foot"), wb.Hold("right_foot")]
         kept += [wb.Hold("left_foot")] if seated else []
-        solution = wb.solve(wb.Problem(wb.Scene(figure), start=start, goals=goals, constraints=kept))
+        scene = wb.Scene(figure)
+        still = [wb.Freeze(part) for part in STILL] if seated else []
+        solution = wb.solve(wb.Problem(scene, start=start, goals=goals, constraints=[*kept, *still]))
         gap = max(distance(figure, solution.q, [one], [other]) for one, other in parts)
         row = ContactRow(name, str(solution.status), 1e3 * max(gap, 0.0))
-        if name not in found or row.gap < found[name].gap:
+        if name not in found or (not found[name].reached and row.gap < found[name].gap):
             found[name] = row
+            shown[name] = scene, solution.q
+    if pictures is not None:
+        for name, (scene, q) in shown.items():
+            draw(scene, q, pictures / found[name].picture)
     return [*found.values(), _palm_on_table(figure), _thighs_on_seat(figure)]
 
 

@@ -15,6 +15,7 @@ from wholebody.arrays import Array
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.problem import Problem
+    from wholebody.scene import Scene
 
 UP, DOWN, FRONT, LEFT, RIGHT = (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, -1, 0)
 WOOD = (0.60, 0.48, 0.36, 1.0)
@@ -219,7 +220,7 @@ def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[Task
     ]
     picture = f"{name.replace(' ', '_')}.png"
     if pictures is not None:
-        _draw(problem, q, pictures / picture)
+        draw(problem.scene, q, pictures / picture)
     row = TaskRow(
         task=name,
         status=str(solution.status),
@@ -262,11 +263,12 @@ def _largest(angles: Mapping[str, float], ending: str) -> float:
     return float(np.degrees(max(value for joint, value in angles.items() if joint.endswith(ending))))
 
 
-def _draw(problem: Problem, q: Array, path: Path) -> None:
+def draw(scene: Scene, q: Array, path: Path) -> None:
+    """Draw a posture from its front right into a file; a door is see-through."""
     from wholebody.view import Viewer
 
-    glass = [name for name in problem.scene.objects if name == "door"]
-    with Viewer(problem.scene, contact_distance=-1.0, see_through=glass) as viewer:
+    glass = [name for name in scene.objects if name == "door"]
+    with Viewer(scene, contact_distance=-1.0, see_through=glass) as viewer:
         viewer.show(q)
         viewer.look((3.5, -2.9, 1.9), (0.05, 0.0, 1.08))
         viewer.picture(path, SIZE, legend=False)

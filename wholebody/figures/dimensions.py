@@ -111,7 +111,8 @@ FINGER_BASES = {
     "ring": (-0.158, 0.440),
     "little": (-0.267, 0.396),
 }
-"""Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist."""
+"""Knuckles, and the root of the thumb: in hand breadths to the thumb's side, in hand lengths from the wrist.
+They are MyoHand's, as in the table "hand"."""
 
 _HAND_COLUMNS = {
     "length": "length_frac_of_hand_length",

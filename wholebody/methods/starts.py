@@ -8,8 +8,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.figures.human_fingers import finger_angles
 from wholebody.figures.state import State
 from wholebody.problem import Problem
+from wholebody.tasks.grasp import Grasp
 
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
@@ -76,6 +78,27 @@ def named_postures(problem: Problem, state: State, start: Array) -> Iterator[Arr
         if figure.root == "free":
             q[:7] = pin.SE3ToXYZQUAT(_upright(start[:7]) * pin.XYZQUATToSE3(q[:7]))
         yield _moved(problem, state, start, pin.difference(figure.model, start, q))
+
+
+def closed_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start with closed fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
+
+    An open hand comes to a thin bar with the roots of its fingers, and closing leads away from it. First the thumb
+    is as at the start, then that of a fist, which lies over the fingers.
+
+    Args:
+        problem: its bounds are kept.
+        state: of the run; it is moved.
+        start: (nq,).
+    """
+    figure = problem.scene.figure
+    terms = (*problem.goals, *problem.constraints)
+    sides = sorted({term.hand.split("_")[0] for term in terms if isinstance(term, Grasp) and term.kind == "power"})
+    fist = {joint: angle for side in sides for joint, angle in finger_angles("fist", side).items()}
+    if fist and fist.keys() <= set(figure.joints):
+        for angles in ({joint: angle for joint, angle in fist.items() if "thumb" not in joint}, fist):
+            q = figure.with_joints(start, angles)
+            yield _moved(problem, state, start, pin.difference(figure.model, start, q))
 
 
 def throughout(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:

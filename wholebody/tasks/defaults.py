@@ -18,11 +18,18 @@ from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
+from wholebody.tasks.support import convex_polygon, least_width, standing_points
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
 AS_AT_START = 1e-3
 """m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
+
+STEADY = 0.15
+"""Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width:
+41 mm of the median man with his feet side by side. Who leans as far as he can uses about 0.6 of the foot's length
+(King, Judge & Wolfson 1994, Journal of Gerontology 49(6): M258-M263, recalled), which is a share of 0.2; an ESTIMATE
+beside it."""
 
 
 def default_measures(scene: Surroundings, *, ranges: bool) -> list[Measure]:
@@ -66,7 +73,8 @@ def default_constraints(
         found.append(ReachCones())
     asked = stands(scene, start, stated, bounds, goals) if balance is None else balance
     if asked and not known & {Balance, Stand}:
-        found.append(Balance())
+        corners = convex_polygon(standing_points(scene, start, FEET)[:, :2])
+        found.append(Balance(margin=STEADY * least_width(corners)))
     return found
 
 

@@ -79,7 +79,7 @@ def convex_polygon(points: Array) -> Array:
     ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
     hull = _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
     corners = np.array(hull).reshape(-1, 2)
-    if len(corners) < 3 or _width(corners) < THINNEST:
+    if len(corners) < 3 or least_width(corners) < THINNEST:
         raise InputError(
             "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
         )
@@ -124,7 +124,7 @@ def _half_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
     return hull
 
 
-def _width(corners: Array) -> float:
+def least_width(corners: Array) -> float:
     """Least extent of a polygon over the directions of its normals."""
     normals, offsets = edges(corners)
     return float((corners @ normals.T - offsets).max(axis=0).min())

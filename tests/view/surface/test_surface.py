@@ -10,9 +10,11 @@ import pinocchio as pin
 import pytest
 
 from wholebody.figures import load
+from wholebody.figures.anthropometry import design_cases
 from wholebody.geometry.mesh_cache import VARIABLE, cache_state
 from wholebody.view.surface import Surface, surface_of
 from wholebody.view.surface import surface as surfaces
+from wholebody.view.surface.person_shape import PersonShape
 
 PEOPLE: dict[str, dict[str, Any]] = {
     "median man": {},
@@ -234,3 +236,22 @@ def test_the_shirt_ends_in_one_level_line_and_covers_the_belt(who: str) -> None:
     np.testing.assert_allclose(lowest, hem, atol=5e-4)
     under = trousers.vertices[trousers.vertices[:, 2] > hem + 0.002]
     assert turns(under, shirt.vertices[shirt.faces]).min() > 0.5
+
+
+@pytest.mark.parametrize("case", ["F5", "F50", "M50", "M95"])
+def test_the_drawn_neck_has_the_girth_that_was_measured(case: str) -> None:
+    """Of people of that stature and mass (ANSUR II), although the piece within is thinner."""
+    person = design_cases()[case]
+    shape = PersonShape(person)
+    (head,) = (garment for garment in shape.garments() if garment.name == "head")
+    low, high = shape.at("neck"), shape.at("head")
+    turn = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]
+    around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
+    radii = np.linspace(0.02, 0.15, 1301)
+    girths = []
+    for share in np.linspace(0.2, 0.9, 8):
+        rays = low + share * (high - low) + radii[:, None, None] * around
+        inside = head.field(rays.reshape(-1, 3)).reshape(rays.shape[:2]) < 0.0
+        ends = radii[inside.sum(axis=0) - 1, None] * around
+        girths.append(np.linalg.norm(ends - np.roll(ends, 1, axis=0), axis=1).sum())
+    assert min(girths) == pytest.approx(2.0 * np.pi * person.radius("neck"), abs=0.005)

@@ -18,7 +18,7 @@ def add_to(commands: Commands) -> None:
         help="compare the person with people: sizes, ranges, self-contacts, everyday tasks",
         description="Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
         "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
-        "docs/human.md, with a picture of each task.",
+        "docs/human.md, with a picture of each contact and task.",
     )
 
 
@@ -50,7 +50,8 @@ def run(arguments: argparse.Namespace) -> int:
         if drawn:
             folder = arguments.update_docs / "assets" / "human"
             make_folder(folder)
-            for row in found.tasks:
-                shutil.copyfile(pictures / row.picture, folder / row.picture)
+            names = [row.picture for row in found.contacts if row.drawn] + [row.picture for row in found.tasks]
+            for name in names:
+                shutil.copyfile(pictures / name, folder / name)
         print(f"wrote {arguments.update_docs / 'human.md'}")
     return 0

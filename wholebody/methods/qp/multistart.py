@@ -18,7 +18,7 @@ from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, named_postures, restarts, throughout
+from wholebody.methods.starts import Minima, closed_hands, named_postures, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
@@ -109,6 +109,9 @@ class Search:
         least = least_left(self.contradictions)
         if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
+        for local, how in self._relaxed_probes(closed_hands(self.problem, self.lineariser.state, start)):
+            if self._accept(local, how):
+                return
         if self._known_out_of_reach(self.best.q):
             return
         self._least = least

@@ -159,7 +159,7 @@ class PersonShape:
                         np.array([0.066, 0.062, 0.062]) * scale,
                     )
                 )
-        collar = 0.94 * size.body.radius("neck") + 0.006
+        collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
         body = grown(union(solids, 0.035 * scale), CLOTH)
         hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
@@ -216,9 +216,9 @@ class PersonShape:
         shape, frame = head_shape(self.size), self.bind["head"]
         scale = self.size.stature / 1.75
         bottom, top = self.at("neck", (0.0, 0.0, -0.04)), self.at("head", (self.size.head_x, 0.0, self.size.head_top))
-        radius = 0.9 * self.person.radius("neck")
+        radius = 0.98 * self.person.radius("neck")
         throat = self.at("head", (self.size.head_x - 0.030 * scale, 0.0, self.size.head_bottom + 0.06 * scale))
-        neck = round_cone(bottom, throat, 1.06 * radius, 0.97 * radius)
+        neck = round_cone(bottom, throat, 1.06 * radius, 0.98 * radius)
         skin = union([placed(shape.skin, frame), neck], 0.022)
         low, high = bounds([bottom, top], 0.15 * scale)
         low[2], high[2] = bottom[2] - radius - 0.02, top[2] + 0.03

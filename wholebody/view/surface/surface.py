@@ -22,7 +22,7 @@ from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
 
-FORMAT = "6"
+FORMAT = "7"
 """Part of the key of kept surfaces: another one whenever a shape, a weight or the layout changes."""
 
 HALF = "/half"
