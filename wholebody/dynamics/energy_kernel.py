@@ -22,6 +22,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.dynamics.contact_kernel import join
 from wholebody.dynamics.motion_kernel import angular_momentum
 
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
@@ -48,28 +49,18 @@ def _islands(
     kind: Indices,
 ) -> None:
     """Write which bodies a contact pushes, the island of each, and what the islands touch; see `restrain`."""
-    for b in range(len(root)):
-        root[b], kind[b], pushed[b] = b, FREE, False
+    bearing, count = np.empty(len(bodies), dtype=np.intp), 0
+    kind[:], pushed[:] = FREE, False
     for c in range(len(bodies)):
         if c < contacts and impulse[c, 0] <= 0.0:
             continue
-        first, second = bodies[c, 0], bodies[c, 1]
+        bearing[count] = c
+        count += 1
         if c < contacts:
-            pushed[first], pushed[second] = moving[first], moving[second]
-        if moving[first] and moving[second]:
-            while root[first] != first:
-                first = root[first]
-            while root[second] != second:
-                second = root[second]
-            root[max(first, second)] = min(first, second)
-    for b in range(len(root)):
-        top = b
-        while root[top] != top:
-            top = root[top]
-        root[b] = top
-    for c in range(len(bodies)):
-        if c < contacts and impulse[c, 0] <= 0.0:
-            continue
+            for side in range(2):
+                pushed[bodies[c, side]] = moving[bodies[c, side]]
+    join(bearing[:count], bodies, moving, root)
+    for c in bearing[:count]:
         for side in range(2):
             own, other = bodies[c, side], bodies[c, 1 - side]
             if moving[own] and not moving[other]:
