@@ -24,6 +24,7 @@ LOOPS = (
     "wholebody.methods.newton.linear_algebra.normal_equations",
     "wholebody.methods.qp.active_set",
     "wholebody.methods.qp.curved_reach",
+    "wholebody.methods.qp.escaping",
     "wholebody.methods.qp.solvers.osqp_solver",
     "wholebody.methods.qp.solvers.split_form",
     "wholebody.methods.qp.step_program",

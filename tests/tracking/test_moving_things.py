@@ -15,7 +15,7 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
-from wholebody.bench.world.throws import DT, SHAPES, Throw
+from wholebody.bench.world.throws import DT, SHAPES, Throw, throws
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 
@@ -90,6 +90,18 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
                 assert throw.ends(step.q) < 1e-4
             q = step.q
     assert could
+
+
+@pytest.mark.parametrize(
+    ("thing", "speed", "person", "count"), [("plate of 1 mm", 10.0, "stands", 2), ("board", 20.0, "walks", 3)]
+)
+def test_nobody_ends_inside_where_another_search_finds_a_free_posture(
+    thing: str, speed: float, person: str, count: int
+) -> None:
+    """The root has to turn and go at once, which programs from where it may go alone do not find."""
+    row = throws(thing, speed, person, swift=False, count=count)
+    assert row.named
+    assert row.avoidable == row.silent == 0
 
 
 def hash_of(kind: str, speed: float) -> int:
