@@ -39,6 +39,9 @@ def compiled_kernel() -> Any:
     energy_kernel.restrain(
         pairs, vectors, vectors, some, 1.0, mask, mask, mask, mass, unit, one, unit, twist, twist, np.zeros(3), mask[:0]
     )
+    energy_kernel.settle(
+        pairs, vectors, some, 0, mask, mask, ~mask, mass, unit, one, unit, twist, one, unit, twist, np.zeros(3)
+    )
     contact_kernel.rates(pairs, laid[1], twist, vectors)
     contact_kernel.join(none, pairs, mask, np.zeros(1, dtype=np.intp))
     contact_kernel.apply(pairs, laid[2], twist, vectors)

@@ -34,10 +34,11 @@ WAYS = (
 RANDOM = 150  # more starts; more = free postures are missed less, and a frame that has none costs more
 FARTHEST = 1.0  # m, rad: of a random start, where no bound is nearer
 WITHIN = 0.02  # m: pairs nearer than this are parted; farther ones cost more and may come in the way of a step
-GAP = 3e-4  # m: to which they are; a step is exact to first order only
-ROUNDS, SWEEPS = 25, 30  # from one start, and over all rows in each, at most
-WORTH = 0.95  # share of the depth that a round must leave at most ...
-WEAK = 3  # ... or else it is one of so many from one start; larger is slower and finds more
+GAP = 3e-4  # m: to which pairs are parted; a round is exact to first order only
+ROUNDS = 25  # from one start, at most
+SWEEPS = 30  # over all rows in one round, at most
+WORTH = 0.95  # share of the depth that a round must leave at most, or else it is weak
+WEAK = 3  # rounds from one start that may be weak; larger is slower and finds more
 LEAST = 1e-9  # of the square of a row that moves anything, and m or rad that a row lacks
 
 
