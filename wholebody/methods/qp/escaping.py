@@ -16,7 +16,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.compiled import compiled
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (
@@ -36,10 +35,8 @@ FARTHEST = 1.0  # m, rad: of a random start, where no bound is nearer
 WITHIN = 0.02  # m: pairs nearer than this are parted; farther ones cost more and may come in the way of a step
 GAP = 3e-4  # m: to which pairs are parted; a round is exact to first order only
 ROUNDS = 25  # from one start, at most
-SWEEPS = 30  # over all rows in one round, at most
 WORTH = 0.95  # share of the depth that a round must leave at most, or else it is weak
 WEAK = 3  # rounds from one start that may be weak; larger is slower and finds more
-LEAST = 1e-9  # of the square of a row that moves anything, and m or rad that a row lacks
 
 
 class Barriers(NamedTuple):
@@ -67,7 +64,7 @@ def free_end(model: pin.Model, q: Array, out: float, look: Callable[[Array], Bar
         out: depth up to which a posture is free, metres.
         look: what stands around a posture (nq,).
     """
-    project, box = compiled_kernel(), look(q).box.copy()
+    project, box = compiled_kernel().project, look(q).box.copy()
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0
         for _ in range(ROUNDS):
@@ -104,30 +101,7 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The projection, compiled or read back."""
-    _project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
-    return _project
+    from wholebody.methods.qp import escaping_kernel
 
-
-@compiled()
-def _project(rows: Array, room: Array, low: Array, high: Array, gone: Array) -> None:
-    """Add to a displacement (nv,) what every row lacks, one after the other, and keep it within bounds (nv,)."""
-    count, size = rows.shape
-    square, left = np.zeros(count), room.copy()
-    for r in range(count):
-        for k in range(size):
-            square[r] += rows[r, k] * rows[r, k]
-            left[r] -= rows[r, k] * gone[k]  # the room is that at the displacement so far
-    for _ in range(SWEEPS):
-        changed = False
-        for r in range(count):
-            if square[r] < LEAST:
-                continue
-            here = left[r]
-            for k in range(size):
-                here += rows[r, k] * gone[k]
-            if here < -LEAST:
-                changed = True
-                for k in range(size):
-                    gone[k] = min(max(gone[k] - here / square[r] * rows[r, k], low[k]), high[k])
-        if not changed:
-            return
+    escaping_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
+    return escaping_kernel
