@@ -121,7 +121,10 @@ class RigidBodies:
             InputError: the place is not three finite numbers.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        lever = point - self.state.position[number]
+        return self._velocity(number, point - self.state.position[number])
+
+    def _velocity(self, number: int, lever: Array) -> Array:
+        """Velocity (3,) of a body's point at a place (3,) seen from its centre of mass, m/s."""
         return np.asarray(self.state.velocity[number] + pin.skew(self.state.spin[number]) @ lever)
 
     def mobility(self, name: str, point: Array) -> Array:
@@ -157,7 +160,7 @@ class RigidBodies:
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
         lever, jointed = point - self.state.position[number], self._joints.jointed[number]
-        before = self.energy() if jointed else 0.5 * float(impulse @ self.velocity_at(name, point))
+        before = self.energy() if jointed else 0.5 * float(impulse @ self._velocity(number, lever))
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
         self.state.moving |= self._joints.linked(number)
@@ -165,7 +168,7 @@ class RigidBodies:
             self._joints.keep(self.state, self.state.twist, self.state.moving)
             self._pushed += self.energy() - before
         else:  # along the mean of the velocities before and after
-            self._pushed += before + 0.5 * float(impulse @ self.velocity_at(name, point))
+            self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
     def _inverse_inertia(self, number: int) -> Array:
         rotation = self.state.rotation[number]

@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.linearisation import Passing
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (
@@ -53,6 +54,15 @@ class Barriers(NamedTuple):
     rows: Array
     room: Array
     box: Array
+
+
+def barriers(at: Passing, rows: Array, room: Array) -> Barriers:
+    """What stands around a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
+    gaps = at.gap - np.minimum(at.clearance, GAP)
+    return Barriers(
+        -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
+        np.concatenate([gaps, room]), at.box,
+    )  # fmt: skip
 
 
 def free_end(model: pin.Model, q: Array, out: float, look: Callable[[Array], Barriers]) -> Array | None:

@@ -15,7 +15,7 @@ from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import Passing
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.qp.escaping import GAP, WITHIN, Barriers, free_end
+from wholebody.methods.qp.escaping import WITHIN, Barriers, barriers, free_end
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
@@ -240,12 +240,7 @@ class QPTracker(OfOneRun):
     def _barriers(self, q: Array) -> Barriers:
         """What stands around a posture (nq,), with all things where they are."""
         at = self._lineariser.passing(q, WITHIN)
-        rows, room = self._program.bounded(at)
-        gaps = at.gap - np.minimum(at.clearance, GAP)
-        return Barriers(
-            -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
-            np.concatenate([gaps, room]), at.box,
-        )  # fmt: skip
+        return barriers(at, *self._program.bounded(at))
 
     def _speeds(self, q: Array) -> Array | None:
         """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
