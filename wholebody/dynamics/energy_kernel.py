@@ -69,6 +69,8 @@ def _islands(
             own, other = bodies[c, side], bodies[c, 1 - side]
             if moving[own] and not moving[other]:
                 kind[root[own]] = max(kind[root[own]], DRIVEN if given[other] else FIXED)
+            elif moving[own] and own == other:  # a joint to the world
+                kind[root[own]] = max(kind[root[own]], FIXED)
 
 
 @compiled()
