@@ -22,6 +22,7 @@ TOGETHER = (
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
         "wholebody.methods.qp.curved_reach",
+        "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
         "wholebody.methods.qp.solvers.osqp_solver",
         "wholebody.methods.qp.solvers.split_form",

@@ -129,7 +129,7 @@ def test_the_program_goes_the_same_way_as_the_clear_version(seed: int, visits: i
 def test_islands_do_not_reach_through_fixed_bodies() -> None:
     bodies = np.array([(1, 2), (4, 3), (0, 1), (0, 3), (5, 4), (2, 6)])
     root, movable = np.empty(7, dtype=np.intp), np.array([False] + 6 * [True])
-    solve_kernel._join(np.arange(5), bodies, movable, root)  # the last point bears nothing
+    contact_kernel.join(np.arange(5), bodies, movable, root)  # the last point bears nothing
     assert root.tolist() == [0, 1, 1, 3, 3, 3, 6]
 
 

@@ -52,8 +52,8 @@ def test_energy_grows_by_no_more_than_the_figure_gives(name: str) -> None:
     for q in scene.track.q:
         made = world.step(q).engine
         assert made is not None
-        # what a joint holds while the figure pushes it keeps what the program's tolerance adds
-        assert made.energy <= energy + made.work + {"door": 1e-6, "bag": 1e-2}.get(name, 1e-10)
+        # joints are closed to a nanometre, and the bag weighs 150 N
+        assert made.energy <= energy + made.work + {"bag": 1e-7}.get(name, 1e-10)
         energy, worked = made.energy, worked + made.work
     assert worked > 0.0 or name == "stairs"
 

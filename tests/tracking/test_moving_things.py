@@ -15,7 +15,7 @@ import pytest
 
 import wholebody as wb
 from wholebody import tracking
-from wholebody.bench.world.throws import DT, SHAPES, Throw
+from wholebody.bench.world.throws import DT, SHAPES, Throw, throws
 from wholebody.methods.solve import as_method
 from wholebody.tracking.loop import FrameLoop
 
@@ -92,6 +92,18 @@ def test_nobody_ends_inside_where_the_root_could_have_gone_somewhere_free() -> N
     assert could
 
 
+@pytest.mark.parametrize(
+    ("thing", "speed", "person", "count"), [("plate of 1 mm", 10.0, "stands", 2), ("board", 20.0, "walks", 3)]
+)
+def test_nobody_ends_inside_where_another_search_finds_a_free_posture(
+    thing: str, speed: float, person: str, count: int
+) -> None:
+    """The root has to turn and go at once, which programs from where it may go alone do not find."""
+    row = throws(thing, speed, person, swift=False, count=count)
+    assert row.named
+    assert row.avoidable == row.silent == 0
+
+
 def hash_of(kind: str, speed: float) -> int:
     return 10 * list(KINDS).index(kind) + int(speed)
 
@@ -134,7 +146,7 @@ def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str, kind: str) -> N
         throw = Thrown(seed, kind, speed)
         q = throw.scene.figure.posture("standing")
         loop = FrameLoop(throw.scene, q, overlap=overlap)
-        named = 0
+        named = parts = 0
         for _ in range(min(throw.frames, 20)):
             before, way = loop.shown, throw.next()
             q = q.copy()
@@ -144,11 +156,16 @@ def test_the_frame_loop_names_what_it_cannot_avoid(overlap: str, kind: str) -> N
             if ends > 1.2e-4:
                 assert frame.collisions
             began = throw.deepest(((0.0, before), (0.0, before)), way, 1)
-            if overlap == "ccd" and not frame.collisions and began < 1e-5:  # what was in before was named then
-                assert throw.deepest(((0.0, before), (1.0, frame.q)), way, 60) < 3e-4
+            assert frame.path[0][1] == pytest.approx(before)
+            assert frame.path[-1][1] == pytest.approx(frame.q)
+            parts = max(parts, len(frame.path) - 1)
+            if not frame.collisions and began < 1e-5:  # what was in before was named then
+                straight = throw.deepest(((0.0, before), (1.0, frame.q)), way, 60)
+                assert straight < 4e-4 or throw.deepest(frame.path, way) < 4e-4
             for one in frame.collisions:
                 assert str(one) in frame.note
             named += bool(frame.collisions)
+        assert (parts > 1) == (overlap == "qp")
         if speed > 10.0:
             assert named
         elif overlap == "qp":

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 
@@ -197,3 +197,28 @@ def start_from(
             start[best, 0] = max(start[best, 0], 0.0)
     for c in range(len(new_pair)):
         head[new_pair[c]] = -1
+
+
+@compiled()
+def join(points: Indices, bodies: Indices, movable: Mask, root: Indices) -> None:
+    """Write the least body of the island of each: bodies that points join, which do not reach through fixed bodies.
+
+    Args:
+        points: (k,) those that join, such as the points that bear something.
+        bodies: (m, 2) of all points.
+        movable: (n,) bodies that islands may reach through.
+        root: (n,) room.
+    """
+    for body in range(len(root)):
+        root[body] = body
+    for c in points:
+        a, b = bodies[c, 0], bodies[c, 1]
+        if not movable[a] or not movable[b]:
+            continue
+        while root[a] != a:
+            a = root[a]
+        while root[b] != b:
+            b = root[b]
+        root[max(a, b)] = min(a, b)
+    for body in range(len(root)):  # lesser bodies know theirs already
+        root[body] = root[root[body]]

@@ -61,13 +61,15 @@ class PushedContacts:
         """
         engine, state = self._engine, self._state
         twists = (state.support * state.spread(velocity)) @ state.columns
+        hands = [twists[joint, :3] + pin.skew(twists[joint, 3:]) @ point for joint, _, _, point, _ in self.rows]
+        mobilities = [
+            engine.mobility(thing, point) + self._mobility(joint, point) for joint, thing, _, point, _ in self.rows
+        ]
         given: dict[str, Array] = {}
         for _ in range(ROUNDS):
             moved = False
-            for joint, thing, piece, point, normal in self.rows:
-                hand = twists[joint, :3] + np.cross(twists[joint, 3:], point)
+            for (_, thing, piece, point, normal), hand, mobility in zip(self.rows, hands, mobilities, strict=True):
                 relative = engine.velocity_at(thing, point) - hand
-                mobility = engine.mobility(thing, point) + self._mobility(joint, point)
                 impulse = contact_impulse(relative, normal, mobility, surfaces[piece, thing])
                 if impulse is not None:
                     engine.push(thing, impulse, point)

@@ -14,6 +14,9 @@ velocities
 with the greatest s that adds no energy. w is zero for an island that rests on something fixed; for one that touches
 nothing fixed it is the motion that the whole of it has as one rigid body, so momentum stays. Every u is scaled by s, so
 what kept pieces apart still does.
+
+Bodies with joints, and what something moved pushes, are settled after they have moved, when their energy and the work
+on them are known: their velocities are scaled likewise. Joints without contacts keep their energy exactly.
 """
 
 from __future__ import annotations
@@ -22,8 +25,10 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.dynamics.contact_kernel import join
 from wholebody.dynamics.motion_kernel import angular_momentum
 
+LARGEST = 1.05  # of s: an island with joints that hardly moves is not made to move by what rounding left
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
@@ -48,32 +53,24 @@ def _islands(
     kind: Indices,
 ) -> None:
     """Write which bodies a contact pushes, the island of each, and what the islands touch; see `restrain`."""
-    for b in range(len(root)):
-        root[b], kind[b], pushed[b] = b, FREE, False
+    bearing, count = np.empty(len(bodies), dtype=np.intp), 0
+    kind[:], pushed[:] = FREE, False
     for c in range(len(bodies)):
         if c < contacts and impulse[c, 0] <= 0.0:
             continue
-        first, second = bodies[c, 0], bodies[c, 1]
+        bearing[count] = c
+        count += 1
         if c < contacts:
-            pushed[first], pushed[second] = moving[first], moving[second]
-        if moving[first] and moving[second]:
-            while root[first] != first:
-                first = root[first]
-            while root[second] != second:
-                second = root[second]
-            root[max(first, second)] = min(first, second)
-    for b in range(len(root)):
-        top = b
-        while root[top] != top:
-            top = root[top]
-        root[b] = top
-    for c in range(len(bodies)):
-        if c < contacts and impulse[c, 0] <= 0.0:
-            continue
+            for side in range(2):
+                pushed[bodies[c, side]] = moving[bodies[c, side]]
+    join(bearing[:count], bodies, moving, root)
+    for c in bearing[:count]:
         for side in range(2):
             own, other = bodies[c, side], bodies[c, 1 - side]
             if moving[own] and not moving[other]:
                 kind[root[own]] = max(kind[root[own]], DRIVEN if given[other] else FIXED)
+            elif moving[own] and own == other:  # a joint to the world
+                kind[root[own]] = max(kind[root[own]], FIXED)
 
 
 @compiled()
@@ -97,7 +94,7 @@ def restrain(
 ) -> None:
     """Scale velocities down where an island gained energy.
 
-    Islands with joints keep the energy that RATTLE gives them, and those that something moved pushes are left alone.
+    Islands with joints, and those that something moved pushes, are settled after they have moved: see `settle`.
 
     Args:
         bodies: (m, 2) of all points, those of joints at the end.
@@ -143,7 +140,76 @@ def restrain(
     for island in range(count):
         if gain[island] > 0.0:
             _scale(
-                island, kind[island] == FREE, gain[island], root, chosen, mass, inertia, position, rotation, twist, fall
+                island, kind[island] == FREE, gain[island], 1.0, root, chosen, mass, inertia, position, rotation, twist,
+                fall,
+            )  # fmt: skip
+
+
+@compiled()
+def settle(
+    bodies: Indices,
+    impulse: Array,
+    work: Array,
+    contacts: int,
+    moving: Mask,
+    given: Mask,
+    jointed: Mask,
+    mass: Array,
+    inertia: Array,
+    position: Array,
+    rotation: Array,
+    twist: Array,
+    old_position: Array,
+    old_rotation: Array,
+    old_twist: Array,
+    gravity: Array,
+) -> None:
+    """Scale the velocities of islands with joints, and of those that something moved pushes, after a step.
+
+    Afterwards they have no more energy than before the step and the work on them, and joints without contacts neither
+    less.
+
+    Args:
+        bodies: (m, 2) of all points, those of joints after the `contacts` of contacts.
+        impulse: (m, 3) of the program.
+        work: (m,) of what is moved at each point, joules.
+        contacts: how many points are those of contacts.
+        moving: (n,) bodies that move by themselves and do not sleep.
+        given: (n,) bodies that are moved.
+        jointed: (n,) bodies with joints.
+        mass: (n,).
+        inertia: (n, 3, 3) in the bodies.
+        position: (n, 3) centres of mass after the step.
+        rotation: (n, 3, 3).
+        twist: (n, 6) changed in place.
+        old_position: (n, 3) before the step.
+        old_rotation: (n, 3, 3).
+        old_twist: (n, 6).
+        gravity: (3,) m/s2.
+    """
+    count = len(moving)
+    root, kind = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
+    pushed, linked = np.empty(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    _islands(bodies, impulse, contacts, moving, given, pushed, root, kind)
+    gain, touched, turning = np.zeros(count), np.zeros(count, dtype=np.bool_), np.empty(3)
+    for c in range(len(bodies)):
+        if c >= contacts or impulse[c, 0] > 0.0:
+            gain[root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]] -= work[c]
+    for b in range(count):
+        if moving[b]:
+            linked[root[b]] |= jointed[b]
+            touched[root[b]] |= pushed[b]
+            gain[root[b]] += _kinetic(mass[b], rotation[b], inertia[b], twist[b], turning)
+            gain[root[b]] -= _kinetic(mass[b], old_rotation[b], inertia[b], old_twist[b], turning)
+            for k in range(3):
+                gain[root[b]] -= mass[b] * gravity[k] * (position[b, k] - old_position[b, k])
+    still = np.zeros(3)
+    for island in range(count):
+        keeps = linked[island] and not touched[island]
+        if keeps or (gain[island] > 0.0 and (linked[island] or kind[island] == DRIVEN)):
+            _scale(
+                island, kind[island] == FREE, gain[island], LARGEST if keeps else 1.0, root, moving, mass, inertia,
+                position, rotation, twist, still,
             )  # fmt: skip
 
 
@@ -152,6 +218,7 @@ def _scale(
     island: int,
     free: bool,
     excess: float,
+    most: float,
     root: Indices,
     chosen: Mask,
     mass: Array,
@@ -161,7 +228,7 @@ def _scale(
     twist: Array,
     fall: Array,
 ) -> None:
-    """Take an energy from an island; arguments as in `restrain`."""
+    """Take an energy from an island, by a share `s` of at most `most`; other arguments as in `restrain`."""
     whole, centre, spin = np.zeros(6), np.zeros(3), np.zeros(3)
     if free:
         _as_one(island, root, chosen, mass, inertia, position, rotation, twist, centre, whole, spin)
@@ -179,7 +246,7 @@ def _scale(
     if square > 0.0:
         root_of = linear * linear - 4.0 * square * rest
         if root_of > 0.0:
-            share = min(1.0, max(0.0, (-linear + np.sqrt(root_of)) / (2.0 * square)))
+            share = min(most, max(0.0, (-linear + np.sqrt(root_of)) / (2.0 * square)))
     for b in range(len(root)):
         if chosen[b] and root[b] == island:
             _seen(b, free, position, twist, centre, whole, own)

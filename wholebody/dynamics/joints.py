@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
-from wholebody.dynamics import joint_kernel, passing_kernel, solve_kernel
+from wholebody.dynamics import contact_kernel, joint_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.pieces import Pieces
 from wholebody.matter.joints import Hinge
@@ -64,9 +64,9 @@ class Joints:
         self._world: Mask = np.array(world, dtype=bool)
         self.jointed: Mask = np.zeros(len(pieces.names), dtype=bool)
         self.jointed[self.bodies] = True
-        self._island = np.arange(len(pieces.names))
-        passing_kernel.join(
-            self.bodies[:, 0].copy(), self.bodies[:, 1].copy(), pieces.dynamic.astype(np.intp), self._island
+        self._island = np.empty(len(pieces.names), dtype=np.intp)
+        contact_kernel.join(
+            np.arange(len(self.bodies)), self.bodies, pieces.dynamic, self._island
         )  # fmt: skip
 
     def _points(self, number: int, joint: object) -> list[Array]:

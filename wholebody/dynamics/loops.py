@@ -39,7 +39,11 @@ def compiled_kernel() -> Any:
     energy_kernel.restrain(
         pairs, vectors, vectors, some, 1.0, mask, mask, mask, mass, unit, one, unit, twist, twist, np.zeros(3), mask[:0]
     )
+    energy_kernel.settle(
+        pairs, vectors, some, 0, mask, mask, ~mask, mass, unit, one, unit, twist, one, unit, twist, np.zeros(3)
+    )
     contact_kernel.rates(pairs, laid[1], twist, vectors)
+    contact_kernel.join(none, pairs, mask, np.zeros(1, dtype=np.intp))
     contact_kernel.apply(pairs, laid[2], twist, vectors)
     contact_kernel.start_from(none, vectors, vectors, none, none, vectors, laid[0], 1.0, vectors)
     impact_kernel.resolve(none, none, pairs, *laid, some, some, held, mask, twist, 1.0, 1, vectors, np.zeros((1, 5)))
@@ -47,5 +51,4 @@ def compiled_kernel() -> Any:
         pairs, some, vectors, some, vectors, turned, turned, none, one, mass, mass, 0.0, 1.0, vectors,
         none, none, some, vectors, np.zeros((0, 4)), mask[:0],
     )  # fmt: skip
-    passing_kernel.join(none, none, none, none)
     return motion_kernel

@@ -180,30 +180,3 @@ def _part(
     """By how much a direction parts two pieces, metres."""
     low = -highest(pair[1], placement, direction, -1.0, points, start, count, radius, axes, plane)
     return low - highest(pair[0], placement, direction, 1.0, points, start, count, radius, axes, plane)
-
-
-@compiled()
-def join(first: Indices, second: Indices, moving: Indices, root: Indices) -> None:
-    """Join bodies that touch into islands: `root` (n,) becomes the least body of the island of each.
-
-    Args:
-        first: (k,) bodies.
-        second: (k,) bodies that touch them.
-        moving: (n,) 1 for bodies that move by themselves; islands do not reach through others.
-        root: (n,) the numbers 0 ... n - 1.
-    """
-    for c in range(len(first)):
-        a, b = first[c], second[c]
-        if moving[a] == 0 or moving[b] == 0:
-            continue
-        while root[a] != a:
-            a = root[a]
-        while root[b] != b:
-            b = root[b]
-        if a != b:
-            root[max(a, b)] = min(a, b)
-    for body in range(len(root)):
-        top = body
-        while root[top] != top:
-            top = root[top]
-        root[body] = top

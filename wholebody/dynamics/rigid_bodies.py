@@ -45,7 +45,7 @@ GIVEN_UP = 3  # steps of a frame that are too deep even so; then nothing helps, 
 FORESEEN = 2  # times that a step is made again with the points where it led too deep, before it is halved
 MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
 STOPS = 8  # early ends of steps in a frame, at most ...
-FEW = 25  # ... while so many bodies move; fewer with more of them: each stop costs a step of all bodies
+FEW = 12  # ... while so many bodies move; fewer with more of them: each stop costs a step of all bodies
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
@@ -121,8 +121,11 @@ class RigidBodies:
             InputError: the place is not three finite numbers.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        lever = point - self.state.position[number]
-        return np.asarray(self.state.velocity[number] + np.cross(self.state.spin[number], lever))
+        return self._velocity(number, point - self.state.position[number])
+
+    def _velocity(self, number: int, lever: Array) -> Array:
+        """Velocity (3,) of a body's point at a place (3,) seen from its centre of mass, m/s."""
+        return np.asarray(self.state.velocity[number] + pin.skew(self.state.spin[number]) @ lever)
 
     def mobility(self, name: str, point: Array) -> Array:
         """Change (3, 3) of the velocity of a body's point (3,) by an impulse there, 1/kg.
@@ -156,13 +159,16 @@ class RigidBodies:
         impulse = _bounded(impulse, STRONGEST, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        lever, before = point - self.state.position[number], self.energy()
+        lever, jointed = point - self.state.position[number], self._joints.jointed[number]
+        before = self.energy() if jointed else 0.5 * float(impulse @ self._velocity(number, lever))
         self.state.velocity[number] += impulse / self._pieces.mass[number]
-        self.state.spin[number] += self._inverse_inertia(number) @ np.cross(lever, impulse)
+        self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
         self.state.moving |= self._joints.linked(number)
-        if self._joints.jointed[number]:
+        if jointed:
             self._joints.keep(self.state, self.state.twist, self.state.moving)
-        self._pushed += self.energy() - before
+            self._pushed += self.energy() - before
+        else:  # along the mean of the velocities before and after
+            self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
     def _inverse_inertia(self, number: int) -> Array:
         rotation = self.state.rotation[number]
@@ -263,8 +269,10 @@ class RigidBodies:
         record.stops -= stopped
         record.time += time
         self._old = program.remembered(time)
-        record.work += program.work()
+        work = program.work()
+        record.work += float(work.sum())
         self._joints.keep(state, state.twist, state.moving)
+        program.settle(before.kept, work)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())

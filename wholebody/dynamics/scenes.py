@@ -28,6 +28,7 @@ GAP = 2e-4  # m: that things stand above what bears them at the start, so that t
 BALL = 0.02  # m: radius of the balls
 DOMINO = (0.008, 0.024, 0.048)  # m
 DOMINOES = 12
+SLAB = (0.05, 0.20, 0.60)  # m: of the dominoes that an avatar walks among
 STEP = (0.25, 1.0, 0.17)  # m: tread, width and rise of a stair
 STEPS = 6
 DOOR = (0.04, 0.90, 2.00)  # m: thickness, width and height of the door
@@ -188,6 +189,19 @@ def _bag(scene: Scene) -> None:
     )  # fmt: skip
 
 
+def _twenty_things(scene: Scene) -> None:
+    for number in range(8):
+        at = (0.65 + 0.22 * number, -0.15, 0.5 * SLAB[2] + GAP)
+        scene.add(Box(SLAB), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=100.0))
+    for number in range(6):
+        at = (0.75 + 0.25 * number, 0.035, 0.08 + GAP)
+        scene.add(Sphere(0.08), name=f"ball {number + 1}", at=at, color=RED, body=Body(density=60.0))
+    for number in range(6):
+        size, level = (0.25, 0.30, 0.35), number % 2
+        at = (0.7 + 0.5 * (number // 2), 0.27, (level + 0.5) * size[2] + (level + 1) * GAP)
+        scene.add(Box(size), name=f"carton {number + 1}", at=at, color=OAK, body=Body(density=60.0))
+
+
 # ---- the hand: position of the wrist, and the glove
 
 
@@ -304,6 +318,10 @@ _PLANS: dict[str, _Plan] = {
     "avatar_and_cartons": _Plan(
         "an avatar walks with its hands ahead into two cartons, one on the other, and a ball",
         "avatar", _walk_into, (3.4, -3.4, 1.9), (0.5, 0.0, 0.85), put=_things_to_walk_into,
+    ),
+    "room": _Plan(
+        "an avatar walks with its hands ahead through twenty things: dominoes, balls and cartons upon each other",
+        "avatar", _walk_through, (3.6, -3.4, 2.4), (1.1, 0.0, 0.6), put=_twenty_things,
     ),
     "door": _Plan(
         "an avatar walks with its hands ahead against a swinging door, and through it",

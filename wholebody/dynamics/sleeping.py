@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.arrays import Indices
-from wholebody.dynamics import passing_kernel
+from wholebody.dynamics import contact_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.geometry.proximity import Contacts
 
@@ -42,8 +42,8 @@ class Sleepers:
         if not (self._slow_for[state.moving] >= PATIENCE).any():
             return
         body = self._touching(near)
-        island = np.arange(len(state.position))
-        passing_kernel.join(body[:, 0].copy(), body[:, 1].copy(), state.pieces.dynamic.astype(np.intp), island)
+        island = np.empty(len(state.position), dtype=np.intp)
+        contact_kernel.join(np.arange(len(body)), body, state.pieces.dynamic, island)
         least = np.full(len(island), np.inf)
         waiting = np.where(state.pieces.dynamic, np.where(state.moving, self._slow_for, np.inf), np.inf)
         np.minimum.at(least, island, waiting)

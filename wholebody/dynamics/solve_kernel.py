@@ -14,8 +14,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
+from wholebody.dynamics.contact_kernel import join
 
 EXACTER = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
 NEARLY = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
@@ -306,7 +307,7 @@ def solve_islands(
         sweeps += 1
         if change < tolerance:
             return sweeps
-        _join(listed[:bearing], bodies, movable, root)
+        join(listed[:bearing], bodies, movable, root)
         first[:] = 0
         worst[:] = 0.0
         for c in listed[:bearing]:
@@ -333,24 +334,6 @@ def solve_islands(
             )  # fmt: skip
         if solved:
             return sweeps
-
-
-@compiled()
-def _join(points: Indices, bodies: Indices, movable: Mask, root: Indices) -> None:
-    """Write the least body (n,) of the island of each, joined by points; islands do not reach through fixed bodies."""
-    for body in range(len(root)):
-        root[body] = body
-    for c in points:
-        a, b = bodies[c, 0], bodies[c, 1]
-        if not movable[a] or not movable[b]:
-            continue
-        while root[a] != a:
-            a = root[a]
-        while root[b] != b:
-            b = root[b]
-        root[max(a, b)] = min(a, b)
-    for body in range(len(root)):  # lesser bodies know theirs already
-        root[body] = root[root[body]]
 
 
 @compiled(error_model="numpy")

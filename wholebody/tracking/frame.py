@@ -54,6 +54,7 @@ class Frame(NamedTuple):
         pairs: number of pairs of pieces that were kept apart or separated.
         note: "" or a report of unusual events.
         collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
     """
 
     q: Array
@@ -66,3 +67,4 @@ class Frame(NamedTuple):
     pairs: int
     note: str
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()

@@ -128,11 +128,17 @@ class FrameLoop(OfOneRun):
         else:
             resolution = self._strategy.resolve(self.shown, self._readable(goal))
         if motion is not None:
-            return self._shown(*self._kept_from_moving(resolution, motion), began=began)
+            resolution, collisions = self._kept_from_moving(resolution, motion)
+            return self._shown(resolution, collisions, resolution.path, began=began)
         return self._shown(self._kept_from_passing(resolution), began=began)
 
     def _shown(
-        self, resolution: Resolution, collisions: tuple[Collision, ...] = (), *, began: tuple[float, float]
+        self,
+        resolution: Resolution,
+        collisions: tuple[Collision, ...] = (),
+        path: tuple[tuple[float, Array], ...] = (),
+        *,
+        began: tuple[float, float],
     ) -> Frame:
         self.shown = np.array(resolution.candidates[0])
         left = ""
@@ -146,7 +152,7 @@ class FrameLoop(OfOneRun):
         return Frame(
             self.shown, wall, cpu, resolution.contact_seconds, resolution.solve_seconds,
             resolution.iterations, resolution.joints, resolution.pairs, note,
-            collisions,
+            collisions, path,
         )  # fmt: skip
 
     def _readable(self, goal: Array) -> Array:
@@ -202,7 +208,7 @@ class FrameLoop(OfOneRun):
         self._workspace.keep(motion, found)
         note = "; ".join(part for part in (resolution.note, *map(str, found)) if part)
         spent = resolution.contact_seconds + time.perf_counter() - began
-        return with_values(resolution, candidates=(best[-1][1],), contact_seconds=spent, note=note), found
+        return with_values(resolution, candidates=(best[-1][1],), contact_seconds=spent, note=note, path=best), found
 
     def _strategy_for(self, overlap: str, dt: float, seed: int, rigid: bool) -> OverlapStrategy:
         if overlap == "qp":

@@ -205,7 +205,7 @@ def _pendulums() -> list[ClosedRow]:
     worst = float(np.abs(changes).max()) / fall
     return [
         *rows,
-        ClosedRow("double pendulum, 10 s", "change of energy, parts of its weight times 1 m", worst, 0.0, 5e-3),
+        ClosedRow("double pendulum, 10 s", "change of energy, parts of its weight times 1 m", worst, 0.0, 1e-9),
     ]
 
 

@@ -1,19 +1,24 @@
 """The end of a frame in which a thing came faster than a figure can go along with: where else is it free?
 
-What is thin and fast is often past the figure at the end of the frame, or the figure may be beside it. So programs
-begin at the posture before, and where its root may go in the frame, all with the thing where it ends.
+What is thin and fast is often past the figure at the end of the frame, or the figure may be beside it. So postures
+within what bounds allow are sought with the thing where it ends: from the posture before, from where its root may go,
+and from random ones, near pairs are projected out of each other one after the other (Kaczmarz, 1937), again and again.
+A program would let all of them lack something where they cannot all be parted to first order, and hardly move.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import lru_cache
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.linearisation import Passing
 
-ROOT = 3  # coordinates of a free root's place
+ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (
     (1, 0, 0),
     (-1, 0, 0),
@@ -26,43 +31,87 @@ WAYS = (
     (-1, 1, 0),
     (-1, -1, 0),
 )
-PROGRAMS = 16  # from one start, at most
-WORTH = (
-    0.8  # share of the depth that a program must leave at most for one more to follow; larger is slower and finds more
-)
+RANDOM = 150  # more starts; more = free postures are missed less, and a frame that has none costs more
+FARTHEST = 1.0  # m, rad: of a random start, where no bound is nearer
+WITHIN = 0.02  # m: pairs nearer than this are parted; farther ones cost more and may come in the way of a step
+GAP = 3e-4  # m: to which pairs are parted; a round is exact to first order only
+ROUNDS = 25  # from one start, at most
+WORTH = 0.95  # share of the depth that a round must leave at most, or else it is weak
+WEAK = 3  # rounds from one start that may be weak; larger is slower and finds more
 
 
-def free_end(
-    model: pin.Model,
-    q: Array,
-    most: Array | None,
-    out: float,
-    overlap: Callable[[Array], float],
-    step: Callable[[Array, Array | None], Array],
-) -> Array | None:
+class Barriers(NamedTuple):
+    """What stands around a posture.
+
+    Attributes:
+        depth: greatest of any pair, metres.
+        rows: (k, nv) rates of what must not become negative.
+        room: (k,) how much that is, metres and radians.
+        box: (2, nv) displacements that bounds allow.
+    """
+
+    depth: float
+    rows: Array
+    room: Array
+    box: Array
+
+
+def barriers(at: Passing, rows: Array, room: Array) -> Barriers:
+    """What stands around a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
+    gaps = at.gap - np.minimum(at.clearance, GAP)
+    return Barriers(
+        -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
+        np.concatenate([gaps, room]), at.box,
+    )  # fmt: skip
+
+
+def free_end(model: pin.Model, q: Array, out: float, look: Callable[[Array], Barriers]) -> Array | None:
     """A posture (nq,) that is free, whatever passes on the way to it; None if none was found.
 
     Args:
         model: of the figure.
         q: (nq,) the posture at the start of the frame.
-        most: (2, nv) largest displacements from q, radians and metres; None without bounds.
         out: depth up to which a posture is free, metres.
-        overlap: greatest depth of any pair at a posture, metres.
-        step: the posture after one program at a posture that may displace it by so much.
+        look: what stands around a posture (nq,).
     """
-    begun = [np.zeros(model.nv)]
-    if most is not None and np.isfinite(most[:, :ROOT]).all() and most[:, :ROOT].any():
-        for way in WAYS:
-            begun.append(np.zeros(model.nv))
-            begun[-1][:ROOT] = [0.0 if sign == 0 else most[max(sign, 0), axis] for axis, sign in enumerate(way)]
-    for displacement in begun:
-        here, before = pin.integrate(model, q, displacement), np.inf
-        for _ in range(PROGRAMS):
-            depth = overlap(here)
-            if depth <= out:
-                return np.asarray(here)
-            if depth > WORTH * before:
+    project, box = compiled_kernel().project, look(q).box.copy()
+    for start in _starts(model, box):
+        gone, least, weak = start, np.inf, 0
+        for _ in range(ROUNDS):
+            here = np.asarray(pin.integrate(model, q, gone))
+            at = look(here)
+            if at.depth <= out:
+                return here
+            weak += at.depth > WORTH * least
+            if weak == WEAK:
                 break
-            before = depth
-            here = step(here, None if most is None else most - pin.difference(model, q, here))
+            least = min(least, at.depth)
+            gone = gone.copy()
+            project(at.rows, at.room, box[0], box[1], gone)
     return None
+
+
+def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
+    """Displacements (nv,) to begin at, all within a box (2, nv)."""
+    yield np.zeros(model.nv)
+    free = model.nq > model.nv
+    if free and np.isfinite(box[:, :ROOT]).all() and box[:, :ROOT].any():
+        for way in WAYS:
+            begun = np.zeros(model.nv)
+            begun[:ROOT] = [0.0 if sign == 0 else box[max(sign, 0), axis] for axis, sign in enumerate(way)]
+            yield begun
+    low, high = np.clip(box, -FARTHEST, FARTHEST)
+    rng, places = np.random.default_rng(0), PLACES if free else 0
+    for _ in range(RANDOM):
+        begun = rng.uniform(low, high)
+        begun[places:] *= rng.uniform()
+        yield begun
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The projection, compiled or read back."""
+    from wholebody.methods.qp import escaping_kernel
+
+    escaping_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
+    return escaping_kernel

@@ -177,6 +177,16 @@ class StepProgram:
             elastic.reshape(k, n), least, weight, self._entries[2], self._entries[3],
         )  # fmt: skip
 
+    def bounded(self, at: Passing) -> tuple[Array, Array]:
+        """Rows (k, nv) of the constraints, and how far (k,) they are from their bounds; less than zero beyond."""
+        value, rows = at.value[at.goals :], at.jacobian[at.goals : len(at.value)]
+        lower, upper = self._subproblem.bound
+        low, high = np.isfinite(lower), np.isfinite(upper)
+        return (
+            np.concatenate([rows[low], -rows[high]]),
+            np.concatenate([value[low] - lower[low], upper[high] - value[high]]),
+        )
+
     def motion(self, at: Passing, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,).
 

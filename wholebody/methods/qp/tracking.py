@@ -15,7 +15,8 @@ from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import Passing
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.qp.escaping import free_end
+from wholebody.methods.qp.escaping import WITHIN, Barriers, barriers, free_end
+from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, unseen_by_rows
@@ -126,6 +127,7 @@ class QPTracker(OfOneRun):
         self.dt = time_step(dt, "dt")
         self._method, self._minimising = method, minimising
         solver.load()  # not in the middle of a drag
+        compiled_escape()
         self._working_set = WorkingSet(solver)
         self._query_distance = LEAST_WITHIN
         self._alone = OneAtATime("tracker")
@@ -221,11 +223,11 @@ class QPTracker(OfOneRun):
             self._program.take((following - share) * self.dt)
             steps.append(self._step(here, measures and following > share))
             path.append((following, steps[-1].q))
+        self._left = None
         if depth > OUT:
-            free = free_end(model, q, most, OUT, self._overlap, self._out_of_overlap)
+            free = free_end(model, q, OUT, self._barriers)
             if free is not None:
                 path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
-        self._left = None
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
@@ -235,11 +237,10 @@ class QPTracker(OfOneRun):
         """Greatest depth of any pair at a posture (nq,), metres."""
         return -float(self.workspace.near(q, 0.0).distance.min(initial=0.0))
 
-    def _out_of_overlap(self, q: Array, left: Array | None) -> Array:
-        """The posture (nq,) after a program that takes no time and goes by at most (2, nv)."""
-        self._left = left
-        self._program.take(0.0)
-        return self._step(q, measures=False).q
+    def _barriers(self, q: Array) -> Barriers:
+        """What stands around a posture (nq,), with all things where they are."""
+        at = self._lineariser.passing(q, WITHIN)
+        return barriers(at, *self._program.bounded(at))
 
     def _speeds(self, q: Array) -> Array | None:
         """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
