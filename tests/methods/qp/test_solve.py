@@ -324,4 +324,5 @@ def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(hone
     proof = wb.assess(case.problem, case.witness)
     assert proof.holds(1e-6)
     assert proof.goal_error < 1e-6
-    assert honest(case.problem, wb.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)).status == "solved"
+    solution = wb.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)
+    assert honest(case.problem, solution, 1e-4).status == "solved"
