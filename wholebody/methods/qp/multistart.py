@@ -120,7 +120,8 @@ class Search:
         few = self._moving() < FEW
         if few:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
-        others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
+        given = (self.problem, self.lineariser.state, start, rng, count)
+        others = throughout(*given) if few else restarts(*given)
         starts = chain([start], self._through, others)
         for local, how in self._relaxed_probes(starts):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
