@@ -30,6 +30,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 """Environment of a process whose libraries compute on one core."""
 
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
+BY_THE_CLOCK = 10.0  # a deadline by the clock in units of that of the processor: others use the machine too
 ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
 LONGEST_WORDS = 200  # most characters kept of the last line that a process wrote
 
@@ -253,6 +254,15 @@ def allow(seconds: float, processor: float = 0.0) -> None:
     if _parent is not None:
         signal.setitimer(signal.ITIMER_REAL, seconds)
         signal.setitimer(signal.ITIMER_PROF, processor)
+
+
+def allow_processor(seconds: float) -> None:
+    """Move the deadline of the running job to so many seconds of the processor's time from now.
+
+    Others' work on the machine does not shorten that. By the clock it is `BY_THE_CLOCK` times as far, for a job that
+    waits for ever.
+    """
+    allow(BY_THE_CLOCK * seconds, seconds)
 
 
 def tell(note: Any) -> None:

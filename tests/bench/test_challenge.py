@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from wholebody.bench.challenge import ChallengeRow
-from wholebody.bench.drag import DragFrameRow
+from wholebody.bench.drag import DragFrameRow, drag_chart
+from wholebody.bench.plot_style import method_style
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 
@@ -33,3 +35,14 @@ def test_both_methods_sit_down(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert "assets/bench/challenge.svg" in page
     assert (tmp_path / "assets" / "bench" / "challenge.svg").is_file()
     assert "over the seat" in capsys.readouterr().out
+
+
+def test_a_method_has_the_colour_that_it_has_in_other_charts(tmp_path: Path) -> None:
+    """Newton must not stand there in placo's colour."""
+    frame = DragFrameRow("sit_on_chair", "newton", 0, 2.0, 1.0, 3, 1.0, 0.0, 0.0)
+    drawn = drag_chart({"newton": [frame], "ccd": [replace(frame, method="ccd")]}, tmp_path / "chart.svg")[
+        0
+    ].read_text()
+    assert method_style("newton").color == method_style("newton/slack").color
+    assert all(method_style(name).color in drawn for name in ("newton/slack", "ccd"))
+    assert all(method_style(name).color not in drawn for name in ("placo", "mink"))

@@ -13,8 +13,8 @@ import wholebody as wb
 from wholebody.methods.starts import Minima, named_postures, restarts, throughout
 
 
-def descents_needed(values) -> int:
-    minima = Minima()
+def descents_needed(values, fewest: int = 0) -> int:
+    minima = Minima(fewest)
     for count, value in enumerate(values, 1):
         minima.add(value, True)
         if minima.complete:
@@ -26,6 +26,11 @@ def descents_needed(values) -> int:
 def test_descents_that_it_takes_to_take_all_minima_for_found(known: int, needed: int) -> None:
     """From w (n - 1) / (n - w - 2) <= w + 1/2, solved for n by hand."""
     assert descents_needed(1.0 + k % known for k in range(100)) == needed
+
+
+def test_no_fewer_descents_than_are_asked_for_find_all_minima() -> None:
+    assert descents_needed([1.0] * 100, fewest=12) == 12
+    assert descents_needed((1.0 + k % 2 for k in range(100)), fewest=12) == 16  # the rule asks for more
 
 
 def test_ends_that_did_not_converge_stand_for_minima_not_yet_seen() -> None:

@@ -14,9 +14,6 @@ from wholebody.tracking.dragging import Dragged, DragJudgement
 
 ALLOWED = 1e-3  # m: of overlap, in a frame and on the way to the next
 
-COLORS = {"newton": "#d55e00", "qp": "#0072b2", "ccd": "#009e73"}
-"""By the first part of a method's name; Okabe and Ito's."""
-
 
 @dataclass(frozen=True)
 class DragFrameRow:
@@ -132,7 +129,7 @@ def drag_chart(drags: Mapping[str, Sequence[DragFrameRow]], path: Path) -> tuple
     above, below = axes[0][0], axes[1][0]
     for method, rows in drags.items():
         frame = [row.frame for row in rows]
-        color = COLORS.get(method.partition("/")[0], "#666666")
+        color = plot_style.method_style(method).color
         above.plot(frame, [row.milliseconds for row in rows], color=color, linewidth=0.8, alpha=0.35)
         above.plot(frame, [max(row.cpu_ms, 1e-3) for row in rows], color=color, linewidth=1.2, label=method)
         below.plot(frame, [max(row.error_mm, 1e-6) for row in rows], color=color, linewidth=1.0)

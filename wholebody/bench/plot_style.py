@@ -39,6 +39,7 @@ _STYLES = {
     "qp/quadprog": Style(COLORS["wholebody/quadprog"], ".", False),
     "qp/proxqp": Style(COLORS["wholebody/proxqp"], ".", False),
     "qp/piqp": Style(COLORS["wholebody/piqp"], ".", False),
+    "newton": Style("#e69f00", "s", True),
     "newton/slack": Style("#e69f00", "s", True),
     "newton/barrier": Style("#a06a00", "D", True),
     "newton/kkt": Style("#f3cf7a", "s", False),

@@ -211,14 +211,12 @@ def _thickened(points: Array, name: str, notes: list[str]) -> list[Piece]:
 _MEND = "mend the mesh where it passes through itself, or place its hull with wb.Hull"
 MOST_SECONDS = 40.0
 """Limit of CoACD for one part, seconds of the processor; the largest of real robots took a fraction of it."""
-BY_THE_CLOCK = 10.0
-"""Its limit by the clock in units of that one: where others use the machine too, or it waits for ever."""
 
 
 def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
-    from wholebody.runner import EndedError
+    from wholebody.runner import BY_THE_CLOCK, EndedError
 
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
     faces = part.faces.astype(np.int32)
@@ -236,9 +234,9 @@ def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[A
 
 def limited(function: Callable[..., list[Array]], seconds: float, *arguments: Any) -> list[Array]:
     """Call a function with a limit of the processor's time; for a child process."""
-    from wholebody.runner import allow
+    from wholebody.runner import allow_processor
 
-    allow(BY_THE_CLOCK * seconds, seconds)
+    allow_processor(seconds)
     return function(*arguments)
 
 

@@ -128,8 +128,9 @@ class Minima:
     "Bayesian stopping rules for multistart global optimization methods", Mathematical Programming 37, 1987).
     """
 
-    def __init__(self) -> None:
-        """Begin with none."""
+    def __init__(self, fewest: int = 0) -> None:
+        """Begin with none; before `fewest` descents they do not count as found."""
+        self._fewest = fewest
         self._values: list[float] = []
         self._count = 0
 
@@ -143,7 +144,8 @@ class Minima:
     def complete(self) -> bool:
         """Whether all minima count as found."""
         found, count = len(self._values), self._count
-        return count > found + 2 and found * (count - 1) <= (found + 0.5) * (count - found - 2)
+        enough = count >= max(self._fewest, found + 3)
+        return enough and found * (count - 1) <= (found + 0.5) * (count - found - 2)
 
 
 def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:

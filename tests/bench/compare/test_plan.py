@@ -65,6 +65,26 @@ def test_one_slow_start_does_not_end_a_set_but_slow_building_does(fakes: ModuleT
     assert slow.cases("arm") == 9  # of sixty seconds 30 % for building
 
 
+def test_a_slow_first_case_does_not_end_a_run_of_one_set(fakes: ModuleType) -> None:
+    plan = Plan(Settings((fakes.SET,), (fakes.adapter("solves"),), 600, 0, minutes=1.0), jobs=1)
+    plan.note(Chunk("arm", 0, (), {"solves": 0.01}, building=50.0))
+    assert plan.allowed()["arm", "solves"].cases == 600
+
+
+def test_a_set_whose_goals_move_has_as_many_cases_as_another(fakes: ModuleType) -> None:
+    """And the first ones are the same whatever the number: each is made from a seed and a number of its own."""
+    asked = Settings((fakes.SET, fakes.MOVING), (fakes.adapter("solves"),), 200, 40, minutes=100.0)
+    assert [asked.asked(family) for family in asked.sets] == [(200, 40), (200, 10)]
+    plan = Plan(asked, jobs=1)
+    for number in range(FIRST):
+        for family in asked.sets:
+            plan.note(Chunk(family.name, number, (), {"solves": 0.01}, building=0.01))
+    assert {key: each.cases for key, each in plan.allowed().items()} == {
+        ("arm", "solves"): 200,
+        ("moving", "solves"): 200,
+    }
+
+
 def test_the_case_for_which_everything_was_compiled_does_not_end_the_run(fakes: ModuleType) -> None:
     plan = Plan(Settings((fakes.SET, fakes.MOVING), (fakes.adapter("solves"),), 20, 0, minutes=1.0), jobs=1)
     plan.note(Chunk("arm", 0, (), {"solves": 0.01}, building=50.0))

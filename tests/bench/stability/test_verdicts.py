@@ -106,6 +106,16 @@ def sleeps(problem: Problem) -> np.ndarray:
     return start(problem)
 
 
+def waits(problem: Problem) -> np.ndarray:
+    time.sleep(1.5)
+    return start(problem)
+
+
+def computes(problem: Problem) -> np.ndarray:
+    while True:
+        pass
+
+
 def crashes(problem: Problem) -> np.ndarray:
     os.kill(os.getpid(), signal.SIGKILL)
     return start(problem)
@@ -122,8 +132,14 @@ def test_a_refusal(fake: Fakes) -> None:
 
 
 def test_hanging(fake: Fakes) -> None:
-    found = verdict("conflict", fake(sleeps), cap=1.0)
+    found = verdict("conflict", fake(computes), cap=1.0)
     assert (found.kind, found.brief) == ("wrong", "hangs")
+    assert verdict("conflict", fake(sleeps), cap=0.3).brief == "hangs"
+
+
+def test_waiting_is_no_hanging(fake: Fakes) -> None:
+    """Others' work on the machine, which makes a method wait, ends no answer: its limit is of the processor."""
+    assert verdict("conflict", fake(waits), cap=1.0).kind == "honest"
 
 
 def test_crashing(fake: Fakes) -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from math import inf
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.problem_sets.robot_arm import SET as ROBOT_ARMS
 from wholebody.bench.stability.posed import cancelling
 
 LENGTHS = (0.5, 0.4)
@@ -312,3 +315,14 @@ def test_a_person_who_stands_in_the_middle_of_a_chair_gets_out_of_it(height, hon
     stands = wb.Stand(on="floor", balance=False)
     problem = wb.Problem(scene, goals=[wb.Sit("seat", back="back")], constraints=[stands])
     assert honest(problem, wb.solve(problem)).status == "unreachable"
+
+
+@pytest.mark.parametrize(("number", "seed"), [(40, 1), (17, 12), (28, 11)])
+def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(honest, number, seed):
+    """A witness proves that the goal is within reach; those that begin near the start all end blocked."""
+    case = ROBOT_ARMS.make(number, seed)
+    proof = wb.assess(case.problem, case.witness)
+    assert proof.holds(1e-6)
+    assert proof.goal_error < 1e-6
+    solution = wb.QP(tolerance=1e-4, time_limit=inf).solve(case.problem)
+    assert honest(case.problem, solution, 1e-4).status == "solved"

@@ -16,10 +16,9 @@ from wholebody.bench.attack import arguments, files, solves, streams, sweeps
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
 from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
+from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, allow_processor, run_jobs, tell
 
 DEADLINE = 60.0  # s of the processor: a case that takes longer, twice, hangs
-SHARED = 10.0  # times that by the clock, where others use the processor too
 WRITING = 300.0  # s: to write a case
 WARMING = 1800.0  # s: to compile everything on a machine that has other things to do
 MEMORY = 4 << 30  # bytes: a file that asks for more is no reason to bring the machine down
@@ -85,7 +84,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
     except Exception as error:
         return Verdict("wrong", f"while it was written: {_said(error)}")
     tell(prepared)
-    allow(SHARED * deadline, deadline)
+    allow_processor(deadline)
     return run(prepared)
 
 

@@ -18,13 +18,13 @@ from wholebody.assessment import assess
 from wholebody.bench import plot_style
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, FLOOR, OVERTIME, Record
-from wholebody.bench.compare.solving import BUILDING, Ready, end_after, solve
+from wholebody.bench.compare.solving import BUILDING, Ready, solve
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.report import render
 from wholebody.compiled import compile_all
 from wholebody.problem import Problem
-from wholebody.runner import ONE_THREAD, Child, EndedError, allow
+from wholebody.runner import ONE_THREAD, Child, EndedError, allow, allow_processor
 from wholebody.taskfile import read_task
 
 REPEATS = 5  # warm solves, of which the median counts
@@ -111,12 +111,12 @@ def _solved(path: Path, adapter: Adapter, cap: float) -> tuple[float, list[Recor
     allow(BUILDING)
     compile_all()
     made = _ready(read_task(path).problem)
-    end_after(cap)
+    allow_processor(cap)
     began = time.perf_counter()
     records = [solve(adapter, DEFAULT, made)]
     cold = time.perf_counter() - began
     for _ in range(REPEATS if records[0].outcome == ANSWERED else 0):
-        end_after(cap)
+        allow_processor(cap)
         records.append(solve(adapter, DEFAULT, made))
     return cold, records
 

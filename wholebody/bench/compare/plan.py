@@ -69,7 +69,7 @@ class Plan:
         known = self._building[family]
         if len(known) < FIRST:  # it may be the one for which everything was compiled: all sets tell more
             known = [seconds for times in self._building.values() for seconds in times]
-        return float(np.quantile(known, 0.25)) if known else 0.0
+        return float(np.quantile(known, 0.25)) if len(known) >= FIRST else 0.0
 
     def allowed(self) -> dict[tuple[str, str], Allowed]:
         """Cases of every method in every set, by what is known of the costs now."""

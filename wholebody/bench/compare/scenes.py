@@ -15,7 +15,7 @@ from wholebody.bench.compare.settings import seed_of
 from wholebody.bench.compare.solving import BUILDING, Ready, Which, case_of
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.files import Scratch
-from wholebody.runner import ONE_THREAD, Child, EndedError, allow
+from wholebody.runner import ONE_THREAD, Child, EndedError, allow_processor
 
 OPENING = '<script id="picture" type="application/octet-stream">'
 CLOSING = "</script>"
@@ -60,7 +60,7 @@ def draw(
 def drawn(which: Which, good: Adapter, bad: Adapter, cap: float) -> str:
     """HTML of a case with two answers; a job of a process of its own."""
     made = case_of(which)
-    allow(2.0 * cap)
+    allow_processor(2.0 * cap)
     return page(good, bad, made)
 
 

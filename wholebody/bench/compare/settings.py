@@ -14,7 +14,7 @@ from wholebody.version import __version__
 
 MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
 SEEDS = 3  # from which the cases of a set are made in turn
-MOVING = 10  # cases of other sets for one whose goals move
+MOVING = 4  # swept cases of other sets for one whose goals move, which is hundreds of solves at every budget
 
 
 @dataclass(frozen=True)
@@ -70,10 +70,11 @@ class Settings:
         }
 
     def asked(self, family: ProblemSet) -> tuple[int, int]:
-        """Cases of a set at the default budget, and at all budgets; fewer where a case is hundreds of solves."""
-        if family.moving:
-            return max(1, self.cases // MOVING), self.sweep // MOVING
-        return self.cases, self.sweep
+        """Cases of a set at the default budget, and at all budgets: fewer of these where a case is hundreds of solves.
+
+        A set whose goals move has as many cases as the others; the plan gives a method as many as its share allows.
+        """
+        return self.cases, self.sweep // MOVING if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""

@@ -26,11 +26,10 @@ from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.methods.differential import TOOL
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
-from wholebody.runner import allow
+from wholebody.runner import allow, allow_processor
 
 BUILDING = 300.0  # s: to build a case and what belongs to its scene; compiling once included
 LEAST = 1e-6  # s: no call of a solver is faster; differences of two clock readings may be
-SLACK = 4.0  # times as long by the clock as of the processor's time: on a busy machine that passes slowly
 JUDGED = (
     "goal_error", "goal_angle", "penetration", "clearance_violation", "limit_violation", "constraint_violation",
     "measure", "optimality",
@@ -87,7 +86,7 @@ def warmed(which: Which, adapter: Adapter, cap: float) -> float:
     if key in _warm:
         return 0.0
     _warm.add(key)
-    end_after(cap)
+    allow_processor(cap)
     began = time.perf_counter()
     solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
     return time.perf_counter() - began
@@ -98,13 +97,8 @@ def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
     warmed(which, adapter, cap)
     made = case_of(which)
     frames = len(made.case.frames)
-    end_after(frame_cap(cap, frames) * frames if frames else cap)
+    allow_processor(frame_cap(cap, frames) * frames if frames else cap)
     return solve(adapter, level, made)
-
-
-def end_after(cap: float) -> None:
-    """End the process after so many seconds of the processor's time, so that other work on a machine ends no solve."""
-    allow(SLACK * cap, cap)
 
 
 def case_of(which: Which) -> Ready:

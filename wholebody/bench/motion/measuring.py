@@ -15,7 +15,7 @@ from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.errors import InputError, WholebodyError
 from wholebody.files import make_folder
-from wholebody.runner import Job, allow
+from wholebody.runner import BY_THE_CLOCK, Job, allow_processor
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck
@@ -26,7 +26,6 @@ CHECKED = "check"  # in place of a method: the clip as it is
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
 START = 120.0  # s of the processor that a case has beside those for its length: imports, compilation
 SLOWEST = 60.0  # s of the processor for a second of motion, after which a method is ended
-BY_THE_CLOCK = 10.0  # the deadline by the clock in units of that one
 MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 LIMIT = 1e-6  # rad, m: by which a limit may be missed
@@ -142,7 +141,7 @@ def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
 
-    allow(BY_THE_CLOCK * most, most)
+    allow_processor(most)
     figure = load(FIGURE)
     scene, clip = dressed(figure, row.equipment), read_clip(path, figure)
     check(clip[:MIDDLE], scene)  # compiles or reads back what is needed

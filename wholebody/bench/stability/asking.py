@@ -13,12 +13,12 @@ from wholebody.bench.stability.case import NOTHING, Answer, HardCase, Nonsense, 
 from wholebody.bench.stability.judging import Judged, judge
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
-from wholebody.runner import Child, EndedError, Job, allow, run_jobs, tell
+from wholebody.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.tracking.drag import Drag
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
-CAP = 20.0  # s: a method that has not answered by then, or has not made its next frame, hangs
-JUDGING = 120.0  # s: a judgement of many frames, all pairs of each
+CAP = 20.0  # s of the processor: a method that has not answered by then, or has not made its next frame, hangs
+JUDGING = 120.0  # s of the processor: a judgement of many frames, all pairs of each
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,16 @@ class Cell:
 
 
 def run(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
-    """Every case by every method, as they end, in `jobs` processes; `cap` is seconds for an answer, or for a frame."""
+    """Every case by every method, as they end, in `jobs` processes.
+
+    `cap` is seconds of the processor for an answer, or for a frame.
+    """
     _warm()
-    left = (Job((case, adapter.name), _cell, (case, adapter, cap), cap) for case in cases for adapter in adapters)
+    left = (
+        Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap)
+        for case in cases
+        for adapter in adapters
+    )
     for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):
         case, method = outcome.job.name
         answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)
@@ -56,16 +63,17 @@ def _warm() -> None:
 
 
 def _cell(case: HardCase, adapter: Adapter, cap: float) -> Judged:
-    """Ask, send the answer, then judge it: the clock for the method stops with the answer."""
-    answer = ask(case, adapter, lambda: allow(cap))
-    allow(JUDGING)
+    """Ask, send the answer, then judge it: the time of the method ends with the answer."""
+    allow_processor(cap)
+    answer = ask(case, adapter, lambda: allow_processor(cap))
+    allow_processor(JUDGING)
     tell(answer)
     return judge(case, answer)
 
 
 def _failure(error: EndedError, cap: float) -> str:
     if error.overtime:
-        return f"hangs: no answer in {cap:g} s"
+        return f"hangs: no answer in {cap:g} s of the processor"
     return f"crashes: {error.how}" if error.code < 0 else f"ends its process with code {error.code}"
 
 

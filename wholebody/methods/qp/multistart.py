@@ -39,6 +39,7 @@ AGREEING = 3  # of them that have to come to rest equally near
 FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
 AGREEING_FEW = 8  # the same for them
 REACH_TRIALS_FEW = 16  # most descents for them
+FEWEST_DESCENTS = 12  # fewest ends before their minima count as all; after 7, one that a fifth lead to may be unseen
 AGREE = 1.1  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
 PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
@@ -120,7 +121,12 @@ class Search:
         self._leave_cancelling()
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
-        starts = chain([start], self._through, restarts(self.problem, self.lineariser.state, start, rng, count))
+        few = self._moving() < FEW
+        if few:
+            self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
+        given = (self.problem, self.lineariser.state, start, rng, count)
+        others = throughout(*given) if few else restarts(*given)
+        starts = chain([start], self._through, others)
         for local, how in self._relaxed_probes(starts):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
