@@ -57,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
         from wholebody.motion.strength import Strength
 
         work = Work(arguments.load, coupling=arguments.coupling, **{name: getattr(arguments, name) for name in FLAGS})
-        scores = ergonomics_of(task.problem.scene.figure, q, work, Strength(arguments.percentile, arguments.sex))
+        scores = ergonomics_of(task.problem.scene, q, work, Strength(arguments.percentile, arguments.sex))
         described["ergonomics"] = scores.summary()
     if arguments.json:
         print(result.as_json(described), end="")

@@ -12,9 +12,11 @@ from math import radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles, body_angles
-from wholebody.ergonomics.work import Work, both_feet, check_work
+from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
+from wholebody.ergonomics.seat import seen
+from wholebody.ergonomics.work import Work, both_feet
 from wholebody.figures.figure import Figure
+from wholebody.scene import Scene
 
 TURNED = radians(10.0)
 """From which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly
@@ -132,19 +134,19 @@ class Rula(BothSides[RulaParts]):
     """RULA of both sides."""
 
 
-def rula(figure: Figure, q: Array, work: Work | None = None) -> Rula:
+def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
     """RULA of a person's posture.
 
     Args:
-        figure: a person, see `body_angles`.
+        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
         q: (nq,) posture.
         work: load and repetition; none if left out.
 
     Raises:
         InputError: no person, no posture, or no work.
     """
-    angles, asked = body_angles(figure, q), check_work(work, "rula: work")
-    return Rula(*(rula_parts(angles, side, asked) for side in SIDES))
+    person = seen(figure, q, work, "rula")
+    return Rula(*(rula_parts(person.angles, side, person.work) for side in SIDES))
 
 
 def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
