@@ -109,6 +109,17 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
     sharp = np.unique(faces[turned])
     keys = np.column_stack([np.floor(vertices / cell), np.full(len(vertices), -1)]).astype(np.int64)
     keys[sharp, 3] = sharp
+    return clustered(vertices, faces, keys)
+
+
+def clustered(vertices: Array, faces: NDArray[np.int64], keys: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return the triangles (k, 3) that are left when all vertices of one key become the one nearest to their middle.
+
+    Args:
+        vertices: (n, 3) metres.
+        faces: (m, 3) indices of vertices.
+        keys: (n, any) rows that are equal for vertices which become one.
+    """
     _, group = np.unique(keys, axis=0, return_inverse=True)
     group = group.ravel()
     middle = np.zeros((group.max() + 1, 3))
