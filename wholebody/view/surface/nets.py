@@ -128,7 +128,8 @@ def clustered(vertices: Array, faces: NDArray[np.int64], keys: NDArray[np.int64]
     order = np.lexsort((np.linalg.norm(vertices - middle[group], axis=1), group))
     first = order[np.unique(group[order], return_index=True)[1]]
     kept: NDArray[np.int64] = first[group][faces]
-    return kept[(kept != np.roll(kept, 1, axis=1)).all(axis=1)]
+    whole: NDArray[np.bool_] = (kept != np.roll(kept, 1, axis=1)).all(axis=1)
+    return np.compress(whole, kept, axis=0)
 
 
 def gradient(field: Field, points: Array) -> Array:
