@@ -120,7 +120,8 @@ class Bodies:
         scene = self.scene
         figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
         for name, (figure, color) in figures.items():
-            surface, look = surface_of(figure), None
+            surface = surface_of(figure)
+            look: Skin | LinkVisuals | None = None
             if surface is not None:
                 look = Skin(surface, figure)
             elif isinstance(figure, Figure) and figure.visual is not figure.geometry:

@@ -99,7 +99,8 @@ class LinkVisuals:
             path = f"{carriers[one.joint]}/visual {number}"
             shown = one.color if color is None else color
             if isinstance(one.shape, tuple):
-                graph.put(path, drawing.mesh(*one.shape, path, shown))
+                vertices, faces = one.shape
+                graph.put(path, drawing.mesh(vertices, faces, path, shown))
             else:
                 graph.put(path, drawing.piece(one.shape, path, shown))
             graph.place(path, one.placement)
