@@ -120,8 +120,8 @@ def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, flo
         named.setdefault(name, own[material])
     painted = {}
     for visual in robot.findall("link/visual"):
-        material = visual.find("material")
-        paint = None if material is None else own.get(material, named.get(material.get("name") or ""))
+        asked = visual.find("material")
+        paint = None if asked is None else own.get(asked, named.get(asked.get("name") or ""))
         if paint is not None:
             painted[visual] = paint
     return painted, notes
