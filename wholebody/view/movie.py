@@ -24,6 +24,7 @@ FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""
 SLOWEST = 0.01  # pictures per second
 _COLORS = 256
+EVERY = 7  # pixels, of which one counts for the palette: all of them take half a second
 
 
 def check_movie(path: str | os.PathLike[str]) -> Path:
@@ -97,7 +98,7 @@ def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
 
     By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
     """
-    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3) for frame in frames])
+    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::EVERY] for frame in frames])
     _, first = np.unique(pixels >> 3, axis=0, return_index=True)
     kinds = np.repeat(pixels[first], len(pixels) // len(first) + 1, axis=0)
     every = np.concatenate([pixels, kinds])
