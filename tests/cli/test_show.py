@@ -14,6 +14,7 @@ import urllib.request
 from pathlib import Path
 
 import pytest
+import trimesh
 
 from wholebody.cli import main
 from wholebody.view.browser import Browser, find_chromium
@@ -121,3 +122,16 @@ def test_a_port_that_is_taken_is_named(capsys: pytest.CaptureFixture[str]) -> No
 def test_the_package_is_a_command_too() -> None:
     done = subprocess.run([sys.executable, "-m", "wholebody", "--version"], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("wholebody ")
+
+
+def test_a_person_of_given_size_is_shown_and_a_file_keeps_its_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small, tall = tmp_path / "small.glb", tmp_path / "tall.glb"
+    assert main(["show", "human", "--stature", "1.55", "--save", str(small)]) == 0
+    assert main(["show", "human", "--stature", "1.95", "--save", str(tall)]) == 0
+    heights = [trimesh.load_scene(path).extents[1] for path in (small, tall)]  # y is up in glTF
+    assert heights == pytest.approx([1.55, 1.95], abs=0.05)
+    capsys.readouterr()
+    assert main(["show", str(tmp_path / "task.toml"), "--sex", "female", "--save", str(small)]) == 2
+    assert "leave out --sex" in capsys.readouterr().err

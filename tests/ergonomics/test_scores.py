@@ -193,6 +193,64 @@ def test_owas_tells_how_a_body_is_carried(person: wb.Figure, posture: str, legs:
     assert wb.owas(person, person.posture(posture)).legs == legs
 
 
+def gap(scene: wb.Scene, q: np.ndarray, thing: str, segment: str) -> float:
+    """Distance of a thing from a segment."""
+    found = scene.contacts(q, within=3.0)
+    owners = [{scene.piece_owner[k] for k in pair} for pair in found.pair]
+    return min(d for both, d in zip(owners, found.distance, strict=True) if both == {thing, segment})
+
+
+def test_who_has_a_thing_below_the_pelvis_sits(person: wb.Figure) -> None:
+    """Nearly upright with one leg hanging, on a saddle whose top touches the pelvis from below."""
+    q = bent(person, left_hip_flexion=35, right_hip_flexion=20, left_knee_flexion=25, right_knee_flexion=5)
+    scene = wb.Scene(person).add(wb.Sphere(0.01), name="saddle", at=(0.0, 0.0, q[2] - 0.4))
+    scene.move("saddle", at=(0.0, 0.0, q[2] - 0.4 + gap(scene, q, "saddle", "pelvis")))
+    assert wb.owas(person, q).legs == 3  # the posture alone does not tell it
+    found = wb.ergonomics_of(scene, q)
+    assert found.owas.legs == wb.owas(scene, q).legs == 1
+    assert wb.reba(scene, q).left.legs == wb.rula(scene, q).left.legs == 1
+    assert found.seat == "sits, as saddle is below pelvis or thighs"
+    assert found.rows()[-1] == ("seat", "", "", found.seat)
+    assert wb.owas(scene, q, wb.Work(seated=False)).legs == 3
+    scene.move("saddle", at=(0.0, 0.0, q[2] - 0.4))  # well below: it bears nothing
+    assert wb.ergonomics_of(scene, q).seat == "does not sit, by the posture"
+
+
+def test_a_seated_trunk_with_a_back_scores_one_in_rula(person: wb.Figure) -> None:
+    """McAtamney and Corlett: 1 "when sitting and well supported with a hip-trunk angle of 90 degrees or more"."""
+    q = person.posture("sitting")
+    half = radians(-12.5)  # leans back by 25 degrees; the thighs rise with it
+    q[3:7] = 0.0, np.sin(half), 0.0, np.cos(half)
+    q = person.with_joints(q, {"left_hip_flexion": radians(60), "right_hip_flexion": radians(60)})
+    assert wb.rula(person, q, wb.Work(seated=True)).left.trunk == 3
+    assert wb.rula(person, q, wb.Work(seated=True, back_supported=True)).left.trunk == 1
+    assert wb.rula(person, q, wb.Work(seated=False, back_supported=True)).left.trunk == 3
+    curled = person.with_joints(q, {"left_hip_flexion": radians(115), "right_hip_flexion": radians(115)})
+    assert wb.rula(person, curled, wb.Work(seated=True, back_supported=True)).left.trunk == 3
+    scene = wb.Scene(person).add(wb.Box((0.1, 1.0, 0.1)), name="backrest", at=(-2.0, 0.0, q[2] + 0.3))
+    scene.move("backrest", at=(-2.0 + gap(scene, q, "backrest", "thorax"), 0.0, q[2] + 0.3))
+    for _ in range(5):  # the nearest point of a slanted trunk is not straight ahead
+        place = scene.objects["backrest"].placement.translation
+        scene.move("backrest", at=(place[0] + gap(scene, q, "backrest", "thorax"), 0.0, place[2]))
+    found = wb.ergonomics_of(scene, q, wb.Work(seated=True))
+    assert found.seat == "sits, as Work says; the back is at backrest"
+    assert found.rula.left.trunk == 1
+
+
+def test_who_leans_at_a_thing_or_lies_on_it_does_not_sit(person: wb.Figure) -> None:
+    q = person.posture("standing")
+    scene = wb.Scene(person).add(wb.Box((0.1, 1.0, 0.1)), name="rail", at=(1.0, 0.0, 0.7))
+    scene.move("rail", at=(1.0 - gap(scene, q, "rail", "left_thigh"), 0.0, 0.7))
+    assert gap(scene, q, "rail", "left_thigh") < 1e-3
+    assert wb.owas(scene, q).legs == 2
+    lying = q.copy()
+    lying[3:7] = 0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)  # on the back
+    scene = wb.Scene(person).add(wb.Box((3.0, 3.0, 0.1)), name="bed")
+    scene.move("bed", at=(0.0, 0.0, gap(scene, lying, "bed", "pelvis")))
+    assert gap(scene, lying, "bed", "pelvis") < 1e-3
+    assert not wb.ergonomics_of(scene, lying).seat.startswith("sits")
+
+
 def test_one_leg_is_told_from_two(person: wb.Figure) -> None:
     lifted = bent(person, left_hip_flexion=60, left_knee_flexion=60)
     assert wb.owas(person, lifted).legs == 3
@@ -222,6 +280,8 @@ def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.Capt
     assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--load", "6"]) == 0
     shown = capsys.readouterr().out
     assert all(word in shown for word in ("RULA", "REBA", "OWAS", "strength"))
+    assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--seated", "yes"]) == 0
+    assert "sits, as Work says" in capsys.readouterr().out
     assert main(["assess", str(tmp_path / "result.json"), "--ergonomics", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["ergonomics"]["rula"]["score"] == max(

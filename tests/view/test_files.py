@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import shutil
 import subprocess
@@ -18,6 +19,7 @@ import wholebody as wb
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.view import Viewer, style
 from wholebody.view.browser import Browser, find_chromium
+from wholebody.view.movie import movie
 
 browser_needed = pytest.mark.browser
 
@@ -197,3 +199,18 @@ def test_mistakes_are_named(exhibit: Any, tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(MissingPackageError, match="ffmpeg"):
         viewer.movie(tmp_path / "x.mp4")
     assert os.listdir(tmp_path) == []
+
+
+def test_a_gif_keeps_the_colours_of_what_is_small() -> None:
+    """A face is one part in fifty of a picture, and the rest are greys."""
+    picture = np.zeros((120, 160, 3), dtype=np.uint8)
+    picture[:] = np.linspace(150, 250, 160)[None, :, None]
+    picture[:, :, 2] += (np.arange(120) // 30)[:, None].astype(np.uint8)
+    face = np.linspace((120, 80, 50), (235, 180, 140), 400).reshape(20, 20, 3)
+    picture[50:70, 70:90] = face
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "PNG")
+    made = Image.open(io.BytesIO(movie(".gif", [file.getvalue()] * 3, 10.0)))
+    shown = np.asarray(made.convert("RGB")).astype(int)
+    assert np.abs(shown[50:70, 70:90] - face).mean() < 4.0
+    assert np.abs(shown - picture).mean() < 4.0

@@ -14,6 +14,7 @@ from wholebody.geometry.shapes import Box, HalfSpace, Sphere
 from wholebody.scene import Scene
 from wholebody.view import Viewer
 from wholebody.view.browser import Browser
+from wholebody.view.surface import surface_of
 
 pytestmark = pytest.mark.browser
 
@@ -55,3 +56,21 @@ def test_a_picture_of_the_human(chromium: str, tmp_path: Path) -> None:
     assert tan.mean() > 0.2
     assert values.max() <= 255
     assert (values.min(axis=2) > 250).mean() < 0.02  # nothing is burnt out
+
+
+def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(browser: Browser, tmp_path: Path) -> None:
+    figure = load("human")
+    viewer = Viewer(Scene(figure))
+    viewer.show(figure.posture("standing"))
+    drawn = []
+    for far in (1.2, 12.0):
+        viewer.look((far, 0.0, 1.0), (0.0, 0.0, 1.0))
+        browser.open(viewer.save(tmp_path / "page.html").as_uri())
+        drawn.append(browser.evaluate("(viewer.render(), viewer.renderer.info.render.triangles)"))
+    near, small = drawn
+    surface = surface_of(figure)
+    assert surface is not None
+    fine = sum(len(patch.faces) for patch in surface.patches())
+    coarse = sum(len(patch.coarse) for patch in surface.patches())
+    assert near - small == fine - coarse
+    assert small < 3 * coarse  # the shadow is drawn coarsely in both

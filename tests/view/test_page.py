@@ -213,6 +213,20 @@ def test_colours_and_markers_change_in_the_course_of_a_motion(
         assert tuple(entry["seen"] for entry in shown) == seen
 
 
+def test_a_marker_that_comes_later_and_never_changes_is_where_it_belongs(
+    exhibit: Any, browser: Browser, nodes: Any, tmp_path: Path
+) -> None:
+    free, near, _ = touching(exhibit)
+    viewer = Viewer(exhibit)
+    viewer.play([free, near, near], dt=0.1)
+    browser.open(viewer.save(tmp_path / "motion.html").as_uri())
+    browser.evaluate("wholebody.seek(0.15)")
+    point, normal = nodes(["/contacts/0/a", "/contacts/0/normal"])
+    contacts = exhibit.contacts(near, within=0.005)
+    np.testing.assert_allclose(point["matrix"][:3, 3], contacts.point_a[0], atol=1e-5)
+    np.testing.assert_allclose(normal["matrix"][:3, 2] / style.NORMAL_LENGTH, contacts.normal[0], atol=1e-5)
+
+
 def test_goals_are_at_their_targets_with_what_is_left(exhibit: Any, browser: Browser, nodes: Any) -> None:
     q = exhibit.posture(1)
     data = exhibit.model.createData()

@@ -15,7 +15,8 @@ print RULA, REBA, OWAS and the torques against published strength too; --json pr
 EPILOG = """\
 examples:
   wholebody assess out/shelf/result.json --ergonomics
-  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json"""
+  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json
+exit code: 1 if the posture violates a limit, a constraint or a clearance by more than 0.1 mm or mrad"""
 FLAGS = {
     "static": "the posture is held for minutes",
     "repeated": "the action is repeated more than four times a minute",
@@ -36,8 +37,15 @@ def add_to(commands: Commands) -> None:
     parser.add_argument("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable")
     for name, says in FLAGS.items():
         parser.add_argument(f"--{name.replace('_', '-')}", action="store_true", help=says)
+    parser.add_argument(
+        "--seated",
+        choices=("yes", "no"),
+        help="whether the person sits (default: told by what is below, or the posture)",
+    )
     parser.add_argument("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)")
-    parser.add_argument("--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95")
+    parser.add_argument(
+        "--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95 (default: 50)"
+    )
     parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
     parser.set_defaults(run=run)
 
@@ -56,8 +64,10 @@ def run(arguments: argparse.Namespace) -> int:
         from wholebody.ergonomics.work import Work
         from wholebody.motion.strength import Strength
 
-        work = Work(arguments.load, coupling=arguments.coupling, **{name: getattr(arguments, name) for name in FLAGS})
-        scores = ergonomics_of(task.problem.scene.figure, q, work, Strength(arguments.percentile, arguments.sex))
+        told = {name: getattr(arguments, name) for name in FLAGS}
+        seated = None if arguments.seated is None else arguments.seated == "yes"
+        work = Work(arguments.load, coupling=arguments.coupling, seated=seated, **told)
+        scores = ergonomics_of(task.problem.scene, q, work, Strength(arguments.percentile, arguments.sex))
         described["ergonomics"] = scores.summary()
     if arguments.json:
         print(result.as_json(described), end="")

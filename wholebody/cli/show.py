@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import argparse
 import math
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import Commands, add_person, person_options
 
 if TYPE_CHECKING:
     import numpy as np
@@ -27,6 +28,7 @@ Show in a browser. The command waits for the first tab, and ends when the last o
 EPILOG = """\
 examples:
   wholebody show human --posture sitting
+  wholebody show human --sex female --stature 1.55
   wholebody show human --pieces                    # what contacts are measured with, instead of the body's surface
   wholebody show out/shelf/result.json
   wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
@@ -38,6 +40,7 @@ def add_to(commands: Commands) -> None:
     shape = argparse.RawDescriptionHelpFormatter
     parser = commands.add_parser("show", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
+    add_person(parser)
     parser.add_argument("--posture", metavar="NAME", help="name of a posture of the figure")
     parser.add_argument("--pieces", action="store_true", help="draw the pieces that contacts are measured with")
     parser.add_argument(
@@ -63,7 +66,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--save: {save} ends in none of .html, .png and .glb; give it one of them")
     if save is not None and (arguments.port or arguments.host != LOCAL):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
-    problem, q, view, title = _subject(arguments.what)
+    problem, q, view, title = _subject(arguments.what, person_options(arguments))
     if arguments.posture is not None:
         q = problem.scene.figure.posture(arguments.posture)
     with viewer_of(problem, view, title, host=arguments.host, port=arguments.port) as viewer:
@@ -80,8 +83,13 @@ def run(arguments: argparse.Namespace) -> int:
     return 0
 
 
-def _subject(what: str) -> tuple[Problem, NDArray[np.float64], View, str]:
-    """Problem, posture, view and title of the subject."""
+def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np.float64], View, str]:
+    """Problem, posture, view and title of the subject.
+
+    Raises:
+        InputError: options of a person for a file that has its figure in it.
+    """
+    from wholebody.errors import InputError
     from wholebody.figures import load
     from wholebody.problem import Problem
     from wholebody.scene import Scene
@@ -89,11 +97,13 @@ def _subject(what: str) -> tuple[Problem, NDArray[np.float64], View, str]:
     from wholebody.taskfile.task import View
 
     path = Path(what)
+    if options and path.suffix.lower() in (".json", ".toml"):
+        raise InputError(f"{path} says which person it shows; leave out --{next(iter(options))}")
     if path.suffix.lower() == ".json":
         task, q = result.read(path)
         return task.problem, q, task.view, task.title
     if path.suffix.lower() == ".toml":
         task = read_task(path)
         return task.problem, task.problem.start, task.view, task.title
-    problem = Problem(Scene(load(what)))
+    problem = Problem(Scene(load(what, **options)))
     return problem, problem.start, View(), what

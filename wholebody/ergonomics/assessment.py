@@ -7,14 +7,16 @@ from math import degrees
 from typing import Any
 
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, body_angles, check_person
+from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
 from wholebody.ergonomics.owas import Owas, owas_code
 from wholebody.ergonomics.reba import Reba, reba_parts
 from wholebody.ergonomics.rula import Rula, rula_parts
+from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.static_torques import StaticTorques, static_torques
-from wholebody.ergonomics.work import Work, check_work
+from wholebody.ergonomics.work import Work
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength
+from wholebody.scene import Scene
 
 Color = tuple[float, float, float, float]
 
@@ -44,6 +46,7 @@ class Ergonomics:
         angles: of the body.
         rula, reba, owas: the scores.
         torques: static torques against strength.
+        seat: whether the person was taken to sit, and what told it.
     """
 
     angles: BodyAngles
@@ -51,6 +54,7 @@ class Ergonomics:
     reba: Reba
     owas: Owas
     torques: StaticTorques
+    seat: str = ""
 
     def rows(self) -> list[tuple[str, str, str, str]]:
         """Rows of a table: method, left, right, and what it says of the worse side."""
@@ -62,6 +66,7 @@ class Ergonomics:
         sides = [f"{share:.0%} {joint}" if joint else "" for joint, share in map(self.torques.of_side, SIDES)]
         joint, share = self.torques.worst
         made.append(("strength", *sides, f"{share:.0%} of the strength of {joint}" if joint else "not known"))  # type: ignore[arg-type]
+        made.append(("seat", "", "", self.seat))
         return made
 
     def summary(self) -> dict[str, Any]:
@@ -76,6 +81,7 @@ class Ergonomics:
             "owas": {"code": self.owas.code, "category": self.owas.category, "action": self.owas.action},
             "strength": {"worst": joint, "share": share, "shares": dict(self.torques.share)},
             "torques": dict(self.torques.torque),
+            "seat": self.seat,
             "angles": _plain(asdict(self.angles)),
         }
 
@@ -98,11 +104,13 @@ class Ergonomics:
         return found
 
 
-def ergonomics_of(figure: Figure, q: Array, work: Work | None = None, strength: Strength | None = None) -> Ergonomics:
+def ergonomics_of(
+    figure: Figure | Scene, q: Array, work: Work | None = None, strength: Strength | None = None
+) -> Ergonomics:
     """Assess a person's posture: RULA, REBA, OWAS, and static torques against strength.
 
     Args:
-        figure: a person, see `body_angles`.
+        figure: a person, see `body_angles`; or a scene with one: then whoever has a thing below pelvis or thighs sits.
         q: (nq,) posture.
         work: load, repetition, support; none if left out.
         strength: of the person; a man of median strength if left out.
@@ -110,13 +118,15 @@ def ergonomics_of(figure: Figure, q: Array, work: Work | None = None, strength: 
     Raises:
         InputError: no person, no posture, no work or no strength.
     """
-    angles, asked = body_angles(figure, q), check_work(work, "ergonomics_of: work")
+    person = seen(figure, q, work, "ergonomics_of")
+    angles, told = person.angles, person.work
     return Ergonomics(
         angles,
-        Rula(*(rula_parts(angles, side, asked) for side in SIDES)),
-        Reba(*(reba_parts(angles, side, asked) for side in SIDES)),
-        owas_code(angles, asked),
-        static_torques(figure, q, load=asked.load, seated=asked.sits(angles), strength=strength),
+        Rula(*(rula_parts(angles, side, told) for side in SIDES)),
+        Reba(*(reba_parts(angles, side, told) for side in SIDES)),
+        owas_code(angles, told),
+        static_torques(person.figure, q, load=told.load, seated=told.sits(angles), strength=strength),
+        person.seat,
     )
 
 

@@ -12,9 +12,11 @@ from math import radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import BodyAngles, body_angles
-from wholebody.ergonomics.work import KNEELING, Work, both_feet, check_work
+from wholebody.ergonomics.angles import BodyAngles
+from wholebody.ergonomics.seat import seen
+from wholebody.ergonomics.work import KNEELING, Work, both_feet
 from wholebody.figures.figure import Figure
+from wholebody.scene import Scene
 
 BENT = radians(20.0)  # of the trunk forward or backward
 TURNED = radians(20.0)  # of the trunk sideways or about its axis
@@ -95,18 +97,19 @@ class Owas:
         return f"{self.code}: back {words[0]}, arms {words[1]}, {words[2]}, {words[3]}"
 
 
-def owas(figure: Figure, q: Array, work: Work | None = None) -> Owas:
+def owas(figure: Figure | Scene, q: Array, work: Work | None = None) -> Owas:
     """OWAS of a person's posture.
 
     Args:
-        figure: a person, see `body_angles`.
+        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
         q: (nq,) posture.
         work: the load, and whether the person walks; none if left out.
 
     Raises:
         InputError: no person, no posture, or no work.
     """
-    return owas_code(body_angles(figure, q), check_work(work, "owas: work"))
+    person = seen(figure, q, work, "owas")
+    return owas_code(person.angles, person.work)
 
 
 def owas_code(angles: BodyAngles, work: Work) -> Owas:

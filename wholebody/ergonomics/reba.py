@@ -7,10 +7,12 @@ from math import radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, body_angles
+from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
 from wholebody.ergonomics.rula import ABDUCTED, DEVIATED, END_OF_TWIST, NEUTRAL, RAISED, lower_arm, position, turned
-from wholebody.ergonomics.work import COUPLINGS, Work, both_feet, check_work
+from wholebody.ergonomics.seat import seen
+from wholebody.ergonomics.work import COUPLINGS, Work, both_feet
 from wholebody.figures.figure import Figure
+from wholebody.scene import Scene
 
 TABLE_A = (
     ((1, 2, 3, 4), (2, 3, 4, 5), (2, 4, 5, 6), (3, 5, 6, 7), (4, 6, 7, 8)),
@@ -116,19 +118,19 @@ class Reba(BothSides[RebaParts]):
     """REBA of both sides: the parts with the arm and the leg of each side."""
 
 
-def reba(figure: Figure, q: Array, work: Work | None = None) -> Reba:
+def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
     """REBA of a person's posture.
 
     Args:
-        figure: a person, see `body_angles`.
+        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
         q: (nq,) posture.
         work: load, grip and repetition; none if left out.
 
     Raises:
         InputError: no person, no posture, or no work.
     """
-    angles, asked = body_angles(figure, q), check_work(work, "reba: work")
-    return Reba(*(reba_parts(angles, side, asked) for side in SIDES))
+    person = seen(figure, q, work, "reba")
+    return Reba(*(reba_parts(person.angles, side, person.work) for side in SIDES))
 
 
 def reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:

@@ -8,13 +8,15 @@ numbers ("twisted", "raised"), the constants say what is taken.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import radians
+from math import pi, radians
 
 from wholebody import checks
 from wholebody.arrays import Array
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles, body_angles
-from wholebody.ergonomics.work import Work, both_feet, check_work
+from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
+from wholebody.ergonomics.seat import seen
+from wholebody.ergonomics.work import Work, both_feet
 from wholebody.figures.figure import Figure
+from wholebody.scene import Scene
 
 TURNED = radians(10.0)
 """From which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly
@@ -25,6 +27,7 @@ ABDUCTED = radians(20.0)
 RAISED = 0.03  # m: of a shoulder
 OUTWARD = radians(30.0)  # of a forearm out of the sagittal plane: "out to the side of the body"
 DEVIATED = radians(10.0)  # of a wrist from its middle line
+RIGHT_ANGLE = radians(90.0)  # between trunk and thighs, from which a seated trunk with a back is well supported
 END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side: "at or near the end of range"
 
 TABLE_A = (
@@ -132,19 +135,19 @@ class Rula(BothSides[RulaParts]):
     """RULA of both sides."""
 
 
-def rula(figure: Figure, q: Array, work: Work | None = None) -> Rula:
+def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
     """RULA of a person's posture.
 
     Args:
-        figure: a person, see `body_angles`.
+        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
         q: (nq,) posture.
         work: load and repetition; none if left out.
 
     Raises:
         InputError: no person, no posture, or no work.
     """
-    angles, asked = body_angles(figure, q), check_work(work, "rula: work")
-    return Rula(*(rula_parts(angles, side, asked) for side in SIDES))
+    person = seen(figure, q, work, "rula")
+    return Rula(*(rula_parts(person.angles, side, person.work) for side in SIDES))
 
 
 def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
@@ -156,7 +159,7 @@ def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
         wrist=_wrist(arm),
         wrist_twist=1 + int(abs(arm.forearm_twist) > END_OF_TWIST),
         neck=_neck(angles),
-        trunk=_trunk(angles),
+        trunk=_trunk(angles, work),
         legs=_legs(angles, work),
         muscle=int(work.static or work.repeated),
         force=_force(work),
@@ -200,9 +203,12 @@ def _neck(angles: BodyAngles) -> int:
     return score + turned(angles.neck_twist, angles.neck_lateral)
 
 
-def _trunk(angles: BodyAngles) -> int:
+def _trunk(angles: BodyAngles, work: Work) -> int:
+    """A trunk that rests on a back scores 1 if it is at least at a right angle to the thighs, however it leans."""
     bent = abs(angles.trunk_flexion)
-    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
+    opened = pi - max(angles.left.thigh_slope, angles.right.thigh_slope) - angles.trunk_flexion
+    rests = bool(work.back_supported) and work.sits(angles) and opened >= RIGHT_ANGLE
+    score = 1 if rests else 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return score + turned(angles.trunk_twist, angles.trunk_lateral)
 
 

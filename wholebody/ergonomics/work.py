@@ -33,6 +33,8 @@ class Work:
         coupling: of hands and load: "good", "fair", "poor" or "unacceptable" (REBA).
         arms_supported: whether the arms rest on something, or the person leans.
         legs_supported: whether legs and feet are supported (RULA).
+        back_supported: whether the back of somebody seated rests on something (RULA); None to tell it from the scene,
+            and without a scene as if it did not.
         walking: whether the person walks (OWAS).
         seated: None to tell it from the posture: both thighs lie, both knees are bent, no knee is on the ground, and
             the centre of mass is behind the feet.
@@ -51,6 +53,7 @@ class Work:
     legs_supported: bool = True
     walking: bool = False
     seated: bool | None = None
+    back_supported: bool | None = None
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -58,8 +61,9 @@ class Work:
         checks.choice(self.coupling, COUPLINGS, "Work: coupling")
         for name in ("static", "repeated", "shock", "unstable", "arms_supported", "legs_supported", "walking"):
             checks.flag(getattr(self, name), f"Work: {name}")
-        if self.seated is not None:
-            checks.flag(self.seated, "Work: seated")
+        for name in ("seated", "back_supported"):
+            if getattr(self, name) is not None:
+                checks.flag(getattr(self, name), f"Work: {name}")
         if self.seated and self.walking:
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 

@@ -78,7 +78,8 @@ class Figure(checks.Settled):
         model: Pinocchio's model; `model.nq` numbers make a posture, `model.nv` a displacement.
         geometry: the convex pieces and the pairs of them that can touch. A piece is called "<segment>" or
             "<segment>:<k>".
-        visual: the geometry that is drawn.
+        visual: the geometry that is drawn: the visuals of a URDF, whose meshes are named by `meshPath` and read when
+            they are drawn; otherwise the pieces.
         detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF.
         root: "free" (a floating base) or "fixed".
         groups: group to joint names, without the root.

@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -19,7 +20,9 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
 from wholebody.figures.self_pairs import choose_pairs
+from wholebody.figures.urdf_file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.pieces import SMALLEST
 
 DATA_KEPT = 4
 """Number of Pinocchio's data objects in a scene with one problem."""
@@ -35,6 +38,7 @@ def robot_figure(
     notes: Iterable[str],
     samples: int,
     seed: int,
+    visual: pin.GeometryModel | None = None,
 ) -> Figure:
     """Return the figure of a robot from its model and geometry alone.
 
@@ -46,6 +50,7 @@ def robot_figure(
         notes: changes made so far.
         samples: number of random postures for choosing the pairs.
         seed: of those postures.
+        visual: what is drawn; the pieces if None.
     """
     excluded = choose_pairs(model, geometry, samples, seed)
     rest = rest_posture(model, geometry, seed)
@@ -62,7 +67,7 @@ def robot_figure(
         excluded=(*excluded, *rest.excluded),
         notes=(*notes, *_told(rest)),
     )
-    return Figure(name, model, geometry, "own", description)
+    return Figure(name, model, geometry, "own", description, visual)
 
 
 def _copied(figure: Articulated, q: Array) -> Array:
@@ -115,6 +120,34 @@ def link_chains(model: pin.Model, links: Iterable[str]) -> dict[str, Chain]:
         names = [model.names[k] for k in model.supports[joint] if k > 0 and model.names[k] != ROOT_JOINT]
         chains[link] = Chain(tuple(names), link)
     return chains
+
+
+def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.GeometryModel | None:
+    """Return what is drawn of links; None without anything.
+
+    An object has the name of its link and a number. A mesh is named by its `meshPath` and scaled by its `meshScale`; it
+    is read when it is drawn, as that takes seconds.
+    """
+    made = []
+    for number, (shape, color) in enumerate(visuals):
+        frame_id = model.getFrameId(shape.link, pin.FrameType.BODY)
+        frame = model.frames[frame_id]
+        solid, file, scale = coal.Sphere(SMALLEST), "", np.ones(3)
+        if shape.file is not None:
+            file, scale = str(shape.file), np.array(shape.size)
+        else:
+            size = [max(length, SMALLEST) for length in shape.size]
+            solid = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}[
+                shape.kind
+            ](*size)
+        paint = np.array(COLOR if color is None else color)
+        made.append(
+            pin.GeometryObject(
+                f"{shape.link}:visual {number}", frame.parentJoint, frame_id, frame.placement * shape.placement,
+                solid, file, scale, color is not None, paint,
+            )
+        )  # fmt: skip
+    return geometry_model(made) if made else None
 
 
 def geometry_of_links(

@@ -9,7 +9,7 @@ from pathlib import Path
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
+from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf_extension import extended_figure
 from wholebody.figures.urdf_file import read_urdf
 from wholebody.figures.urdf_model import urdf_model
@@ -58,4 +58,6 @@ def urdf_figure(
     )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
-    return robot_figure(urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), samples, seed)
+    told = (*urdf.notes, *remarks, *notes)
+    visual = visual_of_links(model, urdf.visuals)
+    return robot_figure(urdf.name, model, urdf.links, geometry, told, samples, seed, visual)

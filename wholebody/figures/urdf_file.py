@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -14,9 +14,22 @@ from wholebody.figures.mesh_search import find_mesh
 from wholebody.figures.urdf_joints import UrdfJoint, read_joints
 from wholebody.figures.xml_reading import bounded, numbers, placement, read_xml, unique_names
 from wholebody.geometry.pieces import LARGEST
+from wholebody.records import with_values
 
 EXTENSION = "wholebody"
 """Name of the element of our extension; see `wholebody.figures.urdf_extension`."""
+
+
+class LinkVisual(NamedTuple):
+    """One visual of a link.
+
+    Attributes:
+        shape: the shape; its file is absolute.
+        color: red, green, blue, alpha of its material; None without one.
+    """
+
+    shape: LinkShape
+    color: tuple[float, float, float, float] | None
 
 
 class UrdfFile(NamedTuple):
@@ -30,6 +43,7 @@ class UrdfFile(NamedTuple):
         joints: in the order of the file.
         shapes: collision shapes in the order of the file.
         colors: link to red, green, blue, alpha of the first of its visuals that has a colour.
+        visuals: what the file wants drawn, without what is wholly transparent or cannot be read.
         extension: the element `EXTENSION`, or None.
         notes: one sentence for each missing part that was filled in.
     """
@@ -41,6 +55,7 @@ class UrdfFile(NamedTuple):
     joints: tuple[UrdfJoint, ...]
     shapes: tuple[LinkShape, ...]
     colors: dict[str, tuple[float, float, float, float]]
+    visuals: tuple[LinkVisual, ...]
     extension: Element | None
     notes: tuple[str, ...]
 
@@ -73,14 +88,21 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
     shapes = tuple(shape for link in robot.findall("link") for shape in _shapes(link, path, tuple(package_dirs)))
     ordered = (root, *(name for name in links if name != root))
     name = robot.get("name") or path.stem
-    colors, remarks = _colors(robot)
+    painted, remarks = _paint(robot)
+    colors = {}
+    for link in robot.findall("link"):
+        # what is wholly transparent in the file is still a body that touches, so it keeps the usual colour
+        seen = [paint for visual in link.findall("visual") if (paint := painted.get(visual)) and paint[3] > 0.0]
+        if seen:
+            colors[str(link.get("name"))] = seen[0]
+    visuals = tuple(_visuals(robot, painted, path, tuple(package_dirs)))
     return UrdfFile(
-        path, name, ordered, inertials, joints, shapes, colors, robot.find(EXTENSION), (*notes, *remarks)
+        path, name, ordered, inertials, joints, shapes, colors, visuals, robot.find(EXTENSION), (*notes, *remarks)
     )  # fmt: skip
 
 
-def _colors(robot: Element) -> tuple[dict[str, tuple[float, float, float, float]], list[str]]:
-    """Colours of links, and one sentence on each material that has none; no robot is refused for one."""
+def _paint(robot: Element) -> tuple[dict[Element, tuple[float, float, float, float]], list[str]]:
+    """Colours of visuals, and one sentence on each material that has none; no robot is refused for one."""
     named: dict[str, tuple[float, float, float, float]] = {}
     notes = []
     materials = [*robot.findall("material"), *robot.findall("link/visual/material")]
@@ -96,14 +118,31 @@ def _colors(robot: Element) -> tuple[dict[str, tuple[float, float, float, float]
             notes.append(f"material {shown(name)}: rgba={shown(text)} is no colour, so it is left out")
             continue
         named.setdefault(name, own[material])
-    colors = {}
+    painted = {}
+    for visual in robot.findall("link/visual"):
+        asked = visual.find("material")
+        paint = None if asked is None else own.get(asked, named.get(asked.get("name") or ""))
+        if paint is not None:
+            painted[visual] = paint
+    return painted, notes
+
+
+def _visuals(
+    robot: Element,
+    painted: dict[Element, tuple[float, float, float, float]],
+    path: Path,
+    package_dirs: tuple[Path, ...],
+) -> Iterator[LinkVisual]:
+    """What is drawn; a visual that cannot be read is left out: the collision shapes are drawn where there is none."""
     for link in robot.findall("link"):
-        painted = [own.get(one, named.get(one.get("name") or "")) for one in link.findall("visual/material")]
-        # what is wholly transparent in the file is still a body that touches, so it keeps the usual colour
-        seen = [one for one in painted if one is not None and one[3] > 0.0]
-        if seen:
-            colors[str(link.get("name"))] = seen[0]
-    return colors, notes
+        for visual in link.findall("visual"):
+            color = painted.get(visual)
+            if color is not None and color[3] == 0.0:
+                continue
+            try:
+                yield LinkVisual(_shape(visual, str(link.get("name")), path, package_dirs), color)
+            except FileFormatError:
+                continue
 
 
 def _links(robot: Element, path: Path) -> tuple[str, ...]:
@@ -128,36 +167,42 @@ def _check_inertial(inertial: Element, place: str) -> None:
     placement(inertial, place, LARGEST)
 
 
-def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> list[LinkShape]:
-    name = str(link.get("name"))
-    capsules = {element.get("name") for element in link.findall("collision_checking/capsule")}
-    found = []
+def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterator[LinkShape]:
+    capsules = {element.get("name") for element in link.findall("collision_checking/capsule")} - {None}
     for collision in link.findall("collision"):
-        place = f"{path}: collision of link {shown(name)}"
-        shapes = list(collision.find("geometry") or ())
-        if len(shapes) != 1:
-            raise FileFormatError(f"{place} has {len(shapes)} shapes in its <geometry>; give one")
-        shape = shapes[0]
-        kind, file = shape.tag, None
-        if kind == "box":
-            size = numbers(shape, "size", place, 3)
-        elif kind == "sphere":
-            size = numbers(shape, "radius", place, 1)
-        elif kind in ("cylinder", "capsule"):
-            size = (*numbers(shape, "radius", place, 1), *numbers(shape, "length", place, 1))
-            kind = "capsule" if collision.get("name") in capsules - {None} else kind
-        elif kind == "mesh":
-            size = bounded(shape, "scale", place, 3, "1 1 1")
-            file = find_mesh(shape.get("filename", ""), place, path, package_dirs)
-            if not all(size):
-                raise FileFormatError(f"{place}: the mesh has the scale {shown(shape.get('scale'))}; give no zeros")
-        else:
-            raise FileFormatError(f"{place} is a <{kind}>; use box, sphere, cylinder or mesh")
-        if kind != "mesh" and min(size) < 0.0:
-            raise FileFormatError(f"{place}: the {kind} has the size {min(size):g}; give metres above zero")
-        if kind != "mesh" and max(size) > LARGEST:
-            raise FileFormatError(f"{place}: the {kind} has the size {max(size):g}; give metres, at most {LARGEST:g}")
-        found.append(
-            LinkShape(name, placement(collision, place, LARGEST), kind, size, file, name=collision.get("name", ""))
+        shape = _shape(collision, str(link.get("name")), path, package_dirs)
+        yield (
+            with_values(shape, kind="capsule") if collision.get("name") in capsules and len(shape.size) == 2 else shape
         )
-    return found
+
+
+def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
+    """The shape of a ``<collision>`` or ``<visual>``.
+
+    Raises:
+        FileFormatError: one sentence with the place and the correction.
+    """
+    place = f"{path}: {element.tag} of link {shown(link)}"
+    shapes = list(element.find("geometry") or ())
+    if len(shapes) != 1:
+        raise FileFormatError(f"{place} has {len(shapes)} shapes in its <geometry>; give one")
+    shape = shapes[0]
+    kind, file = shape.tag, None
+    if kind == "box":
+        size = numbers(shape, "size", place, 3)
+    elif kind == "sphere":
+        size = numbers(shape, "radius", place, 1)
+    elif kind in ("cylinder", "capsule"):
+        size = (*numbers(shape, "radius", place, 1), *numbers(shape, "length", place, 1))
+    elif kind == "mesh":
+        size = bounded(shape, "scale", place, 3, "1 1 1")
+        file = find_mesh(shape.get("filename", ""), place, path, package_dirs)
+        if not all(size):
+            raise FileFormatError(f"{place}: the mesh has the scale {shown(shape.get('scale'))}; give no zeros")
+    else:
+        raise FileFormatError(f"{place} is a <{kind}>; use box, sphere, cylinder or mesh")
+    if kind != "mesh" and min(size) < 0.0:
+        raise FileFormatError(f"{place}: the {kind} has the size {min(size):g}; give metres above zero")
+    if kind != "mesh" and max(size) > LARGEST:
+        raise FileFormatError(f"{place}: the {kind} has the size {max(size):g}; give metres, at most {LARGEST:g}")
+    return LinkShape(link, placement(element, place, LARGEST), kind, size, file, name=element.get("name", ""))

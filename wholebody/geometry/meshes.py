@@ -5,12 +5,13 @@ from __future__ import annotations
 import logging
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.errors import FileFormatError, InputError, MissingPackageError, one_line
+from wholebody.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.files import check_file
 from wholebody.geometry.convex import check_mesh
 
@@ -38,11 +39,64 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
         FileFormatError: missing, empty, of another kind, damaged, without triangles, or not finite.
         MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
     """
+    path = Path(path)
+    scene, unit = _read_scene(path)
+    try:
+        mesh = scene.to_mesh()
+        vertices, faces = unit * np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
+    except Exception as error:
+        raise _unreadable(path, error) from error
+    return _checked(vertices, faces, path)
+
+
+def read_parts(path: str | Path) -> list[tuple[Array, NDArray[np.int64], tuple[float, float, float, float] | None]]:
+    """Read a file as `read_mesh` does, each object alone and with its colour, in the order of their names.
+
+    Args:
+        path: of the file.
+
+    Returns:
+        Of each object vertices (n, 3), faces (m, 3), and red, green, blue, alpha; None where the file has no colour.
+        Of a texture the mean is taken.
+
+    Raises:
+        FileFormatError, MissingPackageError: as `read_mesh`.
+    """
+    path = Path(path)
+    scene, unit = _read_scene(path)
+    found = []
+    try:
+        for node in sorted(scene.graph.nodes_geometry):  # trimesh keeps them in a set
+            placed, name = scene.graph[node]
+            mesh = scene.geometry[name].copy().apply_transform(placed)
+            if len(getattr(mesh, "faces", ())):
+                vertices, faces = unit * np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
+                found.append((*_checked(vertices, faces, path), _color(mesh.visual)))
+    except WholebodyError:
+        raise
+    except Exception as error:
+        raise _unreadable(path, error) from error
+    if not found:
+        raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
+    return found
+
+
+def _color(visual: Any) -> tuple[float, float, float, float] | None:
+    if not visual.defined:
+        return None
+    whole = visual.material.main_color if hasattr(visual, "material") else visual.main_color
+    if getattr(getattr(visual, "material", None), "image", None) is not None:
+        whole = np.append(np.asarray(visual.material.image.convert("RGB")).reshape(-1, 3).mean(axis=0), 255)
+    red, green, blue, alpha = (float(part) / 255.0 for part in whole)
+    return red, green, blue, alpha if alpha > 0.0 else 1.0  # exporters confuse opacity and transparency
+
+
+def _read_scene(path: Path) -> tuple[Any, float]:
+    """The file as trimesh reads it, and the metres of its unit."""
     try:
         import trimesh
     except ImportError:
         raise MissingPackageError("reading meshes needs trimesh: pip install trimesh") from None
-    path = Path(path)
     check_file(path, "mesh")
     if path.suffix.lower() not in SUFFIXES:
         raise FileFormatError(
@@ -57,16 +111,20 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     quiet.setLevel(logging.CRITICAL)
     try:
         scene = trimesh.load_scene(path, process=False)
-        mesh = scene.to_mesh()
-        vertices, faces = np.array(mesh.vertices, dtype=float), np.array(mesh.faces)
-        if path.suffix.lower() == ".dae":
-            vertices *= _metres(scene.units)
+        return scene, _metres(scene.units) if path.suffix.lower() == ".dae" else 1.0
     except Exception as error:  # trimesh's readers raise many kinds of errors
-        raise FileFormatError(
-            f"mesh {path}: it cannot be read ({type(error).__name__}: {one_line(str(error))}); export it again"
-        ) from error
+        raise _unreadable(path, error) from error
     finally:
         quiet.setLevel(level)
+
+
+def _unreadable(path: Path, error: Exception) -> FileFormatError:
+    return FileFormatError(
+        f"mesh {path}: it cannot be read ({type(error).__name__}: {one_line(str(error))}); export it again"
+    )
+
+
+def _checked(vertices: Array, faces: NDArray[np.int64], path: Path) -> tuple[Array, NDArray[np.int64]]:
     if not len(faces):
         raise EmptyMeshError(f"mesh {path}: there are no triangles in it")
     try:

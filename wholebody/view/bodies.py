@@ -9,7 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.figures.figure import Figure
 from wholebody.view import drawing, style
+from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import Color
@@ -47,21 +49,35 @@ class Body:
 
 
 class Dressed(NamedTuple):
-    """A figure whose surface is drawn in place of its pieces.
+    """A figure of which a surface, or the visuals of its file, are drawn in place of pieces.
 
     Attributes:
         prefix: of its segments among the owners of pieces, and of its joints in the model.
         root: node of the surface, below the figure's or a ghost's.
-        skin: the surface.
-        nodes: node of each joint of the surface.
-        color: of the whole surface; each patch's own if None.
+        look: the surface or the visuals.
+        nodes: node of each joint that carries them.
+        color: of all of it; each patch's own if None.
     """
 
     prefix: str
     root: str
-    skin: Skin
+    look: Skin | LinkVisuals
     nodes: Mapping[str, str]
     color: Color | None
+
+    def build(self, graph: SceneGraph, root: str = "", color: Color | None = None) -> list[Skinned]:
+        """Put it in the scene graph, below the node `root`; in a colour if there is one."""
+        nodes = {joint: root + path for joint, path in self.nodes.items()}
+        paint = self.color if color is None else color
+        if isinstance(self.look, Skin):
+            return self.look.build(graph, root + self.root, nodes, paint)
+        return self.look.build(graph, nodes, paint)
+
+    def owns(self, owner: str, things: Collection[str]) -> bool:
+        """Whether it is drawn in place of the pieces of an owner."""
+        if isinstance(self.look, LinkVisuals):
+            return owner.removeprefix(self.prefix) in self.look.links and owner.startswith(self.prefix)
+        return owner.startswith(self.prefix) if self.prefix else owner not in things
 
 
 class Bodies:
@@ -73,7 +89,7 @@ class Bodies:
         Args:
             scene: the scene to draw.
             see_through: names of things to draw transparent.
-            pieces: draw the figure's pieces even if its body has a surface.
+            pieces: draw the figure's pieces even if its body has a surface or visuals.
         """
         self.scene = scene
         self.see_through = frozenset(see_through)
@@ -93,29 +109,31 @@ class Bodies:
         self.pieces = pieces
         self._dressed = () if pieces else tuple(self._dress())
         self._owned = frozenset(
-            owner
-            for owner in scene.piece_owner
-            for figure in self._dressed
-            if (owner.startswith(figure.prefix) if figure.prefix else owner not in numbers)
+            owner for owner in scene.piece_owner for figure in self._dressed if figure.owns(owner, numbers)
         )
         self._patches: list[tuple[str, Skinned]] = []
         shown = enumerate(self.all)
         self._things = [index for index, body in shown if body.thing is not None and not self._hidden(index)]
 
     def _dress(self) -> Iterator[Dressed]:
-        """The figures that have a surface; their joints' nodes join the carriers."""
+        """The figures that have a surface or visuals; their joints' nodes join the carriers."""
         scene = self.scene
         figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
         for name, (figure, color) in figures.items():
             surface = surface_of(figure)
-            if surface is None:
+            look: Skin | LinkVisuals | None = None
+            if surface is not None:
+                look = Skin(surface, figure)
+            elif isinstance(figure, Figure) and figure.visual is not figure.geometry:
+                look = LinkVisuals(figure)
+            if look is None:
                 continue
-            skin, prefix = Skin(surface, figure), f"{name}/" if name else ""
+            prefix = f"{name}/" if name else ""
             folder = f"{style.FIGURE_NODE}/{node(name)}" if name else style.FIGURE_NODE
-            nodes = {joint: f"{folder}/{node(joint)}" for joint in skin.joints}
+            nodes = {joint: f"{folder}/{node(joint)}" for joint in look.joints}
             for joint, path in nodes.items():
                 self.carriers[path] = int(self.scene.model.getJointId(f"{prefix}{joint}"))
-            yield Dressed(prefix, f"{folder}/body", skin, nodes, color)
+            yield Dressed(prefix, f"{folder}/body", look, nodes, color)
 
     def _thing_color(self, thing: str, number: int, piece: Any) -> Color:
         given = getattr(self.scene.objects[thing], "color", None)
@@ -133,9 +151,7 @@ class Bodies:
         graph.remove(style.FIGURE_NODE)
         graph.remove(style.OBJECT_NODE)
         self._patches = [
-            (f"{figure.prefix}{patch.segment}", patch)
-            for figure in self._dressed
-            for patch in figure.skin.build(graph, figure.root, figure.nodes, figure.color)
+            (f"{figure.prefix}{patch.segment}", patch) for figure in self._dressed for patch in figure.build(graph)
         ]
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
@@ -187,8 +203,7 @@ class Bodies:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{style.GHOST_NODE}/{number}"
         for figure in self._dressed:
-            nodes = {joint: root + path for joint, path in figure.nodes.items()}
-            figure.skin.build(graph, root + figure.root, nodes, color)
+            figure.build(graph, root, color)
             for path in figure.nodes.values():
                 graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)
         for index, piece in enumerate(self.scene.geometry.geometryObjects):

@@ -87,7 +87,8 @@ def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], u
         "normal": _numbers(np.round(127.0 * patch.normals), "i1"),
         "bones": _numbers(patch.bones, "u1"),
         "weights": _numbers(weights, "u1"),
-        "index": _numbers(patch.faces, "<u2"),
+        "index": _numbers(np.concatenate([patch.faces, patch.coarse]), "<u2"),
+        "fine": patch.faces.size,
         "color": [float(part) for part in color],
     }
     return Command(OBJECT, path, "", pack(message))

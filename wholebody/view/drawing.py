@@ -35,6 +35,19 @@ def piece(geometry: Any, name: str, color: Color) -> Three:
     return _mesh(name, shape, _material(color, flat=flat), matrix=_matrix(scale, center), shadow=shadow)
 
 
+def mesh(vertices: Array, faces: NDArray[Any], name: str, color: Color) -> Three:
+    """Triangles seen from both sides, as the faces of robots' meshes wind either way.
+
+    Args:
+        vertices: (n, 3) in the coordinates of the node.
+        faces: (m, 3) indices of vertices.
+        name: an identifier that nothing else in the page has.
+        color: red, green, blue, alpha.
+    """
+    material = {**_material(color, flat=True), "side": _BOTH}
+    return _mesh(name, _triangles(vertices, faces, None), material, shadow=color[3] == 1.0)
+
+
 def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float], Array | None, bool]:
     """Three.js geometry, scale, placement (4, 4) or None, and whether its faces are flat."""
     kind = type(geometry).__name__

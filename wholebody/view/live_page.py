@@ -186,11 +186,11 @@ class LivePage:
             began = time.perf_counter()
             with self._lock:
                 if self._target is not None and (self._target is not self._reached):
-                    self._follow(self._target)
+                    self.follow(self._target)
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
 
-    def _follow(self, target: Any) -> None:
-        """Make one frame towards the place of the mouse."""
+    def follow(self, target: Any) -> LiveFrame:
+        """Make one frame towards a place (3,) of the mouse, and show it."""
         name, before = self.drag.taken, self.drag.q
         place = self.drag.place(name)
         frame = self.drag.move(target)
@@ -205,6 +205,7 @@ class LivePage:
                 self.drag.let_go()
                 self._target, frame = None, self.drag.report()
         self._show(frame)
+        return frame
 
     def _show(self, frame: LiveFrame) -> None:
         scene = self.drag.scene

@@ -8,9 +8,12 @@ import os
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.checks import number
 from wholebody.checks import path as checked_path
@@ -20,7 +23,8 @@ from wholebody.files import Scratch
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""
 SLOWEST = 0.01  # pictures per second
-_COLORS = 96
+_COLORS = 256
+EVERY = 7  # pixels, of which one counts for the palette: all of them take half a second
 
 
 def check_movie(path: str | os.PathLike[str]) -> Path:
@@ -79,13 +83,26 @@ def _gif(pictures: Iterable[bytes], fps: float) -> bytes:
     from PIL import Image
 
     frames = [Image.open(io.BytesIO(picture)).convert("RGB") for picture in pictures]
-    middle = frames[len(frames) // 2].quantize(_COLORS, method=Image.Quantize.MEDIANCUT)
-    indexed = [frame.quantize(palette=middle, dither=Image.Dither.NONE) for frame in frames]
+    palette = Image.fromarray(_swatch([frames[0], frames[len(frames) // 2], frames[-1]]))
+    palette = palette.quantize(_COLORS, method=Image.Quantize.MEDIANCUT)
+    indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     made, rest = io.BytesIO(), indexed[1:]
     indexed[0].save(
         made, "GIF", save_all=True, append_images=rest, duration=round(1000 / fps), loop=0, optimize=False
     )  # fmt: skip
     return made.getvalue()
+
+
+def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
+    """An image (rows, 64, 3) from which a palette is chosen: half are the frames' pixels, half are their colours alike.
+
+    By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
+    """
+    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::EVERY] for frame in frames])
+    _, first = np.unique(pixels >> 3, axis=0, return_index=True)
+    kinds = np.repeat(pixels[first], len(pixels) // len(first) + 1, axis=0)
+    every = np.concatenate([pixels, kinds])
+    return np.resize(every, (-(-len(every) // 64), 64, 3))
 
 
 def _mp4(pictures: Iterable[bytes], fps: float) -> bytes:

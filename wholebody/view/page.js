@@ -141,6 +141,14 @@
     skeletons.set(cmd.path, made);
   }
 
+  const SMALL = 0.0035; // m: of a pixel where the camera looks at, from which bodies are drawn coarsely
+  let small = false;
+  function measure() {
+    const distance = viewer.camera.position.distanceTo(viewer.controls.target);
+    const across = 2 * distance * Math.tan(viewer.camera.fov * Math.PI / 360);
+    small = across / viewer.renderer.domElement.height > SMALL;
+  }
+
   function skin(cmd) {
     const shape = new THREE.BufferGeometry();
     const position = Float32Array.from(numbers(Int16Array, cmd.position), x => x * cmd.unit);
@@ -156,6 +164,13 @@
       polygonOffset: alpha < 1, polygonOffsetFactor: 2, polygonOffsetUnits: 8,
     });
     const mesh = new THREE.SkinnedMesh(shape, material);
+    // Shadows are thrown by the coarse triangles, which follow the fine ones; so is a body drawn that is small.
+    const coarse = shape.index.count - cmd.fine, fewer = () => shape.setDrawRange(cmd.fine, coarse);
+    mesh.onBeforeRender = () => {
+      if (!small) shape.setDrawRange(0, cmd.fine);
+    };
+    mesh.onAfterRender = fewer;
+    fewer();
     mesh.frustumCulled = false; // its box is that of the binding posture
     mesh.castShadow = mesh.receiveShadow = alpha === 1;
     mesh.bind(skeletons.get(cmd.skeleton), new THREE.Matrix4());
@@ -210,6 +225,7 @@
   const draw = viewer.render.bind(viewer);
   viewer.render = function () {
     arrange();
+    measure();
     draw();
   };
 

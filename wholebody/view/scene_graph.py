@@ -118,10 +118,14 @@ class SceneGraph:
 
     def play(self, keyframes: Sequence[Keyframe], dt: float, repetitions: float) -> None:
         """Let the page play these keyframes, dt seconds apart. A marker that changes its appearance is left out."""
+        later: set[str] = set()
         for keyframe in keyframes[1:]:
-            for path, (marker, _) in keyframe.markers.items():
+            for path, (marker, place) in keyframe.markers.items():
                 if path not in keyframes[0].markers:
                     self._provide(path, marker)
+                    if path not in later:  # tracks carry only what changes, such as no scale of an arrow that keeps it
+                        self.place(path, place)
+                        later.add(path)
         self.show(keyframes[0])
         tracks = [*_placements(keyframes), *_colors(keyframes), *self._appearances(keyframes)]
         self.do(commands.set_animation(tracks, dt, len(keyframes), repetitions))

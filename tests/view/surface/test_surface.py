@@ -135,6 +135,12 @@ def turns(points: Any, corners: Any) -> Any:
     return found
 
 
+def volume(corners: Any) -> float:
+    """Of a closed surface, by Gauss, from the corners (n, 9) of its triangles."""
+    a, b, c = np.moveaxis(corners.reshape(-1, 3, 3) - corners.reshape(-1, 3).mean(axis=0), 1, 0)
+    return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6.0)
+
+
 def test_the_patches_cover_every_part_once() -> None:
     surface = surface_of(load("human"))
     assert surface is not None
@@ -146,6 +152,12 @@ def test_the_patches_cover_every_part_once() -> None:
         whole = part.surface.vertices[part.surface.faces].reshape(-1, 9)
         assert len(corners) == len(whole)
         np.testing.assert_array_equal(corners[np.lexsort(corners.T)], whole[np.lexsort(whole.T)])
+        few = np.concatenate([patch.vertices[patch.coarse].reshape(-1, 9) for patch in own])
+        assert 0 < len(few) < 0.7 * len(corners)
+        places, numbers = np.unique(few.reshape(-1, 3), axis=0, return_inverse=True)
+        assert is_closed(numbers.reshape(-1, 3)), part.name  # neighbours meet without a gap
+        assert len(places) > 3
+        assert volume(few) == pytest.approx(volume(corners), rel=0.1, abs=1e-6), part.name  # brows are thin
     assert max(len(patch.vertices) for patch in patches) < 2**16
     assert {patch.segment for patch in patches} >= {"head", "thorax", "pelvis", "left_thigh", "right_forearm"}
 

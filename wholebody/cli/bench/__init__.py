@@ -8,6 +8,7 @@ from wholebody.cli.bench import (
     attack,
     challenge,
     compare,
+    daily,
     detail,
     export,
     held_out,
@@ -61,5 +62,6 @@ def add_to(commands: Commands) -> None:
         regress,
         world,
         human,
+        daily,
     ):
         command.add_to(kinds)

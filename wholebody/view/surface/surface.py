@@ -20,6 +20,7 @@ from wholebody.figures.human import human_spec
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
+from wholebody.view.surface.nets import coarsened
 from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
 
 FORMAT = "7"
@@ -57,6 +58,8 @@ class Patch(NamedTuple):
         vertices: (n, 3) metres, in the world of the binding posture.
         normals: (n, 3) outward unit vectors.
         faces: (m, 3) indices of vertices, wound outwards.
+        coarse: (k, 3) the same of fewer and larger triangles, for shadows and small pictures; neighbours share the
+            vertices of their border here too.
         bones: (n, 4) indices of bones.
         weights: (n, 4) their influences, which add up to 1.
     """
@@ -67,6 +70,7 @@ class Patch(NamedTuple):
     vertices: Array
     normals: Array
     faces: NDArray[np.int64]
+    coarse: NDArray[np.int64]
     bones: NDArray[np.uint8]
     weights: Array
 
@@ -92,10 +96,12 @@ class Surface(NamedTuple):
             strength = np.zeros((len(part.weights), len(names)))
             for column in range(part.weights.shape[1]):
                 np.add.at(strength, (np.arange(len(strength)), place[part.bones[:, column]]), part.weights[:, column])
-            owner = strength[part.surface.faces].sum(axis=1).argmax(axis=1)
-            for number in np.unique(owner):
-                faces = part.surface.faces[owner == number]
-                used, local = np.unique(faces, return_inverse=True)
+            coarse = coarsened(part.surface)
+            owner, owner_coarse = (strength[faces].sum(axis=1).argmax(axis=1) for faces in (part.surface.faces, coarse))
+            for number in np.unique(np.concatenate([owner, owner_coarse])):
+                faces, fewer = part.surface.faces[owner == number], coarse[owner_coarse == number]
+                used, local = np.unique(np.concatenate([faces, fewer]), return_inverse=True)
+                local = local.reshape(-1, 3)
                 found.append(
                     Patch(
                         f"{part.name}:{names[number]}",
@@ -103,7 +109,8 @@ class Surface(NamedTuple):
                         part.color,
                         part.surface.vertices[used],
                         part.surface.normals[used],
-                        local.reshape(faces.shape),
+                        local[: len(faces)],
+                        local[len(faces) :],
                         part.bones[used],
                         part.weights[used],
                     )

@@ -1,0 +1,175 @@
+"""What is done every day, in seconds of the processor: reach maps, dragging in a browser, pictures and movies."""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.errors import InputError
+from wholebody.files import Scratch
+from wholebody.tracking.live import LiveDrag
+from wholebody.view.live_page import LivePage
+
+CORNERS = (0.15, -0.75, 0.80), (0.90, 0.45, 1.25)  # m: of the grid over the desk
+GRIDS = (5, 5, 2), (25, 20, 4), (40, 25, 10)  # places along x, y and z: 50, 2,000 and 10,000
+DRAG_FRAMES = 300
+BOXES = 20
+MOVIE_FRAMES = 60
+PICTURE, MOVIE = (960, 720), (640, 480)  # pixels
+SEED = 5
+
+
+@dataclass(frozen=True)
+class DailyRow:
+    """One measurement.
+
+    Attributes:
+        what: in words.
+        count: places, frames or pictures.
+        cpu: seconds of the processor of all processes, of one map, frame or picture; the median of frames.
+        p95: likewise, of frames; 0 where there is one measurement.
+        asked: seconds of the clock on two cores that are asked; 0 for none.
+        told: counts of the outcome, in words.
+    """
+
+    what: str
+    count: int
+    cpu: float
+    p95: float
+    asked: float
+    told: str
+
+
+ASKED = {50: 3.0, 10_000: 90.0}  # s: of a reach map of so many places on two cores
+
+
+def measure(*, quick: bool = False) -> Iterator[DailyRow]:
+    """Measure one after the other.
+
+    Args:
+        quick: the smallest map, and few frames.
+    """
+    for counts in GRIDS[:1] if quick else GRIDS:
+        yield reach(counts)
+    yield drag(20 if quick else DRAG_FRAMES)
+    yield from pictures(4 if quick else MOVIE_FRAMES)
+
+
+def reach(counts: tuple[int, int, int]) -> DailyRow:
+    """Map the right index finger of a seated woman over a desk with a monitor, by one process."""
+    scene = wb.Scene(wb.load("human", sex="female", stature=1.65)).add(wb.HalfSpace(), name="floor")
+    scene.add(wb.Box((0.70, 1.40, 0.03)), name="desk", at=(0.62, 0.0, 0.74))
+    scene.add(wb.Box((0.03, 0.50, 0.32)), name="monitor", at=(0.72, 0.0, 0.98))
+    held = [wb.Hold("pelvis"), wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(scene, "sitting", constraints=held, clearance=0.005)
+    low, high = np.array(CORNERS)
+    before = time.process_time()
+    found = wb.reach_map(problem, "right_index_tip", low, high, (high - low) / (np.array(counts) - 1))
+    spent = time.process_time() - before
+    told = ", ".join(f"{count:,} {name}" for name, count in found.counts().items())
+    places = int(np.prod(counts))
+    return DailyRow("reach map", places, spent, 0.0, ASKED.get(places, 0.0), told)
+
+
+def drag(frames: int) -> DailyRow:
+    """Drag a person's right palm on a circle through 20 boxes; a step, contacts, and the messages to the page."""
+    figure, rng = wb.load("human"), np.random.default_rng(SEED)
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    for number in range(BOXES):
+        place = (rng.uniform(0.35, 0.9), rng.uniform(-0.9, 0.9), rng.uniform(0.2, 1.6))
+        scene.add(wb.Box(tuple(rng.uniform(0.05, 0.15, 3))), name=f"box {number}", at=place)
+    problem = wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()])
+    dragged, times, deepest = LiveDrag(problem), [], 0.0
+    with Scratch() as folder:
+        page = LivePage(dragged, folder / "posture.toml", 8471)
+        try:
+            dragged.take("right_palm")
+            middle = dragged.place("right_palm") + (0.25, 0.0, 0.25)
+            for turn in 2.0 * np.pi * np.arange(frames) / 100.0:
+                target = middle + 0.3 * np.array((np.sin(turn), 0.5 * np.sin(2.0 * turn), -np.cos(turn)))
+                before = time.thread_time()
+                frame = page.follow(target)
+                times.append(time.thread_time() - before)
+                deepest = max(deepest, frame.overlap)
+        finally:
+            page.stop()
+    p95 = float(np.quantile(times, 0.95))
+    return DailyRow("frame of a drag", frames, median(times), p95, 1 / 60, f"deepest overlap {1e3 * deepest:.4f} mm")
+
+
+def pictures(frames: int) -> Iterator[DailyRow]:
+    """Draw a person among things; all processes of Chromium count, and ffmpeg does not.
+
+    Raises:
+        InputError: this is no Linux, which tells what other processes spent.
+    """
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+    for number in range(10):
+        side = (-1) ** number
+        scene.add(wb.Box((0.2, 0.2, 0.1 + 0.1 * number)), name=f"box {number}", at=(0.8, side * 0.25 * number, 0.6))
+    first = figure.posture("standing")
+    last = figure.with_joints(first, {"right_shoulder_flexion": 1.2, "left_elbow_flexion": 1.4})
+    motion = [pin.interpolate(figure.model, first, last, share) for share in np.linspace(0.0, 1.0, frames)]
+    with Scratch() as folder, wb.Viewer(scene) as viewer:
+        viewer.show(first)
+        viewer.picture(folder / "first.png", PICTURE)
+        before = processor_seconds()
+        viewer.show(last)
+        viewer.picture(folder / "later.png", PICTURE)
+        yield DailyRow("picture after the first", 1, processor_seconds() - before, 0.0, 1.5, "960 x 720")
+        viewer.play(motion, 1 / 25)
+        viewer.picture(folder / "begin.png", MOVIE)
+        before = processor_seconds()
+        viewer.movie(folder / "motion.gif", MOVIE)
+        spent = (processor_seconds() - before) / frames
+        yield DailyRow("picture of a movie", frames, spent, 0.0, 0.1, "640 x 480")
+
+
+def processor_seconds() -> float:
+    """Seconds of the processor that this process and all that descend from it have spent.
+
+    Raises:
+        InputError: there is no /proc.
+    """
+    if not Path("/proc/self/stat").is_file():
+        raise InputError("measuring pictures needs /proc, which tells what Chromium spent; run it on Linux")
+    parent, spent = {}, {}
+    for entry in Path("/proc").iterdir():
+        try:
+            fields = (entry / "stat").read_text().rpartition(")")[2].split() if entry.name.isdigit() else []
+        except OSError:  # it has ended
+            continue
+        if fields:
+            parent[int(entry.name)], spent[int(entry.name)] = int(fields[1]), int(fields[11]) + int(fields[12])
+    total = 0
+    for process in parent:
+        above = process
+        while above in parent and above != os.getpid():
+            above = parent[above]
+        total += spent[process] if above == os.getpid() else 0
+    return total / os.sysconf("SC_CLK_TCK")
+
+
+def report(rows: list[DailyRow], facts: dict[str, str]) -> str:
+    """Return the table as Markdown."""
+    lines = [
+        f"Measured on {facts['processor']}, {facts['cores']} cores; load {facts['load']}. CPU is the time of all "
+        "processes, which other work on the machine lengthens.",
+        "",
+        "| what | count | CPU ms | p95 | asked of the clock, two cores, ms | outcome |",
+        "| --- | ---: | ---: | ---: | ---: | --- |",
+    ]
+    for row in rows:
+        p95 = f"{1e3 * row.p95:,.1f}" if row.p95 else ""
+        asked = f"{1e3 * row.asked:,.1f}" if row.asked else ""
+        lines.append(f"| {row.what} | {row.count:,} | {1e3 * row.cpu:,.1f} | {p95} | {asked} | {row.told} |")
+    return "\n".join(lines)
