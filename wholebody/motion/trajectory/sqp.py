@@ -45,7 +45,7 @@ HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises t
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 EARLY = 10  # steps after which a hasty run ends; more = longer where normals mislead, fewer = more other starts
 STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
-LOST = 0.01  # m, rad: if that is larger; less is the bending of contacts
+LOST = 0.01  # m, rad: if it was never less; what was nearer is on the right side, and has contacts that bend
 SHRUNK = 0.5  # of its first trust region: a hasty run also ends once its own is smaller
 FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
 ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
@@ -261,7 +261,7 @@ class WindowProgram:
 
 def _stalled(missed: Sequence[float]) -> bool:
     """Whether the last steps brought too little of the worst shortfalls, one for each step; see `STEPS`."""
-    if len(missed) <= STEPS or missed[-1] <= LOST:
+    if len(missed) <= STEPS or min(missed) <= LOST:
         return False
-    before = max(missed[-1 - STEPS : -1])
-    return missed[-1] > max(STALLED * before, before - ONE_STEP)
+    before = min(missed[:-STEPS])
+    return min(missed[-STEPS:]) > max(STALLED * before, before - ONE_STEP)
