@@ -230,7 +230,8 @@ class ClipRun:
         most, dipped = self._settings.iterations, set[int]()
         for number in range(ROUNDS):
             dear = GROWN * found.objective if found is not None and found.programs else np.inf
-            ends = dear if way is _Way.HASTY else None
+            # from the third round on it is nearly free: what is missed then is seldom on the wrong side
+            ends = dear if way is _Way.HASTY and number < 2 else None
             found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, ends)
             radius = NEARLY
             if number:  # what is free already is to stay where it is, or it dips elsewhere
