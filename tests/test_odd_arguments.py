@@ -748,6 +748,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     still = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
     held = {"before": still, "after": still, "hand": "right_palm", "other": "left_palm"}
     yield "hand_error", Call(measures.hand_error, held)
+    yield "hand_off_weapon", Call(measures.hand_off_weapon, held)
     yield "share_deeper", Call(measures.share_deeper, {"found": wb.check(clip), "depth": 0.01})
     yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})

@@ -99,7 +99,9 @@ def rows() -> list[MotionRow]:
                      distance_mm=9.0, jerk=2.0, sliding_mm=0.5, solves=40)  # fmt: skip
     return [
         base,
-        dataclasses.replace(base, method="trajectory", angle=0.06, jerk=1.1, seconds=3.0, programs=12, hand_mm=0.4),
+        dataclasses.replace(
+            base, method="trajectory", angle=0.06, jerk=1.1, seconds=3.0, programs=12, hand_mm=1.4, off_mm=0.4
+        ),
         dataclasses.replace(base, method="fade", outcome="left", after=3, deepest_mm=2.0, seconds=0.2),
         dataclasses.replace(base, method=CHECKED, seconds=0.1, outcome="left"),
     ]
@@ -117,6 +119,7 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "| trajectory | at most 2 s a second of motion | 1 of 1 |  |" in text
     assert "| bisection | hands on the weapon" not in text
     assert "| trajectory | hands on the weapon within 1 mm | 1 of 1 |  |" in text
+    assert "| trajectory | hands within 1 mm along the weapon too | 0 of 1 | walk, pack: 1.4 mm |" in text
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000

@@ -63,6 +63,8 @@ def test_hands_that_are_held_in_each_other_part_by_their_depth(human: Figure, me
     assert depth.max() < found.report.beside < 1.5 * depth.max() + 5e-4
     for kept, now in zip(grips(clip), grips(found.clip), strict=True):
         apart = kept.actInv(now)
+        shaft = kept.translation / np.linalg.norm(kept.translation)
+        assert np.linalg.norm(np.cross(now.translation, shaft)) < 1e-3  # it slides along what both hands hold
         assert np.linalg.norm(apart.translation) < found.report.beside + 1e-3
         assert np.linalg.norm(pin.log3(apart.rotation)) < 1e-3
 

@@ -11,7 +11,14 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.feet import slid, sliding
-from wholebody.motion.measures import deviation, foot_sliding, hand_error, jerk_ratio, share_deeper
+from wholebody.motion.measures import (
+    deviation,
+    foot_sliding,
+    hand_error,
+    hand_off_weapon,
+    jerk_ratio,
+    share_deeper,
+)
 from wholebody.motion.stance import foot_points
 
 
@@ -88,7 +95,9 @@ def test_hands_on_a_weapon() -> None:
     q = figure.posture("arms_forward")
     before = wb.Clip(figure, [q, q, q], 0.1)  # type: ignore[arg-type]
     turned = pin.integrate(figure.model, q, np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.5, *np.zeros(figure.model.nv - 6)]))
-    opened = figure.with_joints(turned, {"left_elbow_flexion": figure.joint_values(q)["left_elbow_flexion"] + 0.1})
+    angles = figure.joint_values(q)
+    changed = {name: angles[name] + 0.1 for name in ("left_elbow_flexion", "left_shoulder_abduction")}
+    opened = figure.with_joints(turned, changed)
     assert hand_error(before, before.with_q([q, turned, q]), "right_palm", "left_palm") == pytest.approx(0.0, abs=1e-12)
     data, palms = figure.model.createData(), []
     for posture in (q, opened):
@@ -98,6 +107,10 @@ def test_hands_on_a_weapon() -> None:
     error = hand_error(before, before.with_q([q, q, opened]), "right_palm", "left_palm")
     assert error == pytest.approx(float(np.linalg.norm(palms[0] - palms[1])))
     assert error > 0.01
+    across = hand_off_weapon(before, before.with_q([q, q, opened]), "right_palm", "left_palm")
+    shaft = palms[0] / np.linalg.norm(palms[0])
+    assert across == pytest.approx(float(np.linalg.norm(np.cross(palms[1], shaft))))
+    assert 0.01 < across < 0.9 * error
 
 
 def test_share_deeper(free_bodies: Callable[..., Any]) -> None:

@@ -4,10 +4,12 @@
 held at each other, so where the recording has them in each other, contact and grip contradict. Recordings that were
 brought onto larger hands do. There the grip is shifted, by the shift s_t (3,) of each frame t for which
 
-    1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2)    is least, and    n . s_t >= depth + room
+    1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2 + c |s_t - (u_t . s_t) u_t|^2)    is least, and
+    n . s_t >= depth + room
 
-for every near pair of pieces with its normal n, where the room includes the clearance. Normals turn with the shift, so
-the program is solved a few times.
+for every near pair of pieces with its normal n, where the room includes the clearance. u_t is the direction from one
+held frame to the other: two hands on one shaft may slide along it, and leave it only where that parts nothing. Normals
+turn with the shift, so the program is solved a few times.
 """
 
 from __future__ import annotations
@@ -32,6 +34,7 @@ SPREAD = 0.1  # s: how far a shift at one frame spreads to its neighbours
 MARGIN = 0.5  # s, before and after an overlap: in which grips are shifted
 FARTHEST = 0.05  # m: of a shift along any axis; what needs more is no grip, and stays as it is
 ROUNDS = 8  # of normals
+ACROSS = 100.0  # weight c of what a shift has across the line between both frames
 
 
 class _Row(NamedTuple):
@@ -57,6 +60,14 @@ class _Grip:
                 if (pieces[a].parentJoint, pieces[b].parentJoint) == joints and joints[0] != joints[1]:
                     self._pairs.append((pieces[a], pieces[b]))
         self._request, self._result = coal.DistanceRequest(), coal.DistanceResult()
+
+    def line(self, q: Array) -> Array:
+        """(3,) direction from the other frame to the held one at a posture (nq,), in the other one's axes; or zero."""
+        pin.forwardKinematics(self._model, self._data, q)
+        base, held = (self._data.oMi[each.parentJoint] * each.placement for each in (self._other, self._own))
+        way: Array = np.asarray(base.actInv(held).translation)
+        length = float(np.linalg.norm(way))
+        return way / length if length > 0.0 else way
 
     def rows(self, frame: int, q: Array, shift: Array, clearance: float) -> list[_Row]:
         """Near pairs at a posture (nq,) with a shift (3,) in the axes of the other frame.
@@ -114,7 +125,10 @@ def _window(grip: _Grip, window: Window, q: Array, dt: float, clearance: float) 
     count = len(window)
     seams = window.first > 0, window.end < len(q)
     bands = Objective(count, np.ones(3), SPREAD, dt, seams).bands
-    P, shifts = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3))), np.zeros((count, 3))
+    lines = [grip.line(q[window.first + k]) for k in range(count)]
+    across = sp.block_diag([np.eye(3) * (line @ line) - np.outer(line, line) for line in lines])
+    P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + ACROSS * across)
+    shifts = np.zeros((count, 3))
     _, solve = banded_solver(None)
     for _ in range(ROUNDS):
         rows = [row for k in range(count) for row in grip.rows(k, q[window.first + k], shifts[k], clearance)]

@@ -116,6 +116,34 @@ def hand_error(before: Clip, after: Clip, hand: str, other: str) -> float:
     return float(np.linalg.norm(held[0] - held[1], axis=1).max())
 
 
+def hand_off_weapon(before: Clip, after: Clip, hand: str, other: str) -> float:
+    """By how much a hand leaves a straight weapon that both hands hold, along which it may slide: metres.
+
+    The weapon lies along the line between both frames in each posture of the clip before.
+
+    Args:
+        before: the clip in which both hands hold it.
+        after: the clip that was made from it.
+        hand: frame that holds the weapon firmly.
+        other: frame of the other hand.
+
+    Returns:
+        The greatest distance by which the change of the other hand's position leaves that line, in any frame.
+
+    Raises:
+        UnknownNameError: the figure has no such frame.
+        InputError: two clips of different figures or lengths.
+    """
+    _same(before, after, "hand_off_weapon")
+    ids = before.figure.frame_id(hand), before.figure.frame_id(other)
+    held, now = (_relative(clip.figure, clip.q, *ids) for clip in (before, after))
+    length = np.linalg.norm(held, axis=1, keepdims=True)
+    line = np.divide(held, length, out=np.zeros_like(held), where=length > 0.0)
+    change = now - held
+    off = change - (change * line).sum(axis=1, keepdims=True) * line
+    return float(np.linalg.norm(off, axis=1).max())
+
+
 def share_deeper(found: ClipCheck, depth: float = 0.01) -> float:
     """Share of the frames in which some pair overlaps by more than a depth, metres; from 0 to 1.
 

@@ -11,7 +11,11 @@ import pytest
 import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.dips import dips
-from wholebody.motion.trajectory.sqp import Found, WindowProgram
+from wholebody.motion.trajectory.banded_qp import banded_solver
+from wholebody.motion.trajectory.nodes import Node, Rows
+from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.program import Limits
+from wholebody.motion.trajectory.sqp import EARLY, MET, STEPS, Found, WindowProgram
 
 
 def among_needles(planar_arm: Callable[..., Figure], shares: list[tuple[float, float]]) -> dict[int, list[float]]:
@@ -34,6 +38,75 @@ def test_needles_met_at_nearly_the_same_share_are_told_once(planar_arm: Callable
     assert among_needles(planar_arm, [(0.6, 0.9), (0.604, 0.7)])[0] == pytest.approx([0.602], abs=5e-3)
 
 
+class Asked:
+    """Looks at frames of one degree of freedom: a share of its deviation is to be at least `least` metres."""
+
+    def __init__(self, least: float, share: float) -> None:
+        self.least, self.share = least, share
+
+    def nodes(self) -> list[Node]:
+        return [Node(frame) for frame in range(3)]
+
+    def at(self, node: Node, x: np.ndarray, within: float) -> Rows:
+        gap = self.share * x[node.frame] - self.least
+        return Rows(node, gap, (np.ones((1, 1)),), np.zeros(1, dtype=np.intp), np.zeros(0), np.zeros((0, 1)))
+
+
+def asked(least: float, hasty: float | None, share: float = 1.0) -> Found:
+    """What a run of three frames ends with that begins with no deviation."""
+    wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
+    limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
+    looking: Any = Asked(least, share)
+    program = WindowProgram(looking, objective, limits, banded_solver(None)[1], 60)
+    return program.run(np.zeros((3, 1)), lambda number, worst: False, hasty=hasty)
+
+
+def test_a_run_whose_steps_gain_little_ends_early_where_there_are_others() -> None:
+    hurried, patient = asked(0.05, np.inf, share=0.05), asked(0.05, None, share=0.05)  # a step brings 1.5 mm
+    assert hurried.early
+    assert hurried.programs == STEPS
+    assert not patient.early
+    assert patient.worst < 0.5 * hurried.worst
+
+
+def test_a_run_that_gains_what_its_steps_ask_for_goes_on() -> None:
+    found = asked(0.25, np.inf)
+    assert found.met
+    assert found.x == pytest.approx(np.full((3, 1), 0.25), abs=10.0 * MET)
+    far = asked(0.9, np.inf)  # a twentieth of it a step is what is asked for at most
+    assert far.early
+    assert far.programs == EARLY
+
+
+def test_a_run_that_grows_dear_ends_early() -> None:
+    found = asked(0.6, 0.1)  # half of three squares of 0.26
+    assert found.early
+    assert found.objective > 0.1
+    assert 0.2 < found.x.max() < 0.3
+
+
+def test_attempts_that_end_early_are_gone_on_with(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    figure = planar_arm((0.5, 0.5), radius=0.002)
+    clip = wb.Clip(figure, np.stack([np.linspace(-0.8, 0.8, 6), np.full(6, 0.0)], axis=1), 1 / 30)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(0.002), name="needle", at=(0.985, 0.05, 0.0))  # passed between two frames
+    run, runs = WindowProgram.run, []
+
+    def once(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
+        found = run(self, x, *given)
+        runs.append((x, self.between, given[-1], found.x))
+        return found if given[-1] is None else found._replace(early=True)
+
+    monkeypatch.setattr(WindowProgram, "run", once)
+    wb.avoid(clip, scene, method="trajectory")
+    ended = [ended for _, _, hasty, ended in runs if hasty is not None]
+    began = [begun for begun, _, hasty, _ in runs if hasty is None]
+    assert ended
+    assert any(begun is one for begun in began for one in ended)
+
+
 def test_attempts_that_end_early_are_begun_again(
     planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -45,7 +118,7 @@ def test_attempts_that_end_early_are_begun_again(
     run, ended = WindowProgram.run, []
 
     def hurried(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
-        if not given[-1]:
+        if given[-1] is None:
             return run(self, x, *given)
         ended.append(x)
         return Found(x, 0.0, 1.0, met=False, programs=0, cancelled=False, early=True)

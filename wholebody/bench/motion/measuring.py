@@ -54,6 +54,7 @@ class MotionRow:
         jerk: of the answer, in parts of that before.
         sliding_mm: by how much standing feet slide more than before.
         hand_mm: by how much the hands leave their places at each other; -1 where they hold no weapon.
+        off_mm: by how much of that they leave the line through both hands, along which the weapon lies; or -1.
         beside_mm: by how much the method holds them beside their places, because they overlap there.
         changed: frames that are others than before.
         solves, programs: posture solves, and quadratic programs.
@@ -81,6 +82,7 @@ class MotionRow:
     jerk: float = 1.0
     sliding_mm: float = 0.0
     hand_mm: float = -1.0
+    off_mm: float = -1.0
     beside_mm: float = 0.0
     changed: int = 0
     solves: int = 0
@@ -210,6 +212,7 @@ def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck, missed:
         jerk=measures.jerk_ratio(before, after),
         sliding_mm=1e3 * measures.foot_sliding(before, after),
         hand_mm=1e3 * measures.hand_error(before, after, *hands) if hands else -1.0,
+        off_mm=1e3 * measures.hand_off_weapon(before, after, *hands) if hands else -1.0,
         changed=apart.frames_changed,
     )
 

@@ -122,6 +122,8 @@ def lines(rows: Sequence[MotionRow]) -> list[Line]:
             (method, "joint limits hold", " rad or m", 1e-6, lambda row: row.limit),
             (method, "standing feet slide at most 1 mm", " mm", ASKED["sliding_mm"], lambda row: row.sliding_mm),
             (method, "hands on the weapon within 1 mm", " mm", ASKED["hand_mm"],
+             lambda row: row.off_mm if row.off_mm >= 0.0 else None),
+            (method, "hands within 1 mm along the weapon too", " mm", ASKED["hand_mm"],
              lambda row: row.hand_mm if row.hand_mm >= 0.0 else None),
         ]  # fmt: skip
         if method in REAL_TIME:

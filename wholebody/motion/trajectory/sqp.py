@@ -22,6 +22,7 @@ from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.nodes import Looking, Node, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import (
+    ONE_STEP,
     SOFT,
     Limits,
     active,
@@ -43,6 +44,8 @@ RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 EARLY = 10  # steps after which a hasty run ends; more = longer where normals mislead, fewer = more other starts
+STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
+LOST = 0.01  # m, rad: if it was never less; what was nearer is on the right side, and has contacts that bend
 SHRUNK = 0.5  # of its first trust region: a hasty run also ends once its own is smaller
 FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
 ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
@@ -112,12 +115,17 @@ class WindowProgram:
         self.nodes = looking.nodes()
         self._free = (limits.lower < limits.upper).any(axis=0)
 
+    @property
+    def between(self) -> tuple[Node, ...]:
+        """The places between frames."""
+        return tuple(node for node in self.nodes if node.share)
+
     def add(self, nodes: Sequence[Node]) -> None:
         """More places to look at."""
         self.nodes = sorted({*self.nodes, *nodes})
 
     def run(
-        self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST, hasty: bool = False
+        self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST, hasty: float | None = None
     ) -> Found:
         """Iterate from deviations x (n, nv).
 
@@ -126,16 +134,22 @@ class WindowProgram:
             cancel: told how far it is.
             radius: first trust region.
             largest: largest trust region.
-            hasty: end early where much is missed still, for there are other deviations to begin with.
+            hasty: end early where much is missed still and no longer less, or where the objective is larger than this,
+                for there are other deviations to begin with; None to go on.
         """
         here = self._at(x)
         penalty = PENALTY
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)
-        programs, smallest = 0, SHRUNK * radius
+        programs, smallest, missed = 0, SHRUNK * radius, list[float]()
         for number in range(self._iterations):
-            if hasty and here.worst > FAR and (number >= EARLY or radius < smallest):
+            missed.append(here.worst)
+            if (
+                hasty is not None
+                and here.worst > FAR
+                and (number >= EARLY or radius < smallest or here.objective > hasty or _stalled(missed))
+            ):
                 return Found(here.x, here.objective, here.worst, False, programs, False, True)
             if cancel(number, here.worst):
                 return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
@@ -243,3 +257,11 @@ class WindowProgram:
     def _shifted(self, old: Array, one: Rows) -> Array:
         """Multipliers of equalities, divided by the stiffness."""
         return np.clip(old + one.equal, -0.05, 0.05)
+
+
+def _stalled(missed: Sequence[float]) -> bool:
+    """Whether the last steps brought too little of the worst shortfalls, one for each step; see `STEPS`."""
+    if len(missed) <= STEPS or min(missed) <= LOST:
+        return False
+    before = min(missed[:-STEPS])
+    return min(missed[-STEPS:]) > max(STALLED * before, before - ONE_STEP)

@@ -29,6 +29,7 @@ SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that be
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 SHORTER = 0.3  # of the largest step: after the second round, each round takes shorter ones
 SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger = more that dips elsewhere
+GROWN = 2.0  # of the objective: what grows by more in a later round is on the wrong side of what it passes
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
@@ -69,18 +70,24 @@ class _Way(Enum):
 
 
 class _Attempt(NamedTuple):
-    """Deviations that one attempt ended with, and whether it ended early."""
+    """Deviations that one attempt ended with, the places between frames that it had, and whether it ended early."""
 
     x: Array
     worst: float
     dipping: int
     objective: float
     early: bool = False
+    between: tuple[Node, ...] = ()
 
     @property
     def rank(self) -> tuple[bool, bool, float]:
         """The best attempt has the least."""
         return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
+
+
+def _begun(x: Array) -> _Attempt:
+    """An attempt that has not begun, at deviations (n, nv)."""
+    return _Attempt(x, np.inf, 0, np.inf)
 
 
 class ClipRun:
@@ -167,17 +174,17 @@ class ClipRun:
         looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
-        ended_early: list[Array] = []
+        ended_early: list[_Attempt] = []
         if begun is None:
-            starts = ((start, _Way.HASTY) for start in self._starts(window, chart, limits, depths, always))
+            starts = ((_begun(x), _Way.HASTY) for x in self._starts(window, chart, limits, depths, always))
         else:
-            starts = ((start, _Way.CAREFUL) for start in [_deviations(chart, begun, limits)])
+            starts = ((_begun(x), _Way.CAREFUL) for x in [_deviations(chart, begun, limits)])
         for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
             if attempt is None:
                 return Freed(chart.original, "")
             if attempt.early:
-                ended_early.append(start)
+                ended_early.append(attempt)
                 continue
             best = attempt if best is None or attempt.rank < best.rank else best
             if best.worst <= MET and not best.dipping:
@@ -196,7 +203,7 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends. Attempts that end early are begun again after all others.
+        and both ends. Attempts that end early are gone on with after all others.
         """
         none = np.zeros((len(window), self._workspace.model.nv))
         yield none
@@ -212,26 +219,30 @@ class ClipRun:
             yield _deviations(chart, self._carried.outwards(window, middle), limits)
 
     def _attempt(
-        self, x: Array, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
+        self, begun: _Attempt, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
         cancel: Callable[[float], bool], way: _Way,
     ) -> _Attempt | None:  # fmt: skip
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
-        careful, hasty = way is _Way.CAREFUL, way is _Way.HASTY
+        program.add(begun.between)
+        x = begun.x
+        careful = way is _Way.CAREFUL
         found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
         most, dipped = self._settings.iterations, set[int]()
         for number in range(ROUNDS):
-            found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, hasty)
+            dear = GROWN * found.objective if found is not None and found.programs else np.inf
+            # from the third round on it is nearly free: what is missed then is seldom on the wrong side
+            ends = dear if way is _Way.HASTY and number < 2 else None
+            found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, ends)
             radius = NEARLY
             if number:  # what is free already is to stay where it is, or it dips elsewhere
                 largest = max(SHORTER * min(largest, NEARLY), SHORTEST)
                 radius = largest
-                hasty = False  # it is nearly free: what is missed now is seldom on the wrong side
             self._programs += found.programs
             if found.cancelled:
                 return None
             x = found.x
             if found.early:
-                return _Attempt(x, found.worst, 0, found.objective, early=True)
+                return _Attempt(x, found.worst, 0, found.objective, True, program.between)
             q = chart.postures(x)
             gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
             swept = dips(self._workspace, q, gaps)
