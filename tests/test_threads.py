@@ -21,7 +21,7 @@ FEET = ("left_foot", "right_foot")
 
 
 @pytest.fixture(autouse=True)
-def hasty_switching() -> Iterator[None]:
+def frequent_switching() -> Iterator[None]:
     """Let threads take turns a hundred times as often as they do by themselves."""
     before = sys.getswitchinterval()
     sys.setswitchinterval(5e-5)

@@ -127,15 +127,15 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     pairs.move(q)
     state = pairs.state
     distance, angle, each = _goal_errors(problem, state)
-    lack = float((problem.clearances - pairs.distance).max(initial=0.0))
+    violation = float((problem.clearances - pairs.distance).max(initial=0.0))
     missed = _constraint_violation(problem, state)
-    fits = max(distance, angle, lack, missed) <= MET
+    fits = max(distance, angle, violation, missed) <= MET
     return Assessment(
         goal_error=distance,
         goal_angle=angle,
         penetration=max(0.0, -pairs.least) if np.isfinite(pairs.least) else 0.0,
         least_distance=pairs.least,
-        clearance_violation=lack,
+        clearance_violation=violation,
         limit_violation=_limit_violation(problem, q),
         constraint_violation=missed,
         measure=sum(term.weight * term.value(state) for term in problem.measures),

@@ -154,9 +154,9 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
     signed, one_sided, rows, numbers = _active(asked, state, near)
     pull = np.zeros(nv)
     violated: dict[Label, float] = {}
-    lack = clearances - near.found[:, 0]
-    for row in np.flatnonzero(lack > MET).tolist():
-        violated[near.label(row)] = float(lack[row])
+    violation = clearances - near.found[:, 0]
+    for row in np.flatnonzero(violation > MET).tolist():
+        violated[near.label(row)] = float(violation[row])
     for number, constraint in enumerate(asked.constraints):
         value = np.atleast_1d(constraint.value(state))
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)

@@ -234,7 +234,8 @@ def _boxes(bounds: Sequence[Bound], state: State, dt: float | None) -> tuple[lis
 def _braking(bounds: Sequence[Bound], nv: int, dt: float | None) -> Array:
     """Largest share (nv,) of the way to its limit that each freedom goes in a step."""
     shares = [bound.braking(dt) for bound in bounds if type(bound) is tasks.StepLimit]
-    return np.min([np.ones(nv), *shares], axis=0)
+    least: Array = np.min([np.ones(nv), *shares], axis=0)
+    return least
 
 
 def _measures(

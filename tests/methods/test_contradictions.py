@@ -159,7 +159,7 @@ def upper_limit(scene, name, sign=1.0):
 
 
 def cone_texts(problem):
-    return [entry.text for entry in found(problem) if "'right_shoulder' is left" in entry.text]
+    return [entry.text for entry in found(problem) if "'right_shoulder' is violated" in entry.text]
 
 
 def bent(figure, **angles):
@@ -176,7 +176,7 @@ def test_a_frozen_leg_that_its_hamstrings_do_not_allow(standing):
     start = bent(scene.figure, left_hip_flexion=110.0, left_knee_flexion=0.0)
     (only,) = found(wb.Problem(scene, start, constraints=[wb.Freeze("left_leg")]))
     assert only.status == "infeasible"
-    assert "RangeOfMotion (by default), 'left_hamstrings' is left by 48 degrees" in only.text
+    assert "RangeOfMotion (by default), 'left_hamstrings' is violated by 48 degrees" in only.text
     assert "Freeze('left_leg')" in only.text
     apart = [wb.Freeze("left_hip_flexion"), wb.Freeze("left_knee_flexion")]
     (only,) = found(wb.Problem(scene, start, constraints=apart))
@@ -187,7 +187,7 @@ def test_a_frozen_leg_that_its_hamstrings_do_not_allow(standing):
 
 
 def test_a_frozen_joint_that_no_angle_of_the_other_allows():
-    """A range of a frozen and of a free joint is left for good where the free joint's limit does not suffice."""
+    """A range of a frozen and of a free joint is violated for good where the free joint's limit does not suffice."""
     row = CoupledRow((Coordinate(0, 0, 1.0), Coordinate(1, 1, -0.5)), 0.2)
     least, most = np.array([0.8, -1.0]), np.array([0.8, 1.0])
     assert row.largest(least, most) == pytest.approx(0.2 - (0.8 - 0.5))
@@ -201,7 +201,7 @@ def test_a_frozen_neck_beyond_its_ellipse(standing):
     for frozen in (("neck",), names):
         texts = [entry.text for entry in found(wb.Problem(scene, start, constraints=[wb.Freeze(*frozen)]))]
         assert len(texts) == 1
-        assert "'neck' is left" in texts[0]
+        assert "'neck' is violated" in texts[0]
     assert found(wb.Problem(scene, start, constraints=[wb.Freeze("neck1_lateral", "neck1_rotation")])) == ()
 
 

@@ -3,7 +3,7 @@
 Joints that cannot turn join segments into rigid groups, and a hold of a frame fixes the placement of its whole group.
 Four kinds of contradictions hold for all values of the other joints: two holds that fix one group at different
 placements; a fixed group that penetrates something that does not move; a range of motion or a reach cone that joints
-which cannot turn leave, wherever the others turn; and a goal for a point of a fixed group at a different position.
+which cannot turn violate, wherever the others turn; and a goal for a point of a fixed group at a different position.
 
 A goal inside of something that does not move is unreachable if the point that is to reach it lies inside a piece: then
 the point stays outside by the clearance, and the error is at least the clearance plus the goal's depth.
@@ -134,7 +134,7 @@ class _Finder:
                 return  # one is enough: such parts mostly overlap in many pieces
 
     def ranges(self) -> None:
-        """Find ranges of motion and reach cones that are left wherever the joints turn that can."""
+        """Find ranges of motion and reach cones that are violated wherever the joints turn that can."""
         if not any(mask.any() for _, mask in self._stuck):
             return
         least, most = self._reachable()
@@ -147,7 +147,7 @@ class _Finder:
                     else:
                         axes = (row.coordinates,) if isinstance(row, CoupledRow) else row.axes
                         dofs = [coordinate.idx_v for axis in axes for coordinate in axis]
-                        self._left(f"{name}, {range_name!r}", row.largest(least, most), dofs)
+                        self._violated(f"{name}, {range_name!r}", row.largest(least, most), dofs)
             elif isinstance(term, ReachCones):
                 cones = self._problem.scene.figure.cones if term.names is None else term.names
                 for place, (limb, cone_name) in enumerate(zip(term.limbs, cones, strict=True)):
@@ -172,14 +172,14 @@ class _Finder:
                 while end and end != self._group[limb.joint]:
                     dofs += range(model.idx_vs[end], model.idx_vs[end] + model.nvs[end])
                     end = model.parents[end]
-            self._left(name, value(self._workspace.state.update(self._problem.start)), dofs)
+            self._violated(name, value(self._workspace.state.update(self._problem.start)), dofs)
 
-    def _left(self, name: str, largest: float, dofs: list[int]) -> None:
+    def _violated(self, name: str, largest: float, dofs: list[int]) -> None:
         """Report a range whose largest value is negative, with the bounds that keep some of its degrees of freedom."""
         if largest < -CLEAR:
             keepers = " and ".join(repr(bound) for bound, mask in self._stuck if mask[dofs].any())
             if keepers:
-                text = f"{name} is left by {np.degrees(-largest):.3g} degrees where {keepers} keeps the joints"
+                text = f"{name} is violated by {np.degrees(-largest):.3g} degrees where {keepers} keeps the joints"
                 self.found.append(Contradiction("infeasible", text))
 
     def goals(self) -> None:

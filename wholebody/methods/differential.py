@@ -138,7 +138,11 @@ class Iteration:
             if self._settings.best:
                 self._rank(error, violation)
             early = self.steps < settings.least
-            if not early and max(error, violation) <= enough and self._lack(self.q) <= enough + COAL_ACCURACY:
+            if (
+                not early
+                and max(error, violation) <= enough
+                and self._clearance_violation(self.q) <= enough + COAL_ACCURACY
+            ):
                 return
             if self.steps and not early and length <= REST * settings.tolerance:
                 self.rested = True
@@ -168,7 +172,7 @@ class Iteration:
         self._last = move
         return move
 
-    def _lack(self, q: Array) -> float:
+    def _clearance_violation(self, q: Array) -> float:
         """What the worst pair lacks of its clearance at a posture (nq,) [m]."""
         clearances = self._problem.clearances
         near = self._proximity.query(self._state.update(q), float(clearances.max(initial=0.0)))
@@ -176,7 +180,7 @@ class Iteration:
 
     def _rank(self, error: float, violation: float) -> None:
         """Keep the present posture if it is the best so far: least broken, then nearest; of equal ones the last."""
-        broken = max(violation, self._lack(self.q))
+        broken = max(violation, self._clearance_violation(self.q))
         rank = (max(broken, self._settings.tolerance, FIRM), error)
         if rank <= self._best_rank:
             self._best, self._best_rank = self.q, rank

@@ -2,7 +2,7 @@
 
 A forward pass follows the original motion as contacts let it. It is late where contact begins, so a backward pass
 follows it from the last frame to the first, and both are blended. What overlaps after that is put right by steps of the
-tracker, dips between frames by more room beside them, and what is left then by `wholebody.motion.mending`.
+tracker, dips between frames by more room beside them, and what is left then by `wholebody.motion.repair`.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from wholebody.motion.dips import dipping
 from wholebody.motion.faults import DEPTH, depth, faults
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion.mending import Mender
+from wholebody.motion.repair import Repairer
 from wholebody.motion.windows import Window, windows
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
@@ -77,11 +77,11 @@ class PerFrame:
                 self._free(window, q, terms, follower, workspace)
                 _lift(window, q, follower, workspace)
                 done += len(window)
-            mender = Mender(terms, workspace, self.clearance)
+            repairer = Repairer(terms, workspace, self.clearance)
             if found and not watch.ended:
-                q = mender.mend(q, watch)
+                q = repairer.repair(q, watch)
         ended = "the caller ended it" if watch.ended else ""
-        return MethodResult(q, 0, mender.programs + (0 if follower is None else follower.programs), ended)
+        return MethodResult(q, 0, repairer.programs + (0 if follower is None else follower.programs), ended)
 
     def _free(self, window: Window, q: Array, terms: FrameTerms, follower: Follower, workspace: Workspace) -> None:
         forward = _passed(follower, terms, range(window.first, window.end))

@@ -52,13 +52,13 @@ class Asked:
         return Rows(node, gap, (np.ones((1, 1)),), np.zeros(1, dtype=np.intp), np.zeros(0), np.zeros((0, 1)))
 
 
-def asked(least: float, hasty: float | None, share: float = 1.0) -> Found:
+def asked(least: float, early_exit: float | None, share: float = 1.0) -> Found:
     """What a run of three frames ends with that begins with no deviation."""
     wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
     limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
     looking: Any = Asked(least, share)
     program = WindowProgram(looking, objective, limits, banded_solver(None)[1], 60)
-    return program.run(np.zeros((3, 1)), lambda number, worst: False, hasty=hasty)
+    return program.run(np.zeros((3, 1)), lambda number, worst: False, early_exit=early_exit)
 
 
 def test_a_run_whose_steps_gain_little_ends_early_where_there_are_others() -> None:
@@ -101,8 +101,8 @@ def test_attempts_that_end_early_are_gone_on_with(
 
     monkeypatch.setattr(WindowProgram, "run", once)
     wb.avoid(clip, scene, method="trajectory")
-    ended = [ended for _, _, hasty, ended in runs if hasty is not None]
-    began = [begun for begun, _, hasty, _ in runs if hasty is None]
+    ended = [ended for _, _, early_exit, ended in runs if early_exit is not None]
+    began = [begun for begun, _, early_exit, _ in runs if early_exit is None]
     assert ended
     assert any(begun is one for begun in began for one in ended)
 

@@ -34,7 +34,7 @@ class Judged:
         finite: whether it is made of numbers.
         goal: largest goal error [m, rad].
         least: least signed distance of any pair [m]; inf without pairs.
-        lack: by how much the worst pair misses what is asked of it [m].
+        shortfall: by how much the worst pair misses what is asked of it [m].
         closest: the worst pair.
         limits: how far out of its limits the worst joint is [rad, m].
         constraints: how far the worst constraint is from holding [m, rad].
@@ -44,7 +44,7 @@ class Judged:
     finite: bool = True
     goal: float = 0.0
     least: float = np.inf
-    lack: float = 0.0
+    shortfall: float = 0.0
     closest: str = ""
     limits: float = 0.0
     constraints: float = 0.0
@@ -53,7 +53,7 @@ class Judged:
     @property
     def violation(self) -> float:
         """The worst of everything that must hold [m, rad]."""
-        return max(self.lack, self.limits, self.constraints, -self.least, 0.0)
+        return max(self.shortfall, self.limits, self.constraints, -self.least, 0.0)
 
 
 class Pairs:
@@ -108,10 +108,10 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
         return Judged(finite=False)
     pairs = Pairs(scene)
     distance, asked = pairs.distances(q), pairs.asked(start, problem.clearance)
-    least, lack, closest = np.inf, 0.0, ""
+    least, shortfall, closest = np.inf, 0.0, ""
     if len(distance):
         worst = int(np.argmax(asked - distance))
-        least, lack = float(distance.min()), float(max((asked - distance)[worst], 0.0))
+        least, shortfall = float(distance.min()), float(max((asked - distance)[worst], 0.0))
         closest = " and ".join(pairs.owners[worst])
     if not np.isfinite(distance).all():
         return Judged(finite=False)
@@ -124,7 +124,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
     return Judged(
         goal=max((body.goal(term) for term in goals), default=0.0),
         least=least,
-        lack=lack,
+        shortfall=shortfall,
         closest=closest,
         limits=_limits(scene.model, q),
         constraints=float(max([0.0, *held])),

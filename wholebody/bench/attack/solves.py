@@ -277,7 +277,7 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
     pairs = (
         ("least distance", said.least_distance, found.least),
         ("goal error", max(said.goal_error, said.goal_angle), found.goal),
-        ("clearance lack", said.clearance_violation, found.lack),
+        ("clearance violation", said.clearance_violation, found.shortfall),
     )
     for name, value, measured in pairs:
         if not np.isfinite(value) and value != measured:
@@ -291,6 +291,7 @@ def _words(found: Judged) -> str:
     if not found.finite:
         return "not measured"
     return (
-        f"goals {found.goal:.3g}, least distance {found.least:.3g}, clearance lack {found.lack:.3g} ({found.closest}), "
-        f"limits {found.limits:.3g}, constraints {found.constraints:.3g}"
+        f"goals {found.goal:.3g}, least distance {found.least:.3g}, "
+        f"clearance violation {found.shortfall:.3g} ({found.closest}), limits {found.limits:.3g}, "
+        f"constraints {found.constraints:.3g}"
     )

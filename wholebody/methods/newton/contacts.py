@@ -56,8 +56,8 @@ class ContactSet:
         """Whether a pair that is no inequality overlaps at the end of the step; such pairs become inequalities."""
         assert self._there is not None
         contacts = self._there.contacts
-        lack = self.clearances[contacts.number] - contacts.distance
-        new = contacts.number[lack > OVERLAP]
+        violation = self.clearances[contacts.number] - contacts.distance
+        new = contacts.number[violation > OVERLAP]
         if len(new):
             new = np.setdiff1d(new, self.pairs)
         if not len(new):

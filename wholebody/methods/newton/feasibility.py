@@ -10,7 +10,7 @@ from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
 RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
-SETTLING = 1e-2  # damping of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
+GOAL_DAMPING = 1e-2  # of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
 
 
 class FeasibilityResult(NamedTuple):
@@ -80,7 +80,7 @@ def reach(
 def _settle(run: Iteration, iterations: int, tolerance: float) -> None:
     """Lower the error of goals out of reach, from a state that meets the constraints; it stays if that fails."""
     best, goal, stationary = run.x, run.goal, run.stationary
-    run.least_damping = SETTLING
+    run.least_damping = GOAL_DAMPING
     run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance:
         run.iterate(RESTORATIONS, goals=False, measures="ignore")

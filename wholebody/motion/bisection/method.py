@@ -20,7 +20,7 @@ from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion.mending import Mender
+from wholebody.motion.repair import Repairer
 from wholebody.scene import Scene
 from wholebody.tasks import Freeze
 
@@ -132,15 +132,15 @@ class Bisection:
             )
             recursion.run(self._points(figure, original, frozen))
             missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
-            mender = Mender(_with_frozen(terms, frozen), workspace)
-            q = mender.mend(recursion.q, watch)
+            repairer = Repairer(_with_frozen(terms, frozen), workspace)
+            q = repairer.repair(recursion.q, watch)
             for frame in changed_frames(recursion.q, q):
                 q[frame] = stays.applied(frame, q[frame])
             stuck = [frame for frame in sorted(recursion.stuck) if not predictor.good(frame, q[frame])]
             bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
             missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
         said = _message(recursion, stuck, bad, missed, watch)
-        return MethodResult(q, recursion.predictions, recursion.programs + mender.programs, said)
+        return MethodResult(q, recursion.predictions, recursion.programs + repairer.programs, said)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""

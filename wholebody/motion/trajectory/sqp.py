@@ -43,10 +43,10 @@ PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
 RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
-EARLY = 10  # steps after which a hasty run ends; more = longer where normals mislead, fewer = more other starts
+EARLY = 10  # steps until an early exit; more = longer where normals mislead, fewer = more other starts
 STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
 LOST = 0.01  # m, rad: if it was never less; what was nearer is on the right side, and has contacts that bend
-SHRUNK = 0.5  # of its first trust region: a hasty run also ends once its own is smaller
+SHRUNK = 0.5  # of its first trust region: a smaller one is an early exit too
 FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
 ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
 MARGIN = 1e-2  # of a shortfall: by how much a step must be better than the filter
@@ -125,7 +125,12 @@ class WindowProgram:
         self.nodes = sorted({*self.nodes, *nodes})
 
     def run(
-        self, x: Array, cancel: Cancel, radius: float = RADIUS, largest: float = LARGEST, hasty: float | None = None
+        self,
+        x: Array,
+        cancel: Cancel,
+        radius: float = RADIUS,
+        largest: float = LARGEST,
+        early_exit: float | None = None,
     ) -> Found:
         """Iterate from deviations x (n, nv).
 
@@ -134,7 +139,7 @@ class WindowProgram:
             cancel: told how far it is.
             radius: first trust region.
             largest: largest trust region.
-            hasty: end early where much is missed still and no longer less, or where the objective is larger than this,
+            early_exit: end early where much is missed still and no longer less, or the objective is larger than this,
                 for there are other deviations to begin with; None to go on.
         """
         here = self._at(x)
@@ -146,9 +151,9 @@ class WindowProgram:
         for number in range(self._iterations):
             missed.append(here.worst)
             if (
-                hasty is not None
+                early_exit is not None
                 and here.worst > FAR
-                and (number >= EARLY or radius < smallest or here.objective > hasty or _stalled(missed))
+                and (number >= EARLY or radius < smallest or here.objective > early_exit or _stalled(missed))
             ):
                 return Found(here.x, here.objective, here.worst, False, programs, False, True)
             if cancel(number, here.worst):

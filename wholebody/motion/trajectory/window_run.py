@@ -66,7 +66,7 @@ class _Way(Enum):
 
     CAREFUL = "careful"
     USUAL = "usual"
-    HASTY = "hasty"
+    EARLY_EXIT = "early exit"
 
 
 class _Attempt(NamedTuple):
@@ -176,7 +176,7 @@ class ClipRun:
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         if begun is None:
-            starts = ((_begun(x), _Way.HASTY) for x in self._starts(window, chart, limits, depths, always))
+            starts = ((_begun(x), _Way.EARLY_EXIT) for x in self._starts(window, chart, limits, depths, always))
         else:
             starts = ((_begun(x), _Way.CAREFUL) for x in [_deviations(chart, begun, limits)])
         for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
@@ -231,7 +231,7 @@ class ClipRun:
         for number in range(ROUNDS):
             dear = GROWN * found.objective if found is not None and found.programs else np.inf
             # from the third round on it is nearly free: what is missed then is seldom on the wrong side
-            ends = dear if way is _Way.HASTY and number < 2 else None
+            ends = dear if way is _Way.EARLY_EXIT and number < 2 else None
             found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, ends)
             radius = NEARLY
             if number:  # what is free already is to stay where it is, or it dips elsewhere

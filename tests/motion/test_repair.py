@@ -1,4 +1,4 @@
-"""Mending of postures that are nearly free: dips, holds that are missed, and what stays as it is."""
+"""Repair of postures that are nearly free: dips, holds that are missed, and what stays as it is."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoider import Watch
 from wholebody.motion.frame_terms import frame_terms
-from wholebody.motion.mending import Mender
+from wholebody.motion.repair import Repairer
 
 DT = 1 / 30
 
@@ -19,10 +19,10 @@ def swing(figure: Figure, frames: int = 40) -> wb.Clip:
     return wb.Clip(figure, np.stack([np.linspace(-1.45, 0.95, frames), np.full(frames, 0.5)], axis=1), DT)
 
 
-def mended(clip: wb.Clip, scene: wb.Scene, q: np.ndarray, *terms: wb.Hold) -> tuple[np.ndarray, int]:
+def repaired(clip: wb.Clip, scene: wb.Scene, q: np.ndarray, *terms: wb.Hold) -> tuple[np.ndarray, int]:
     with scene.borrow() as workspace:
-        mender = Mender(frame_terms(scene, clip.q, clip.dt, terms), workspace)
-        return mender.mend(q, Watch(None)), mender.programs
+        repairer = Repairer(frame_terms(scene, clip.q, clip.dt, terms), workspace)
+        return repairer.repair(q, Watch(None)), repairer.programs
 
 
 def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar_arm: Callable[..., Figure]) -> None:
@@ -31,7 +31,7 @@ def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar
     scene.add(wb.Sphere(0.002), name="needle", at=(0.971, 0.0, 0.0))
     before = wb.check(clip, scene)
     assert (before.colliding, before.dips) == (0, 1)
-    q, programs = mended(clip, scene, clip.q)
+    q, programs = repaired(clip, scene, clip.q)
     assert programs > 0
     assert wb.check(clip.with_q(q), scene).free
     gap = int(np.argmax(before.between))
@@ -41,7 +41,7 @@ def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar
 
 def test_where_nothing_is_wrong_nothing_is_computed(planar_arm: Callable[..., Figure]) -> None:
     clip = swing(planar_arm((0.5, 0.5)))
-    q, programs = mended(clip, wb.Scene(clip.figure), clip.q)
+    q, programs = repaired(clip, wb.Scene(clip.figure), clip.q)
     np.testing.assert_array_equal(q, clip.q)
     assert programs == 0
 
@@ -51,7 +51,7 @@ def test_what_is_held_holds_again_in_a_frame_that_left_it(planar_arm: Callable[.
     tip = clip.figure.segments[-1]
     left = clip.q.copy()
     left[20] += 0.05
-    q, _ = mended(clip, wb.Scene(clip.figure), left, wb.Hold(tip, orientation=False))
+    q, _ = repaired(clip, wb.Scene(clip.figure), left, wb.Hold(tip, orientation=False))
     state = wb.Scene(clip.figure).state(q[0])
     number = clip.figure.frame_id(tip)
     for frame in range(len(clip)):

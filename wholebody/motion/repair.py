@@ -31,7 +31,7 @@ from wholebody.records import with_values
 from wholebody.workspace import Workspace
 
 MARGIN = 0.1  # s, before and after what is wrong: in which postures may change; what is left gets twice as much
-ROUNDS = 4  # of looking at the clip, and mending what is wrong
+ROUNDS = 4  # of looking at the clip, and repairing what is wrong
 ADDED = 6  # rounds of sweeping one window, and adding the places that dip
 PROGRAMS = 12  # most of one round of a window; more = more that is freed, longer where nothing can be
 RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
@@ -76,7 +76,7 @@ class _Looking(Looking):
             self.room[frame] = min(2.0 * self.room[frame] + ROOM, MOST_ROOM)
 
 
-class Mender:
+class Repairer:
     """Puts right what is left in the postures of one clip."""
 
     def __init__(self, terms: FrameTerms, workspace: Workspace, clearance: float = 0.0) -> None:
@@ -96,7 +96,7 @@ class Mender:
         """How many quadratic programs were solved."""
         return self._programs + (0 if self._follower is None else self._follower.programs)
 
-    def mend(self, q: Array, watch: Watch) -> Array:
+    def repair(self, q: Array, watch: Watch) -> Array:
         """Postures (n, nq) with less that is wrong; those in which nothing is wrong nearby are the given ones."""
         q = np.array(q)
         margin = max(2, round(MARGIN / self._terms.dt))
@@ -107,7 +107,7 @@ class Mender:
                 wrong, gaps = self._faults(q)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
             for window in windows(wrong, margin << number):
-                if watch.tell(1.0, f"frames {window.first} to {window.end - 1} are mended"):
+                if watch.tell(1.0, f"frames {window.first} to {window.end - 1} are repaired"):
                     return q
                 changed.append(self._window(window, q))
             if not any(changed) and number:
@@ -127,7 +127,7 @@ class Mender:
         return keep_back(self._follower, self._workspace, q, gap, len(q))
 
     def _window(self, window: Window, q: Array) -> bool:
-        """Mend one window of q (n, nq) in place; whether it is better than before."""
+        """Repair one window of q (n, nq) in place; whether it is better than before."""
         terms, workspace = self._terms, self._workspace
         chart = Chart(workspace.model, q[window.first : window.end].copy())
         seams = window.first > 0, window.end < len(q)
