@@ -135,7 +135,7 @@ def test_constraints_are_called_as_they_were_given():
     )  # fmt: skip
     solution = wb.solve(problem)
     assert solution.status == "infeasible"
-    assert "RangeOfMotion (by default) is missed" in solution.message
+    assert "RangeOfMotion (by default), 'neck' is violated by" in solution.message
     assert "constraints[0]" not in solution.message
     problem.constraints = problem.constraints[:1]
     assert problem.constraint_names == ("constraints[1], Hold('left_foot')",)

@@ -823,6 +823,8 @@ DERIVATIVES = (
     "value",
     "gradient",
     "curvature",
+    "squares",
+    "braking",
     "bounds",
     "parts",
     "rows",

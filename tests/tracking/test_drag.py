@@ -102,7 +102,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
         spent.append(programs)
         measures.append(wb.assess(problem, q).measure)
     assert spent[0] < spent[1] <= spent[2]
-    assert max(measures) < 1.03 * min(measures)  # they settle over a second, in which the goal moves on
+    assert max(measures) < 1.06 * min(measures)  # they settle over a second, in which the goal moves on
 
 
 @pytest.mark.parametrize("speed", [0.6, 1.5])

@@ -87,6 +87,7 @@ class RigidBodies:
         self._near: Contacts
         self._look(SUBSTEP)
         self._check_start()
+        self._joints.keep(self.state, self.state.twist, self.state.moving)  # given velocities may part joints
 
     def _check_start(self) -> None:
         if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:

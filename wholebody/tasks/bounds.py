@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import instance, number, shown
 from wholebody.errors import InputError
+from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Bound, Surroundings, filled
@@ -111,6 +112,23 @@ class StepLimit(Bound):
         """(nv,) largest share of the way to its limit that each freedom goes in a step of dt seconds."""
         share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / BRAKING))
         return np.where(np.isfinite(self._velocity), share, 1.0)
+
+
+def at_speeds(bounds: Sequence[Bound], state: State, dt: float | None) -> Array | None:
+    """Displacements (2, nv) from a state that bounds on velocities allow in dt seconds; None without such bounds."""
+    ranges = np.array([bound.bounds(state, dt) for bound in bounds if isinstance(bound, StepLimit)])
+    return np.array([ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)]) if len(ranges) else None
+
+
+def allowed(bounds: Sequence[Bound], limits: Limits, state: State, dt: float | None) -> Array:
+    """Displacements (2, nv) from a state that joint limits and bounds allow in dt seconds, without braking."""
+    box = np.stack([np.full(state.model.nv, -np.inf), np.full(state.model.nv, np.inf)])
+    box[0, limits.idx_v] = limits.lower - state.q[limits.idx_q]
+    box[1, limits.idx_v] = limits.upper - state.q[limits.idx_q]
+    for bound in bounds:
+        low, high = bound.bounds(state, dt)
+        np.clip(box, low, high, out=box)
+    return box
 
 
 def _speed(value: object, where: str) -> float:

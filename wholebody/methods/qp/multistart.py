@@ -126,8 +126,7 @@ class Search:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
         given = (self.problem, self.lineariser.state, start, rng, count)
         others = throughout(*given) if few else restarts(*given)
-        starts = chain([start], self._through, others)
-        for local, how in self._relaxed_probes(starts):
+        for local, how in self._relaxed_probes(chain([start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
@@ -155,13 +154,8 @@ class Search:
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
         for q in starts:
-            if (
-                self._without_gain >= NO_NEARER
-                or self._minima.complete
-                or self._relaxed_minima.complete
-                or self._left <= 0
-                or self.control.spent > FOR_WAYS
-            ):
+            complete = self._minima.complete or self._relaxed_minima.complete
+            if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
             relaxed = self._probe(q, RELAXATION_DEPTH)
             nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
@@ -296,7 +290,7 @@ class Search:
                 self._approach(self._pushed_out(local.q))
 
     def _approach(self, begin: Array) -> None:
-        """Come as near as goes from a posture (nq,); where what must hold does not hold then, mend it."""
+        """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
         tolerance = self.settings.tolerance
         local = self._curved().among_things(begin, tolerance, self._at_most(COMING_NEAR))
         self.spent += local.iterations
@@ -318,7 +312,7 @@ class Search:
         return CurvedReach(self.problem, self.lineariser, self.solver, self.control)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
-        """Descend with the goals' errors to stay as they are: what must hold is mended, then the measures improve."""
+        """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
         most = self._at_most(STAYING) if _held(local, self.settings.tolerance) else self.settings.iterations
         stayed = self._descent(most, nearest, "nearest").run(local.q)
@@ -349,7 +343,7 @@ class Search:
         full_step: bool = False,
         early_exit: bool = False,
     ) -> LocalSolution:
-        """Descend from a start; where that ends with something that must hold not holding, mend it."""
+        """Descend from a start; where that ends with something that must hold not holding, restore it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
         descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step, early_exit=early_exit)
         local = descent.run(start)

@@ -26,7 +26,7 @@ from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
-from wholebody.tasks import StepLimit
+from wholebody.tasks.bounds import StepLimit, allowed, at_speeds
 from wholebody.workspace import OfOneRun
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
@@ -205,7 +205,7 @@ class QPTracker(OfOneRun):
         """
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
-        most = self._speeds(q)
+        most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
         path, steps = [(0.0, q)], list[QPStep]()
         before = np.inf
         while True:
@@ -239,21 +239,18 @@ class QPTracker(OfOneRun):
 
     def _barriers(self, q: Array) -> Barriers:
         """What stands around a posture (nq,), with all things where they are."""
-        at = self._lineariser.passing(q, WITHIN)
+        at = self._unbraked(self._lineariser.passing(q, WITHIN))
         return barriers(at, *self._program.bounded(at))
 
-    def _speeds(self, q: Array) -> Array | None:
-        """Largest displacements (2, nv) of the step from q (nq,) that bounds on speeds allow; None without."""
-        limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
-        if not limits:
-            return None
-        state = self.workspace.state.update(q)
-        ranges = np.array([bound.bounds(state, self.dt) for bound in limits])
-        return np.array([ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)])
+    def _unbraked(self, at: Passing) -> Passing:
+        """The same, with joints that need not brake: to get out of the way they go up to their limits."""
+        at.box[:] = allowed(self.problem.bounds, self.problem.scene.figure.limits, self.workspace.state, self.dt)
+        return at
 
     def _linearised(self, q: Array) -> Passing:
         at = self._lineariser.passing(q, self._query_distance)
         if self._left is not None:
+            self._unbraked(at)
             np.clip(at.box, np.minimum(self._left[0], 0.0), np.maximum(self._left[1], 0.0), out=at.box)
         return at
 
