@@ -92,7 +92,10 @@ class ReferenceRowBuilder(ContactRowBuilder):
         contact = wide[side % count]
         order = np.argsort(contact, kind="stable")
         groups = np.split(order, np.flatnonzero(np.diff(contact[order])) + 1)
-        kept = [_farthest_first(group, point, contacts.point_a[contact[group[:1]]]) for group in groups]
+        kept = [
+            _farthest_first(group, point, gap - distance[side], contacts.point_a[contact[group[:1]]])
+            for group in groups
+        ]
         order = np.concatenate(kept)
         return contact[order], point[order], gap[order]
 
@@ -131,15 +134,19 @@ class ReferenceRowBuilder(ContactRowBuilder):
         return reach, sag
 
 
-def _farthest_first(group: Indices, point: Array, witness: Array) -> Indices:
-    """Which MOST_ENDS rows of one contact to keep: the farthest from the witness point, then from those before."""
+def _farthest_first(group: Indices, point: Array, beyond: Array, witness: Array) -> Indices:
+    """Which MOST_ENDS rows of one contact to keep: the farthest from the witness point, then from those before.
+
+    One that is SETBACK beyond the contact's distance counts as half as far away.
+    """
     if len(group) <= module.MOST_ENDS:
         return group
-    away = ((point[group] - witness) ** 2).sum(axis=1)
+    nearness = (module.SETBACK / (module.SETBACK + beyond[group])) ** 2
+    away = nearness * ((point[group] - witness) ** 2).sum(axis=1)
     chosen = [int(np.argmax(away))]
     away = np.full(len(group), np.inf)
     while len(chosen) < module.MOST_ENDS:
-        away = np.minimum(away, ((point[group] - point[group[chosen[-1]]]) ** 2).sum(axis=1))
+        away = np.minimum(away, nearness * ((point[group] - point[group[chosen[-1]]]) ** 2).sum(axis=1))
         chosen.append(int(np.argmax(away)))
     return group[chosen]
 

@@ -30,8 +30,9 @@ INSET = 5e-4  # m: how far below the plane a point must find the other piece; la
 SAME_NORMAL = 1.0 - 5e-5  # cosine of 0.01 rad: nearer to a face's normal than this, coal's may be meant to be it
 NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pieces by less than coal's does
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
+SETBACK = 1e-3  # m: of too many ends, one this much farther off counts as half as far out; less = more of the near ones
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
-LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM])
+LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM, SETBACK])
 """What the compiled loops take of the above."""
 
 

@@ -88,6 +88,7 @@ def patch_ends(
     band: float,
     inset: float,
     shortest: float,
+    setback: float,
     most_ends: int,
 ) -> tuple[Indices, Array, Array]:
     """Ends of the patches of the contacts `wide`, at most `most_ends` each; arguments as in `ContactRowBuilder`.
@@ -190,23 +191,28 @@ def patch_ends(
                     gap[first_begun + row] = gap[begun + row]
                 filled = first_begun + rows
         if filled - first_begun > most_ends:
-            _farthest_first(place[first_begun:filled], gap[first_begun:filled], point_a[c], most_ends)
+            _farthest_first(
+                place[first_begun:filled], gap[first_begun:filled], point_a[c], distance[c], setback, most_ends
+            )  # fmt: skip
             filled = first_begun + most_ends
     return contact[:filled], place[:filled], gap[:filled]
 
 
 @compiled()
-def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> None:
+def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, setback: float, count: int) -> None:
     """Move `count` places of a contact to the front, with their gaps: each the farthest from those before it.
 
-    The first is the farthest from the witness point. `place` (m, 3) and `gap` (m,) are changed in place.
+    The first is the farthest from the witness point. A place whose gap is larger than the contact's `distance` by
+    `setback` counts as half as far away: it takes a larger turn to touch. `place` (m, 3) and `gap` (m,) are changed in
+    place.
     """
     total = len(gap)
-    away = np.empty(total)
+    away, nearness = np.empty(total), np.empty(total)
     for row in range(total):
+        nearness[row] = (setback / (setback + gap[row] - distance)) ** 2
         away[row] = 0.0
         for k in range(3):
-            away[row] += (place[row, k] - witness[k]) ** 2
+            away[row] += nearness[row] * (place[row, k] - witness[k]) ** 2
     for chosen in range(count):
         best = chosen
         for row in range(chosen + 1, total):
@@ -216,10 +222,11 @@ def _farthest_first(place: Array, gap: Array, witness: Array, count: int) -> Non
             place[chosen, k], place[best, k] = place[best, k], place[chosen, k]
         gap[chosen], gap[best] = gap[best], gap[chosen]
         away[chosen], away[best] = away[best], away[chosen]
+        nearness[chosen], nearness[best] = nearness[best], nearness[chosen]
         for row in range(chosen + 1, total):
             square = 0.0
             for k in range(3):
-                square += (place[row, k] - place[chosen, k]) ** 2
+                square += nearness[row] * (place[row, k] - place[chosen, k]) ** 2
             away[row] = square if chosen == 0 else min(away[row], square)
 
 
@@ -253,8 +260,8 @@ def contact_rows(
 ) -> int:
     """Write the rows of all contacts, as `ContactRowBuilder.write` does; how many there are.
 
-    `lengths` holds the lever distance, band, inset, shortest lever, cosine of the same normal and room for it; the
-    other arguments are as in `ContactRowBuilder` and `Contacts`.
+    `lengths` holds the lever distance, band, inset, shortest lever, cosine of the same normal, room for it and setback;
+    the other arguments are as in `ContactRowBuilder` and `Contacts`.
     """
     count = len(distance)
     wide = np.empty(count, dtype=np.intp)
@@ -277,7 +284,7 @@ def contact_rows(
         return count
     owner, place, open_by = patch_ends(
         wide, pair, distance, normal, point_a, point_b, placement, points, point_start, point_count, faces, face_start,
-        face_count, radius, axis, is_capsule, lengths[1], lengths[2], lengths[3], most_ends,
+        face_count, radius, axis, is_capsule, lengths[1], lengths[2], lengths[3], lengths[6], most_ends,
     )  # fmt: skip
     for e in range(len(owner)):
         c, row = owner[e], count + e

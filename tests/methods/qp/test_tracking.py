@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -138,3 +139,25 @@ def test_a_hold_comes_back_in_the_step_after_a_jump(jump: tuple[float, float, fl
         missed.append(float(np.abs(held.value(problem.scene.state(q))).max()))
     assert missed[-2] > 1e-3
     assert missed[-1] < 0.3 * missed[-2]
+
+
+SLIDER = """<robot name="slider">
+  <link name="rail"/>
+  <link name="ball"><collision><geometry><sphere radius="0.05"/></geometry></collision></link>
+  <joint name="slide" type="prismatic"><parent link="rail"/><child link="ball"/><axis xyz="1 0 0"/>
+    <limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+
+@pytest.mark.parametrize("method", [wb.QP(), wb.QP(hot_start=False)])
+def test_a_joint_does_not_brake_where_it_has_to_leave_something(method: wb.QP, tmp_path: Path) -> None:
+    """Five millimetres before its limit, and four inside of a wall behind it: one step leads out."""
+    path = tmp_path / "slider.urdf"
+    path.write_text(SLIDER)
+    scene = wb.Scene(wb.load(path)).add(wb.Box((1.0, 1.0, 1.0)), name="wall", at=(0.449, 0.0, 0.0))
+    start, limit = np.array([0.995]), wb.StepLimit(1.0)
+    assert scene.contacts(start, 0.1).distance == pytest.approx(-0.004, abs=1e-6)
+    step = method.tracker(wb.Problem(scene, start, constraints=[limit]), 0.01).step(start)
+    assert step.q == pytest.approx(0.999, abs=1e-6)
+    alone = wb.Problem(wb.Scene(wb.load(path)), start, goals=[wb.Point("ball", (2.0, 0.0, 0.0))], constraints=[limit])
+    assert method.tracker(alone, 0.01).step(start).q == pytest.approx(1.0 - 0.005 * np.exp(-0.2), abs=1e-6)

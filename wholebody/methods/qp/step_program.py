@@ -62,6 +62,7 @@ class Answer(NamedTuple):
         worst: largest violation of an elastic row at x = 0, metres.
         spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
             negative infinite where it is not known.
+        missed: largest violation of an elastic row after the displacement, metres or radians, to first order.
         exact: see `QPSolution`, like the next two.
         iterations: of the solver.
         by: what closed the program.
@@ -72,6 +73,7 @@ class Answer(NamedTuple):
     turn: float
     worst: float
     spare: float
+    missed: float
     exact: bool
     iterations: int
     by: str
@@ -211,7 +213,7 @@ class StepProgram:
         if 5 * k > len(self._integers):
             self._grow(2 * k)
         held = working.held if working.hot else self._unknown
-        solved, count, motion, turn, worst, spare, damping, asked = self._kernel.solve(
+        solved, count, motion, turn, worst, spare, missed, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
             self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
             workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
@@ -221,13 +223,16 @@ class StepProgram:
         if solved:
             working.pushing = self._integers[2 * k : 2 * k + count].copy()
             by = working.solver.count([ACTIVE_SET])
-            return Answer(self._x, motion, turn, worst, spare, True, 0, by), damping, asked
-        answer = working.solve(self.program(), self.rows(at).key)
+            return Answer(self._x, motion, turn, worst, spare, missed, True, 0, by), damping, asked
+        rows = self.rows(at)
+        answer = working.solve(self.program(), rows.key)
         motion, turn = self.motion(at, answer.x)
+        missed = float((rows.elastic_violation - rows.elastic @ answer.x).max(initial=0.0))
         remains = self._soft_rows[: self.goals] @ answer.x - self._target[: self.goals]
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
-        return Answer(answer.x, motion, turn, worst, spare, answer.exact, answer.iterations, answer.by), damping, asked
+        answered = (answer.exact, answer.iterations, answer.by)
+        return Answer(answer.x, motion, turn, worst, spare, missed, *answered), damping, asked
 
     def _foresee(self, at: Passing, displacement: Array) -> bool:
         """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.

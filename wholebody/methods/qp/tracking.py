@@ -38,6 +38,7 @@ CORRECTIONS = 3  # programs that ask again for what turning brought nearer, befo
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
 PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
+BRAKED = 1e-6  # m, rad: what must hold is missed by more where joints brake for their limits: they do not then
 OUT = 5e-5  # m: overlap with what came into the figure that is left; half of what counts as an overlap
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 
@@ -258,6 +259,8 @@ class QPTracker(OfOneRun):
         program = self._program
         at = self._linearised(q)
         answer = program.solve(at, measures)
+        if self._left is None and answer.missed > BRAKED:
+            answer = program.solve(self._unbraked(at), measures)  # what must hold comes before soft stops
         motion = answer.motion
         if motion > 0.5 * self._query_distance and answer.worst > UNSEEN:
             # something came in fast: to get out of its way, one must look as far as one has to go

@@ -133,7 +133,7 @@ def solve(
         elastic_weight[j] = numbers[12]
         worst = max(worst, violated[j])
     if not hot:
-        return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
     for i in range(n):
         at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = solve_growing(
@@ -141,7 +141,7 @@ def solve(
         labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[18:24], work, places, x,
     )  # fmt: skip
     if rounds < 0:
-        return False, 0, 0.0, 0.0, worst, -np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
     for i in range(n):
         held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = 0
@@ -163,12 +163,14 @@ def solve(
             left += (gone - target[r]) ** 2
     left = np.sqrt(left)
     after[last + m], after[last + m + 1] = left, 1.0
-    spare = np.inf
-    for j in range(one_sided, k):
+    spare, missed = np.inf, 0.0
+    for j in range(k):
         ahead = -violated[j]
         for i in range(n):
             ahead += elastic[j, i] * x[i]
-        spare = min(spare, ahead)
+        missed = max(missed, -ahead)
+        if j >= one_sided:
+            spare = min(spare, ahead)
     asked = numbers[10] * min(1.0, left / error) if left > numbers[11] else 0.0
     wide, pieces = len(columns), len(reach)
     for c in range(wide):
@@ -177,7 +179,7 @@ def solve(
         spread, columns, joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
         joints[len(joints) - pieces :], placement, reach,
     )  # fmt: skip
-    return True, count, way, turn, worst, spare, damping, asked
+    return True, count, way, turn, worst, spare, missed, damping, asked
 
 
 @compiled()
