@@ -43,7 +43,7 @@ def solve(
     measures: bool,
     hot: bool,
     least_damping: float,
-) -> tuple[bool, int, float, float, float, float, float, float]:
+) -> tuple[bool, int, float, float, float, float, float, float, float]:
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
