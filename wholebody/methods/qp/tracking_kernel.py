@@ -78,8 +78,8 @@ def solve(
 
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
-        violation of an elastic row; least room that a contact row has after the step; the damping, and what the answer
-        asks for.
+        violation of an elastic row; least room that a contact row has after the step, and largest violation of an
+        elastic row then; the damping, and what the answer asks for.
     """
     n, goals = box.shape[1], len(share)
     equal, one_sided = 0, 0
