@@ -1,4 +1,4 @@
-"""Rows that lack something are met one after the other, within bounds (Kaczmarz, 1937), as a compiled loop."""
+"""Rows that are violated are met one after the other, within bounds (Kaczmarz, 1937), as a compiled loop."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from wholebody.arrays import Array
 from wholebody.compiled import compiled
 
 SWEEPS = 30  # over all rows in one round, at most
-LEAST = 1e-9  # of the square of a row that moves anything, and m or rad that a row lacks
+LEAST = 1e-9  # of the square of a row that moves anything, and m or rad by which a row is violated
 
 
 @compiled()
 def project(rows: Array, room: Array, low: Array, high: Array, gone: Array) -> None:
-    """Add to a displacement (nv,) what every row lacks, one after the other, and keep it within bounds (nv,)."""
+    """Add to a displacement (nv,) what meets every violated row, one after the other, and keep it within bounds (nv,)."""
     count, size = rows.shape
     square, left = np.zeros(count), room.copy()
     for r in range(count):
