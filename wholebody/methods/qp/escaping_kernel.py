@@ -13,7 +13,7 @@ LEAST = 1e-9  # of the square of a row that moves anything, and m or rad by whic
 
 @compiled()
 def project(rows: Array, room: Array, low: Array, high: Array, gone: Array) -> None:
-    """Add to a displacement (nv,) what meets every violated row, one after the other, and keep it within bounds (nv,)."""
+    """Add to a displacement (nv,) what meets the violated rows, one after the other, within bounds (nv,)."""
     count, size = rows.shape
     square, left = np.zeros(count), room.copy()
     for r in range(count):
