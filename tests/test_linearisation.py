@@ -209,7 +209,7 @@ def random_term(rng, scene):
 
 
 def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
-    """Random terms at random postures: 60 problems, 6 postures each, with and without a time step."""
+    """Random terms at random postures: 60 problems, 3 postures each, with and without a time step."""
     rng, rows = np.random.default_rng(3), 0
     pin.seed(3)
     scene = problem.scene
@@ -226,12 +226,12 @@ def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
         dt = None if number % 2 else 0.02
         one, other = asked.workspace(), asked.workspace()
         lineariser, plain = asked.lineariser(one, dt), reference(asked, other, dt)
-        for k in range(6):
+        for k in range(3):
             q = posture(asked, 20 * number + k)
             found = lineariser.at(q, 0.08)
             assert_same(found, plain.at(q, 0.08))
             rows += len(found.gap) + len(found.goal_error) + len(found.value)
-    assert rows > 9000
+    assert rows > 5000
 
 
 def test_reach_cones_roots_and_heights_are_in_the_plan(problem):

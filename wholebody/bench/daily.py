@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.bench.report import render
 from wholebody.errors import InputError
 from wholebody.files import Scratch
 from wholebody.tracking.live import LiveDrag
@@ -161,15 +162,4 @@ def processor_seconds() -> float:
 
 def report(rows: list[DailyRow], facts: dict[str, str]) -> str:
     """Return the table as Markdown."""
-    lines = [
-        f"Measured on {facts['processor']}, {facts['cores']} cores; load {facts['load']}. CPU is the time of all "
-        "processes, which other work on the machine lengthens.",
-        "",
-        "| what | count | CPU ms | p95 | asked of the clock, two cores, ms | outcome |",
-        "| --- | ---: | ---: | ---: | ---: | --- |",
-    ]
-    for row in rows:
-        p95 = f"{1e3 * row.p95:,.1f}" if row.p95 else ""
-        asked = f"{1e3 * row.asked:,.1f}" if row.asked else ""
-        lines.append(f"| {row.what} | {row.count:,} | {1e3 * row.cpu:,.1f} | {p95} | {asked} | {row.told} |")
-    return "\n".join(lines)
+    return render("daily.md", rows=rows, facts=facts)

@@ -58,19 +58,18 @@ def test_quadprog_agrees():
 
 @pytest.mark.parametrize("k", [0, 20, 100, 400])
 def test_the_compiled_loop_is_the_array_code(k):
+    """100 random programs of each size, 400 in all, after one, two and five iterations in turn; three to the end."""
     rng = np.random.default_rng(k)
-    for _ in range(5):
+    for number in range(100):
         program = crowded(rng, k=k)
         start = rng.normal(size=program.size)
-        for iterations in (1, 2, 5):
+        for iterations in ((1, 2, 5)[number % 3], *((300,) if number < 3 else ())):
             x, active, used = minimise(program, start, iterations)
             expected, its_active, its_used = semismooth_newton.minimise(program, start, iterations)
-            assert used == its_used
-            assert x == pytest.approx(expected, abs=1e-10)
-            assert active.same(its_active)
-        assert minimise(program, start, 300)[0] == pytest.approx(
-            semismooth_newton.minimise(program, start, 300)[0], abs=1e-10
-        )
+            assert np.abs(x - expected).max() < 1e-10
+            if iterations < 300:
+                assert used == its_used
+                assert active.same(its_active)
 
 
 def test_correcting_a_set_takes_the_smaller_system():

@@ -111,7 +111,7 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The projection, compiled or read back."""
-    from wholebody.methods.qp import escaping_kernel
+    from wholebody.methods.qp import dense_kernel
 
-    escaping_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
-    return escaping_kernel
+    dense_kernel.project(np.zeros((0, 1)), np.zeros(0), np.zeros(1), np.zeros(1), np.zeros(1))
+    return dense_kernel
