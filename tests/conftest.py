@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
+from wholebody import batches
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene import Scene
@@ -144,3 +145,15 @@ def _least_distance(scene: Scene, q: Any) -> float:
 def least_distance() -> Callable[..., float]:
     """Return a function: scene, posture -> least signed distance of all pairs."""
     return _least_distance
+
+
+@pytest.fixture(scope="module")
+def one_process() -> Iterator[None]:
+    """Let batches of one job at a time use one child process throughout a module: each would start its own otherwise.
+
+    A process that ends over a job is replaced as always. Changes of the environment reach it only until it begins.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(batches, "close_own_child", lambda: None)
+        yield
+    batches.close_own_child()
