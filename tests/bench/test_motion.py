@@ -18,6 +18,8 @@ from wholebody.cli import main
 from wholebody.motion import avoidance
 from wholebody.motion.ready_equipment import dressed
 
+pytestmark = pytest.mark.usefixtures("one_process")
+
 NAME = "sword cut"
 
 

@@ -12,6 +12,8 @@ import wholebody as wb
 from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
 
+pytestmark = pytest.mark.usefixtures("one_process")
+
 TASK = (
     figure("human")
     + box("post", [0.05, 0.05, 0.5], [1.5, 0.0, 0.25])

@@ -80,7 +80,7 @@ class Fake:
         if self.does == "dies":
             os._exit(3)
         if self.does == "sleeps":
-            time.sleep(float(os.environ.get("FAKES_SLEEP", "0.4")))
+            time.sleep(float(os.environ.get("FAKES_SLEEP", "0.01")))
         if self.does == "compiles" and "COMPILED" not in os.environ:
             os.environ["COMPILED"] = "in this process"
             time.sleep(1.5)
