@@ -35,6 +35,25 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
+LONG = (
+    *("motion/test_batch.py", "bench/compare/test_run.py", "test_odd_arguments.py", "examples/test_examples.py"),
+    *("tracking/test_moving_things.py", "bench/test_commands.py", "motion/test_avoidance.py"),
+    *("dynamics/test_scenes.py", "test_compiled.py", "docs/test_pages.py", "methods/newton/test_method.py"),
+    *("view/test_live_page.py", "view/surface/test_surface.py", "test_threads.py", "tracking/test_scenes.py"),
+    *(
+        "tracking/test_dragging.py",
+        "cli/test_commands.py",
+        "motion/test_grips.py",
+        "motion/test_dynamics.py",
+        "studies/test_many.py",
+    ),
+    *("bench/attack/test_running.py", "bench/compare/test_report.py", "studies/test_study.py", "bench/test_motion.py"),
+)
+"""Files that take over six seconds of the processor, and longer by the clock: they begin first.
+
+So all workers end together. pytest-xdist keeps this order with `--no-loadscope-reorder`; by itself it would begin with
+the files of the most tests."""
+
 COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1e-5)}
 """Accuracy of coal's distances: metres, and share of the size of both pieces together.
 
@@ -42,6 +61,12 @@ COAL = {"formula": (0.0, 1e-12), "iterated": (1e-6, 1e-9), "ellipsoid": (1e-6, 1
 random pairs of 1 cm to 2 m. "iterated" are pairs of boxes and hulls: coal stops at 1e-6 m; measured 9e-11 of the size,
 and 4e-8 m inside of small hulls. "ellipsoid" are ellipsoids but with half-spaces: measured 5e-6 of the size, at 1 m as
 at 100 m, and 1e-6 m at 1 cm."""
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Put the tests of the files that take longest before the others."""
+    places = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
+    items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
 @pytest.fixture(scope="session")

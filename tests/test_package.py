@@ -6,6 +6,9 @@ import ast
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
+from functools import cache
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -91,41 +94,50 @@ def test_what_is_used_most_loads_no_library_that_few_of_its_calls_need() -> None
     assert not [name for name in rare if name in loaded]
 
 
-def modules() -> list[Path]:
-    return sorted(PACKAGE.rglob("*.py"))
+@cache
+def modules() -> dict[str, ast.Module]:
+    """The syntax of every module, by its name; that of a package ends in `__init__`."""
+    paths = sorted(PACKAGE.rglob("*.py"))
+    return {".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts): parsed(path) for path in paths}
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_is_one_idea_and_imports_downwards_only(path: Path) -> None:
-    text = path.read_text()
-    assert len(text.splitlines()) <= 400
-    room = room_of("wholebody." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts))
-    for node in ast.walk(ast.parse(text)):
-        names = [node.module] if isinstance(node, ast.ImportFrom) else []
-        names += [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
-        for name in names:
-            other = room_of(name or "")
-            if room is not None and other is not None:
-                assert ROOMS.index(other) <= ROOMS.index(room), f"{room} imports {name}"
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(), str(path))
+
+
+def imported(tree: ast.Module) -> Iterator[str]:
+    """Names of modules that a module imports, also within functions and for type checkers."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and node.module:
+            yield node.module
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+
+
+def test_a_module_is_one_idea() -> None:
+    long = {path for path in PACKAGE.rglob("*.py") if len(path.read_text().splitlines()) > 400}
+    assert not long
+
+
+def test_modules_import_downwards_only() -> None:
+    upwards = []
+    for name, tree in modules().items():
+        room = room_of(name)
+        rooms = {other for other in map(room_of, imported(tree)) if other is not None}
+        upwards += [f"{name} imports {other}" for other in rooms if room and ROOMS.index(other) > ROOMS.index(room)]
+    assert not upwards
 
 
 def test_no_modules_import_each_other_in_a_circle() -> None:
     """Imports within functions and for type checkers count; what a package's own `__init__` gathers does not."""
-    files = {"wholebody." + ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path for path in modules()}
-    imports = {name: set[str]() for name, path in files.items() if path.name != "__init__.py"}
-    for name in imports:
-        for node in ast.walk(ast.parse(files[name].read_text())):
+    files = {name: tree for name, tree in modules().items() if not name.endswith(".__init__")}
+    imports = {name: set[str]() for name in files}
+    for name, tree in files.items():
+        for node in ast.walk(tree):
             if isinstance(node, ast.ImportFrom) and node.module:
                 named = {node.module, *(f"{node.module}.{alias.name}" for alias in node.names)}
                 imports[name] |= named & (imports.keys() - {name})
-    while free := [
-        name
-        for name, needed in imports.items()
-        if not needed & imports.keys() or not any(name in others for others in imports.values())
-    ]:
-        for name in free:
-            del imports[name]
-    assert not imports
+    TopologicalSorter(imports).prepare()  # raises CycleError, which names a circle
 
 
 def private_reads(tree: ast.AST) -> set[str]:
@@ -138,9 +150,9 @@ def private_reads(tree: ast.AST) -> set[str]:
     return {node.attr for node in reads if not node.attr.startswith("__")} - own
 
 
-@pytest.mark.parametrize("path", modules(), ids=lambda path: str(path.relative_to(PACKAGE)))
-def test_a_module_reads_nothing_private_of_another(path: Path) -> None:
-    assert not private_reads(ast.parse(path.read_text()))
+def test_a_module_reads_nothing_private_of_another() -> None:
+    found = {name: private_reads(tree) for name, tree in modules().items()}
+    assert not {name: reads for name, reads in found.items() if reads}
 
 
 def room_of(module: str) -> str | None:

@@ -77,7 +77,7 @@ METHODS = {  # and how often the problems within reach are solved again
     "qp/osqp": (wb.QP(budget=20, restarts=1, time_limit=None), 3),
     "qp/daqp": (wb.QP(solver="daqp", budget=20, restarts=1, time_limit=None), 3),
     "dls": (wb.DampedLeastSquares(iterations=40, time_limit=None), 3),
-    "newton": (wb.Newton(restarts=0, iterations=12, time_limit=None), 0),
+    "newton": (wb.Newton(restarts=0, iterations=6, time_limit=None), 0),
     "placo": (wb.Placo(iterations=20, time_limit=None), 0),
     "ccd": (wb.CCD(restarts=0, iterations=40, time_limit=None), 1),
 }

@@ -1,8 +1,19 @@
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import pytest
 
+from wholebody.bench import plot_style
 from wholebody.bench.track import Track, track
+
+
+@pytest.fixture(scope="session", autouse=True)
+def coarse_pictures() -> Iterator[None]:
+    """Draw charts of fewer pixels, which takes less time; their SVG are the same."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(plot_style, "PNG_DPI", 40)
+        yield
 
 
 @pytest.fixture(scope="session")

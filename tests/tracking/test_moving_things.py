@@ -28,6 +28,7 @@ class Thrown(Throw):
 
     def __init__(self, seed: int, kind: str, speed: float, turn: float = 0.0) -> None:
         super().__init__(np.random.default_rng(seed), SHAPES[KINDS[kind]], speed, turn)
+        self._judged = wb.Problem(self.scene)
 
     def deepest(self, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int = 0) -> float:
         """Depth of the thing in the body along a path, metres."""
@@ -40,7 +41,7 @@ class Thrown(Throw):
 
     def ends(self, q: np.ndarray) -> float:
         """Deepest overlap of all pairs at a posture, metres."""
-        return wb.assess(wb.Problem(self.scene, q), q).penetration
+        return wb.assess(self._judged, q).penetration
 
 
 def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:

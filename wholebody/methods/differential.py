@@ -173,7 +173,7 @@ class Iteration:
         return move
 
     def _clearance_violation(self, q: Array) -> float:
-        """What the worst pair lacks of its clearance at a posture (nq,) [m]."""
+        """By what the worst pair is nearer than its clearance at a posture (nq,) [m]."""
         clearances = self._problem.clearances
         near = self._proximity.query(self._state.update(q), float(clearances.max(initial=0.0)))
         return float((clearances[near.number] - near.distance).max(initial=0.0))

@@ -52,7 +52,7 @@ def beyond(places: Array, center: Array, radius: Array) -> Mask:
     return outside
 
 
-def lacking(places: Array, center: Array, radius: Array) -> Array:
+def distance_beyond(places: Array, center: Array, radius: Array) -> Array:
     """By how much (n,) places are at least out of reach, metres."""
     least = np.zeros(len(places))
     for middle, size in zip(center, radius, strict=True):

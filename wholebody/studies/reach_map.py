@@ -19,7 +19,7 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.runner import packed
 from wholebody.studies.many import MOST_JOBS
-from wholebody.studies.reach_bounds import beyond, lacking, reach_balls
+from wholebody.studies.reach_bounds import beyond, distance_beyond, reach_balls
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
 from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
 from wholebody.tasks import inputs
@@ -112,7 +112,7 @@ class _Search:
         count = len(grid.places)
         center, radius = reach_balls(asked.problem, asked.frame, asked.offset)
         self._verdict = np.where(beyond(grid.places, center, radius), BEYOND, NOT_TRIED).astype(np.int8)
-        self._left = np.where(self._verdict == BEYOND, lacking(grid.places, center, radius), 0.0)
+        self._left = np.where(self._verdict == BEYOND, distance_beyond(grid.places, center, radius), 0.0)
         self._measure = np.zeros(count)
         self._q: dict[int, Array] = {}
         self._tried: set[tuple[int, int]] = set()

@@ -10,7 +10,9 @@ from wholebody.batches import close_own_child
 from wholebody.bench.compare.jobs import Task, work
 
 
-def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(fakes: ModuleType, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(
+    fakes: ModuleType, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Or it would be given a handful of problems."""
     monkeypatch.setenv("FAKES_SLEEP", "0.4")
     solves = tuple((fakes.adapter(does), ()) for does in ("compiles", "sleeps", "dies"))

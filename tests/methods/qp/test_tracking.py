@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.methods.qp.active_set import lacking, solve_from
+from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.tasks.base import Goal
 
@@ -116,10 +116,10 @@ def program() -> QuadraticProgram:
 @pytest.mark.parametrize("field", ["linear", "rows", "weight", "elastic", "elastic_weight", "lower", "upper"])
 def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
     whole = program()
-    assert solve_from(whole, lacking(whole), 50) is not None
+    assert solve_from(whole, violated_set(whole), 50) is not None
     broken = replace(whole, **{field: getattr(whole, field)[:-1]})
     with pytest.raises(ValueError, match="other sizes"):
-        solve_from(broken, lacking(whole), 50)
+        solve_from(broken, violated_set(whole), 50)
 
 
 @pytest.mark.parametrize("jump", [(0.1, 0.0, -0.16), (0.0, 0.0, 0.2), (0.1, 0.1, 0.1)])

@@ -35,7 +35,7 @@ def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> A
     return ActiveSet(lower, upper, program.elastic @ x <= program.least + tolerance)
 
 
-def lacking(program: QuadraticProgram) -> ActiveSet:
+def violated_set(program: QuadraticProgram) -> ActiveSet:
     """Active set to begin from where nothing is known: no bounds, and the elastic rows that x = 0 does not meet."""
     free = np.zeros(program.size, dtype=bool)
     return ActiveSet(free, free.copy(), program.least > 0.0)

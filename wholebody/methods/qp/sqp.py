@@ -266,8 +266,8 @@ class SQP:
     def _take(self, there: Iterate, program: QuadraticProgram, dq: Array, way: Array) -> Iterate:
         """Note that a step was taken.
 
-        What the rows would still lack after the program's own step dq, because the measures pull, is asked for in the
-        next one (method of multipliers).
+        What would be left of the rows' violation after the program's own step dq, because the measures pull, is asked
+        for in the next one (method of multipliers).
         """
         self._memory.went(way)
         self._anchor = None

@@ -102,11 +102,11 @@ def violation(
             hold += error * error
     worst[:] = 0.0
     for r in range(len(violated)):
-        lacking = violated[r]
+        violation = violated[r]
         if moves:
             for i in range(len(displacement)):
-                lacking -= elastic[r, i] * displacement[i]
-        worst[contact[r]] = max(worst[contact[r]], lacking)
+                violation -= elastic[r, i] * displacement[i]
+        worst[contact[r]] = max(worst[contact[r]], violation)
     for c in range(len(worst)):
         total += worst[c]
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)

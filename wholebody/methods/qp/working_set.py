@@ -12,7 +12,7 @@ from wholebody.methods.qp.semismooth_newton import compiled_kernel as semismooth
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.records import with_values
 
-NEAR = 0.03  # m: rows lacking less than this at x = 0 are in from the beginning
+NEAR = 0.03  # m: rows with less room than this at x = 0 are in from the beginning
 ROUNDS = 8  # most times that rows are added before all of them are
 LIMITS = np.array([NEAR, ROUNDS, WARM_CORRECTIONS, FULL_CORRECTIONS, BOUND_TOLERANCE, ROW_TOLERANCE])
 """What the compiled loop takes of these."""

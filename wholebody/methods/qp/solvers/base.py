@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.active_set import lacking, solve_from
+from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
 from wholebody.records import with_values
@@ -48,7 +48,7 @@ class QPSolver(ABC):
         Args:
             program: what to solve.
             guess: active set of a program like this one; None where none is known. With a hot start it is corrected,
-                and None stands for the rows that lack at x = 0; but the first program of all is the solver's.
+                and None stands for the rows violated at x = 0; but the first program of all is the solver's.
 
         Returns:
             The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box.
@@ -56,7 +56,7 @@ class QPSolver(ABC):
         if not (self.hot_start and self._begun):
             self._begun = True
             return self.solve_cold(program)
-        solution = solve_from(program, lacking(program) if guess is None else guess, WARM_CORRECTIONS)
+        solution = solve_from(program, violated_set(program) if guess is None else guess, WARM_CORRECTIONS)
         if solution is not None:
             return with_values(solution, by=ACTIVE_SET)
         if len(program.target) + len(program.least) > LARGEST:

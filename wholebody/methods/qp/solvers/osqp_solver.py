@@ -1,6 +1,6 @@
 """OSQP with a workspace that lives on: set up once for a sparsity, warm from program to program, finished exactly.
 
-A second solver asks it only where active sets, corrected from the rows that lack, are not right after many corrections.
+A second solver asks it only where active sets, corrected from the violated rows, are not right after many corrections.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.methods.qp.active_set import lacking, solve_from
+from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
@@ -88,7 +88,7 @@ class ActiveSetSolver(QPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
-        solution = solve_from(program, lacking(program), WARM_CORRECTIONS)
+        solution = solve_from(program, violated_set(program), WARM_CORRECTIONS)
         return self._osqp.solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
 
 
