@@ -225,7 +225,7 @@ def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path,
         assert depth.max() < 1e-4
         lowest = np.inf
         for number, q in enumerate(dragged.q):
-            if number % 8 == 0:
+            if number % 24 == 0:
                 least, where = deepest(problem, q)
                 assert least > -1e-4, where
             place = places(problem, q)

@@ -257,9 +257,9 @@ def test_the_drawn_neck_has_the_girth_that_was_measured(case: str) -> None:
     shape = PersonShape(person)
     (head,) = (garment for garment in shape.garments() if garment.name == "head")
     low, high = shape.at("neck"), shape.at("head")
-    turn = np.linspace(0.0, 2.0 * np.pi, 181)[:-1]
+    turn = np.linspace(0.0, 2.0 * np.pi, 91)[:-1]
     around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
-    radii = np.linspace(0.02, 0.15, 1301)
+    radii = np.linspace(0.02, 0.15, 521)
     girths = []
     for share in np.linspace(0.2, 0.9, 8):
         rays = low + share * (high - low) + radii[:, None, None] * around
