@@ -66,6 +66,8 @@ at 100 m, and 1e-6 m at 1 cm."""
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Put the tests of the files that take longest before the others."""
     places = {ROOT / "tests" / name: place for place, name in enumerate(LONG)}
+    if missing := [str(path) for path in places if not path.is_file()]:
+        raise pytest.UsageError(f"LONG in tests/conftest.py names {', '.join(missing)}, which is no file")
     items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
