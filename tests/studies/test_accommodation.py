@@ -10,8 +10,6 @@ from scipy.stats import norm
 
 import wholebody as wb
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 
 def upright(figure: wb.Figure, target: Any, layout: Any) -> wb.Problem:
     """Somebody who stands still under a beam, and is to bring the top of the head to 1.70 m."""

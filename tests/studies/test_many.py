@@ -12,8 +12,6 @@ import pytest
 
 import wholebody as wb
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 ARM = Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf"
 PLACES = [(0.4, 0.1 * k, 0.5) for k in range(-2, 3)]
 

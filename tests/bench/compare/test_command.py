@@ -12,8 +12,6 @@ from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
 from wholebody.errors import InputError, UnknownNameError
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()

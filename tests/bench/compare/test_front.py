@@ -16,8 +16,6 @@ from wholebody.bench.compare.record import ANSWERED, FAILED, REFUSED, Record
 from wholebody.bench.compare.results import QUANTITIES, Results
 from wholebody.bench.compare.summary import summaries
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 WORST, GOAL, PENETRATION, EFFORT = QUANTITIES
 CASES = range(5)
 

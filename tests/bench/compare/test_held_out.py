@@ -14,8 +14,6 @@ from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.compare.summary import Summary
 from wholebody.cli import main
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 
 def row(family: str, method: str, solved: int, cases: int, refused: int = 0) -> Summary:
     low, high = wilson(solved, cases)

@@ -22,8 +22,6 @@ from wholebody.bench.plot_style import method_style
 from wholebody.bench.tables import read_rows
 from wholebody.errors import InputError
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 FACTS = {"wholebody": "0", "processor": "a fast one", "date": "2030-01-02"}
 REFUSAL = "it cannot take <goals[0]>, Point"
 FETCHED = re.compile(
