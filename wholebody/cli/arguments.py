@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.errors import InputError, UnknownNameError, nearest_names
 
 
 class Commands(Protocol):
@@ -15,6 +16,31 @@ class Commands(Protocol):
 
     def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
         """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose messages about unknown commands and options name the nearest known ones."""
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """As `argparse` does; what a command does not know is told with the options of that command."""
+        found, rest = super().parse_known_args(args, namespace)
+        for word in rest[:1]:
+            if word.startswith("-"):
+                self.error(f"no option is called {word!r}; {_did_you_mean(word, self._option_string_actions)}")
+        return found, rest
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the message, and end with 2."""
+        if wrong := re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message):
+            word, choices = wrong[1], [choice.strip("'") for choice in wrong[2].split(", ")]
+            message = f"{message}; {_did_you_mean(word, choices)}"
+        super().error(message)
+
+
+def _did_you_mean(word: str, known: Iterable[str]) -> str:
+    return f"did you mean {', '.join(nearest_names(word, tuple(known)))}?"
 
 
 PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")
