@@ -35,8 +35,8 @@ def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     names = _run(root / page)
     assert names
-    if "solution" in names:
-        assert names["solution"].solved
+    for name in {"solution", "taken", "put"} & names.keys():
+        assert names[name].solved, name
 
 
 def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
