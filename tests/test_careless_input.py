@@ -151,6 +151,10 @@ def test_a_reach_map_of_one_place_by_mistake(person: wb.Figure) -> None:
         (["psoe", "task.toml"], "did you mean pose"),
         (["pose", "task.toml", "--methd", "ccd"], "no option is called '--methd'; did you mean --method"),
         (["bench", "compre"], "did you mean compare"),
+        (
+            ["reach", "task.toml", "--frame", "head", "--high", "1,1,1", "--low", "0.3", "-0.4", "1.0"],
+            "join numbers by commas",
+        ),
     ],
 )
 def test_the_command_line(given: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -158,3 +162,9 @@ def test_the_command_line(given: list[str], told: str, capsys: pytest.CaptureFix
         main(given)
     assert ended.value.code == 2
     assert told in capsys.readouterr().err
+
+
+def test_a_value_may_begin_with_a_negative_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task = str(tmp_path / "task.toml")
+    assert main(["reach", task, "--frame", "left_palm", "--low", "-0.3,-0.4,1.0", "--high", "0.6,0.1,1.3"]) == 2
+    assert "task.toml" in capsys.readouterr().err  # the corners were understood, the task does not exist

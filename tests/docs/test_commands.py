@@ -19,7 +19,7 @@ def printed(root: Path) -> dict[str, list[str]]:
     for page in [*sorted(root.glob("*.md")), *sorted(root.glob("docs/**/*.md")), *sorted(root.glob("examples/*.md"))]:
         for block in re.findall(r"```console\n(.*?)```", page.read_text(encoding="utf-8"), re.DOTALL):
             for line in re.findall(r"^\$ (.*)$", block, re.MULTILINE):
-                found.setdefault(re.sub(r"\s+# .*", "", line).strip(), []).append(page.name)
+                found.setdefault(re.sub(r"\s+(# |> ).*", "", line).strip(), []).append(page.name)
     return found
 
 
@@ -49,7 +49,7 @@ def test_inline_commands_name_known_options(root: Path) -> None:
     for page in [root / "README.md", *sorted(root.glob("docs/**/*.md"))]:
         for command in re.findall(r"`wholebody ([a-z]+[^`\n]*)`", page.read_text(encoding="utf-8")):
             words = [word for word in re.findall(r"\S+", command) if not word[0].isupper()]
-            names = [word for word in words[:2] if word.isalpha()]
+            names = [word for word in words[:2] if re.fullmatch(r"[a-z][a-z-]+", word)]
             if names[:1] not in (["bench"], ["clip"]):
                 names = names[:1]
             key = " ".join(names)

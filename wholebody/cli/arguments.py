@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
+from wholebody.checks import is_number
 from wholebody.errors import InputError, UnknownNameError, nearest_names
 
 
@@ -18,8 +19,23 @@ class Commands(Protocol):
         """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
 
 
+NUMBERS = re.compile(r"-[\d.][\d.,eE+-]*")
+"""A negative number, or numbers joined by commas of which the first is negative."""
+
+JOINED = "X,Y,Z"
+"""How the help shows numbers that are joined by commas."""
+
+
 class Parser(argparse.ArgumentParser):
-    """A parser whose messages about unknown commands and options name the nearest known ones."""
+    """A parser whose messages about unknown commands and options name the nearest known ones.
+
+    A word such as -0.3,0.5,1.2 is a value, as a negative number is for `argparse`.
+    """
+
+    def __init__(self, *given: Any, **settings: Any) -> None:
+        """As `argparse` does."""
+        super().__init__(*given, **settings)
+        self._negative_number_matcher = NUMBERS
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
@@ -27,7 +43,9 @@ class Parser(argparse.ArgumentParser):
         """As `argparse` does; what a command does not know is told with the options of that command."""
         found, rest = super().parse_known_args(args, namespace)
         for word in rest[:1]:
-            if word.startswith("-"):
+            if is_number(word) and any(option.metavar == JOINED for option in self._actions):
+                self.error(f"{word} belongs to no option; join numbers by commas, such as 0.3,-0.4,1.0")
+            if word.startswith("-") and not is_number(word):
                 self.error(f"no option is called {word!r}; {_did_you_mean(word, self._option_string_actions)}")
         return found, rest
 
