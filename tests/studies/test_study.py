@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
+from wholebody.studies.task_files import TaskFile
 
 TASK = (
     figure("human")
@@ -161,3 +163,11 @@ def test_what_was_refused_is_told_with_its_reason() -> None:
     told = repr(wb.accommodation(task, count=1))
     assert told.startswith("Accommodation of 2 people: 0%")
     assert "first refused: " in told
+
+
+def test_a_task_file_is_found_by_a_process_in_another_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    file = TaskFile(Path("task.toml"))
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    assert pickle.loads(pickle.dumps(file)).contents == file.contents
