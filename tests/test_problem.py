@@ -36,8 +36,8 @@ GOAL = wb.Point("right_index_tip", (0.5, -0.2, 1.0))
         ({"clearance": np.nan}, wb.InputError, "clearance is nan;"),
         ({"clearance": "2 mm"}, wb.InputError, "clearance is '2 mm';"),
         ({"clearance": None}, wb.InputError, "clearance is None;"),
-        ({"touching": [("right_hand",)]}, wb.InputError, "touching takes pairs of names"),
-        ({"touching": ["floor"]}, wb.InputError, "touching takes pairs of names"),
+        ({"touching": [("right_hand",)]}, wb.InputError, "touching takes a list of pairs of names"),
+        ({"touching": ["floor"]}, wb.InputError, "touching takes a list of pairs of names"),
         ({"touching": [("right_hand", "flor")]}, wb.UnknownNameError, "did you mean floor"),
     ],
 )

@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Collection, Iterable
+from difflib import get_close_matches
 from operator import index
 from pathlib import Path
 from reprlib import Repr
@@ -16,7 +18,7 @@ from typing import Any, ClassVar, TypeVar
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.errors import ALIKE, InputError, UnknownNameError
 
 _T = TypeVar("_T")
 
@@ -26,6 +28,9 @@ NUMERIC = "fiu"
 FAR = 1e15  # values beyond this get no hint at a wrong unit
 TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
+
+LONGEST_LIKELY = 10.0
+"""Seconds of a step beyond which a number of frames a second was probably meant."""
 
 LONGEST = 200
 """Characters of a name or a title."""
@@ -112,7 +117,11 @@ def time_step(value: object, what: str) -> float:
     Raises:
         InputError: no number within `TIME_STEP`.
     """
-    return number(value, what, *TIME_STEP, "s, such as 0.02")
+    found = number(value, what, *TIME_STEP, "s, such as 0.02")
+    if found > LONGEST_LIKELY:
+        told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
+        warnings.warn(told, stacklevel=3)
+    return found
 
 
 def whole(value: object, what: str, low: int, high: int) -> int:
@@ -317,11 +326,14 @@ def color(value: object, what: str) -> tuple[float, float, float, float]:
         try:
             parts = (*ImageColor.getrgb(value), 255)[:4]
         except ValueError:
-            raise InputError(f"{what} is {shown(value)}; give {wanted}") from None
+            near = get_close_matches("".join(value[:LONGEST].lower().split()), ImageColor.colormap, 3, ALIKE)
+            hint = f"; did you mean {', '.join(near)}?" if near else f"; give {wanted}"
+            raise InputError(f"{what} is {shown(value)}{hint}") from None
         return parts[0] / 255.0, parts[1] / 255.0, parts[2] / 255.0, parts[3] / 255.0
     found = array(value, what, wanted)
     if found.shape not in ((3,), (4,)) or not ((found >= 0.0) & (found <= 1.0)).all():
-        raise InputError(f"{what} is {shown(value)}; give {wanted}")
+        bytes_ = found.shape in ((3,), (4,)) and ((found >= 0.0) & (found <= 255.0)).all()
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{'; divide bytes by 255' if bytes_ else ''}")
     red, green, blue, alpha = (*found.tolist(), 1.0)[:4]
     return red, green, blue, alpha
 

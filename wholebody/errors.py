@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from difflib import get_close_matches
+import re
+from collections.abc import Collection, Iterable
+from difflib import SequenceMatcher
 
 SHOWN = 80
 """Largest number of characters of a name in a message."""
@@ -13,6 +14,39 @@ def one_line(text: str, most: int = SHOWN) -> str:
     """A text as messages quote it: without line ends and unprintable characters, and no longer than `most`."""
     plain = text if text.isprintable() else text.encode("unicode_escape", "backslashreplace").decode()
     return plain if len(plain) <= most else f"{plain[: most - 3]}..."
+
+
+OFFERED = 4
+"""Most names that a message offers; of a few more, all, if none is similar."""
+
+SIMILAR, ALIKE = 0.4, 0.6
+"""Least similarity, 0 to 1, of a name that is offered, and of one beside which the dissimilar ones are left out."""
+
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+|[0-9]+|[^\W_]")
+_SIDES = {"l": "left", "r": "right"}
+
+
+def nearest_names(name: str, known: Collection[str]) -> list[str]:
+    """The known names that are most similar to a name, the best first.
+
+    Neither case nor the order of words matters, and "l" and "r" are sides: `hand_left`, `LeftHand` and `l_hand` are
+    nearest to `left_hand`. Of at most six names all are offered if none is alike.
+    """
+    given = _spellings(name[:SHOWN])
+    scores = {}
+    for one in known:
+        pairs = zip(given, _spellings(one[:SHOWN]), strict=True)
+        scores[one] = max(SequenceMatcher(None, theirs, mine).ratio() for mine, theirs in pairs)
+    order = sorted(scores, key=lambda one: (-scores[one], one))
+    if len(order) <= OFFERED + 2 and (not order or scores[order[0]] < ALIKE):
+        return order
+    return [one for one in order[:OFFERED] if scores[one] >= SIMILAR] or order[: OFFERED + 2]
+
+
+def _spellings(name: str) -> tuple[str, str]:
+    """A name in lower case, and its words in the order of the alphabet."""
+    words = [word.lower() for word in _WORD.findall(name)]
+    return name.lower(), " ".join(sorted(_SIDES.get(word, word) for word in words))
 
 
 class WholebodyError(Exception):
@@ -36,7 +70,7 @@ class UnknownNameError(WholebodyError, KeyError):
             where: the place, such as "goal 2" or "task.toml, key goals[1].frame".
         """
         known = sorted(set(known))
-        near = get_close_matches(str(name)[:SHOWN], known, n=4, cutoff=0.4) or known[:6]
+        near = nearest_names(str(name), known)
         hint = f"did you mean {', '.join(map(one_line, near))}?" if near else "there are none."
         place = f"{where}: " if where else ""
         self.kind, self.name, self.known = kind, name, tuple(known)

@@ -103,7 +103,7 @@ def _opened(path: str | PathLike[str], kind: str, largest: int) -> Iterator[int]
     try:
         descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe would wait for its writer
     except FileNotFoundError:
-        raise FileFormatError(f"{kind} {_named(path)}: there is no such file") from None
+        raise FileFormatError(f"{kind} {_named(path)}: there is no such file{_looked_in(path)}") from None
     except (OSError, ValueError) as error:
         why = error.strerror if isinstance(error, OSError) else "no file system takes the name"
         raise FileFormatError(f"{kind} {_named(path)}: cannot be opened ({why}); give another file") from None
@@ -117,6 +117,13 @@ def _opened(path: str | PathLike[str], kind: str, largest: int) -> Iterator[int]
         yield descriptor
     finally:
         os.close(descriptor)
+
+
+def _looked_in(path: str | PathLike[str]) -> str:
+    """The folder in which a relative path was looked for, for a message."""
+    with suppress(OSError):  # the folder itself may be gone
+        return "" if os.path.isabs(path) else f" in {_named(Path.cwd())}"
+    return ""
 
 
 def _too_large(path: str | PathLike[str], kind: str, largest: int) -> FileFormatError:

@@ -32,6 +32,9 @@ LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 _KINDS: dict[str, tuple[type, ...]] = {
     "goals": (Goal,), "constraints": (Constraint,), "bounds": (Bound,), "measures": (Measure,)
 }  # fmt: skip
+_ARGUMENTS: dict[str, tuple[type, ...]] = {
+    "goals": (Goal,), "constraints": (Constraint, Bound), "measures": (Measure,)
+}  # fmt: skip
 
 
 class Problem(checks.Settled):
@@ -98,8 +101,8 @@ class Problem(checks.Settled):
         self._revision = scene.revision
         self.start = _start(scene, start)
         self.clearance = _clearance(clearance)
-        terms = [*_checked(goals, (Goal,), "goals")]
-        given = [*_checked(constraints, (Constraint, Bound), "constraints")]
+        terms = [*_checked(goals, _ARGUMENTS["goals"], "goals")]
+        given = [*_checked(constraints, _ARGUMENTS["constraints"], "constraints")]
         self.measures_given = measures is not None
         moving = checks.flag(range_of_motion, "range_of_motion")
         usual = default_measures(scene, ranges=moving)
@@ -351,14 +354,17 @@ def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
     for number, term in enumerate(listed):
         if not isinstance(term, kinds):
             wanted = " or ".join(kind.__name__ for kind in kinds)
-            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; see wholebody.tasks")
+            home = next((name for name, taken in _ARGUMENTS.items() if isinstance(term, taken)), "")
+            mend = f"give it in {home}=[...]" if home else "see wholebody.tasks"
+            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {mend}")
     return listed
 
 
 def _owner_pair(scene: Scene, pair: Any) -> tuple[str, str]:
     known = {*scene.figure.segments, *scene.objects}
     if not isinstance(pair, (tuple, list)) or len(pair) != 2:
-        raise InputError(f"touching takes pairs of names such as ('right_hand', 'table'), not {checks.shown(pair)}")
+        told = checks.shown(pair)
+        raise InputError(f"touching takes a list of pairs of names, such as [('right_hand', 'table')], not of {told}")
     for name in pair:
         checks.known(name, known, "segment or object", "touching")
     return str(pair[0]), str(pair[1])

@@ -9,13 +9,14 @@ from threading import RLock
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
 from wholebody.errors import InputError
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import PairTable
-from wholebody.geometry.shapes import Shape
+from wholebody.geometry.shapes import Box, Capsule, Cylinder, Ellipsoid, Hull, Mesh, Shape, Sphere
 from wholebody.matter.body import Body
 from wholebody.matter.inertia import mass_properties
 from wholebody.matter.materials import DEFAULT, Material
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
 
 FARTHEST_LIKELY = 100.0  # m: a thing farther than this from the origin is probably placed in millimetres
+WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
@@ -220,6 +222,7 @@ class SceneContents(checks.Settled):
         seconds = None if over is None else checks.time_step(over, f"move {checks.shown(name)}: over")
         with self._lock:
             thing = self._object(name)
+            _warn_of_units(name, place)
             motion = None if seconds is None else Motion(thing.placement, seconds)
             moved = self._objects[name] = replace(thing, placement=place, motion=motion)
             if self._built is not None:
@@ -255,9 +258,7 @@ class SceneContents(checks.Settled):
         checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
-        if (far := float(max(abs(place.translation)))) > FARTHEST_LIKELY:
-            told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
-            warnings.warn(told, stacklevel=3)
+        _warn_of_units(name, place, shape)
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
@@ -306,3 +307,37 @@ class SceneContents(checks.Settled):
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._lock = RLock()
+
+
+def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> None:
+    """Warn of a place and a size that are hardly metres."""
+    if (far := float(max(abs(place.translation)))) > FARTHEST_LIKELY:
+        told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
+        warnings.warn(told, stacklevel=4)
+    extent = _extent(shape)
+    if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
+        size = " x ".join(f"{length:.4g}" for length in extent)
+        mend = (
+            "wb.Mesh(..., scale=0.001) reads millimetres"
+            if isinstance(shape, Mesh)
+            else "divide millimetres by 1000, centimetres by 100"
+        )
+        told = f"{name!r} measures {size} m; lengths are in metres: {mend}"
+        warnings.warn(told, stacklevel=4)
+
+
+def _extent(shape: Shape | None) -> tuple[float, ...]:
+    """Full lengths along the axes of a shape, metres; zero for one of which they are not known or endless."""
+    match shape:
+        case Box():
+            return shape.size
+        case Sphere():
+            return (2.0 * shape.radius,)
+        case Capsule() | Cylinder():
+            return 2.0 * shape.radius, shape.length
+        case Ellipsoid():
+            return tuple(2.0 * length for length in shape.semi_axes)
+        case Mesh() | Hull():
+            points = shape.vertices if isinstance(shape, Mesh) else shape.points
+            return tuple(np.ptp(points, axis=0).tolist())
+    return (0.0,)

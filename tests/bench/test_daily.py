@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
-from wholebody.bench.daily import DailyRow, drag, processor_seconds, reach, report
+from wholebody.bench.daily import DailyRow, drag, maps, processor_seconds, reach, report
+from wholebody.cli.main import main
 
 
 def test_the_processor_seconds_of_children_count() -> None:
@@ -34,11 +36,24 @@ def test_a_drag_stays_out_of_the_boxes() -> None:
     assert float(row.told.split()[2]) <= 0.1
 
 
+def test_two_processes_find_what_one_does() -> None:
+    one, two = maps([(3, 2, 2)])
+    assert (one.processes, two.processes) == (1, 2)
+    assert two.told.split("; ")[1] == one.told
+    assert min(one.clock, two.clock) > 0.0
+
+
 def test_the_table_has_a_line_for_each_row() -> None:
     rows = [
-        DailyRow("reach map", 10_000, 12.5, 0.0, 90.0, "9,000 reached"),
-        DailyRow("frame", 3, 0.002, 0.004, 0.0, ""),
+        DailyRow("reach map", 10_000, 2, 12.5, 0.0, 7.0, 90.0, "9,000 reached"),
+        DailyRow("frame", 3, 1, 0.002, 0.004, 0.0021, 0.0, ""),
     ]
     text = report(rows, {"processor": "X", "cores": "2", "load": "0.1 in the minute before"})
-    assert "| reach map | 10,000 | 12,500.0 |  | 90,000.0 | 9,000 reached |" in text
-    assert "| frame | 3 | 2.0 | 4.0 |  |  |" in text
+    assert "| reach map | 10,000 | 2 | 12,500.0 |  | 7,000.0 | 90,000.0 | 9,000 reached |" in text
+    assert "| frame | 3 | 1 | 2.0 | 4.0 | 2.1 |  |  |" in text
+
+
+def test_a_part_is_measured_alone(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "daily", "--quick", "--parts", "maps", "--out", str(tmp_path)]) == 0
+    assert "reach map, 50, processes 2" in capsys.readouterr().out
+    assert {path.name for path in tmp_path.iterdir()} == {"daily-maps.csv", "daily-maps.md"}

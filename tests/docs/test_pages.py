@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import os
 import re
+import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+
+from wholebody.cli.main import main
 
 
 @pytest.mark.parametrize(
@@ -35,8 +38,8 @@ def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatc
     monkeypatch.chdir(tmp_path)
     names = _run(root / page)
     assert names
-    if "solution" in names:
-        assert names["solution"].solved
+    for name in {"solution", "taken", "put"} & names.keys():
+        assert names[name].solved, name
 
 
 def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -58,6 +61,20 @@ def test_configurations_of_pink_and_mujoco_are_starts(
     names = _run(root / "docs/how-to/warm-start.md")
     assert capsys.readouterr().out.split() == ["solved", "solved"]
     np.testing.assert_allclose(names["start"], names["configuration"].q)
+
+
+def test_the_study_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The file and the command of the page, beside the packaged task that the file names."""
+    page = (root / "docs/studies.md").read_text()
+    block = re.search(r"```toml\n# (\S+)\n(.*?)```", page, re.DOTALL)
+    command = re.search(r"^\$ wholebody (study .*)$", page, re.MULTILINE)
+    assert block
+    assert command
+    monkeypatch.chdir(tmp_path)
+    shutil.copyfile(root / "examples/tasks/shelf.toml", "shelf.toml")
+    Path(block[1]).write_text(block[2])
+    assert main(command[1].split()) == 0
+    assert "solved" in Path("out/shelf-study/cases.csv").read_text()
 
 
 def _run(page: Path) -> dict[str, Any]:

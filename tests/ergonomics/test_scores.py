@@ -257,6 +257,14 @@ def test_one_leg_is_told_from_two(person: wb.Figure) -> None:
     assert wb.reba(person, lifted).right.legs == 2
 
 
+def test_scores_print_as_a_table(person: wb.Figure) -> None:
+    found = wb.ergonomics_of(person, person.posture("standing"))
+    head, rula, *rest = str(found).splitlines()
+    assert head.split() == ["score", "left", "right", "worse"]
+    assert rula.split()[:3] == ["RULA", str(found.rula.left.score), str(found.rula.right.score)]
+    assert [line.split()[0] for line in rest] == ["REBA", "OWAS", "strength", "seat"]
+
+
 def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figure) -> None:
     found = wb.ergonomics_of(person, bent(person, left_shoulder_flexion=120, left_shoulder_abduction=30))
     colors = found.colors(person)

@@ -57,3 +57,11 @@ def test_a_thing_does_not_hide_its_own_surface(person: wb.Figure) -> None:
     scene, point = wb.Scene(person), ahead(person, 0, -15)
     scene.add(wb.Sphere(0.05), name="ball", at=ahead(person, 0, -15, 1.05))
     assert wb.sight(scene, person.posture("standing"), point).seen
+
+
+def test_a_thing_does_not_hide_its_own_middle(person: wb.Figure) -> None:
+    scene, point = wb.Scene(person), ahead(person, 0, -15)
+    scene.add(wb.Box((0.3, 0.3, 0.3)), name="clock", at=point)
+    assert wb.sight(scene, person.posture("standing"), point).seen
+    scene.add(wb.Box((0.02, 0.3, 0.3)), name="board", at=ahead(person, 0, -15, 0.5))
+    assert wb.sight(scene, person.posture("standing"), point).hidden_by == "board"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
+from wholebody.studies.task_files import TaskFile
 
 pytestmark = pytest.mark.usefixtures("one_process")
 
@@ -143,3 +145,33 @@ def test_what_cannot_vary_is_refused(folder: Path) -> None:
         wb.study(folder / "task.toml", people=["F6"])
     with pytest.raises(wb.InputError, match="target"):
         wb.study(folder / "task.toml", targets=[(0.0, 1.0)])
+
+
+def test_a_function_of_the_figure_alone_is_refused() -> None:
+    def task(figure: wb.Figure) -> wb.Problem:
+        return wb.Problem(wb.Scene(figure))
+
+    with pytest.raises(wb.InputError, match=r"takes \(figure.*\).*def task\(figure, target, layout\)"):
+        wb.study(task, people=["F5"])  # type: ignore[arg-type]
+    with pytest.raises(wb.InputError, match="a figure, a target and a layout"):
+        wb.accommodation(task, count=1)  # type: ignore[arg-type]
+
+
+def test_what_was_refused_is_told_with_its_reason() -> None:
+    def task(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
+        return wb.Problem(wb.Scene(figure), goals=[wb.Point("no such frame", (0.0, 0.0, 1.0))])
+
+    assert "first refused: F5, Point: no frame is called 'no such frame'" in repr(wb.study(task, people=["F5"]))
+    told = repr(wb.accommodation(task, count=1))
+    assert told.startswith("Accommodation of 2 people: 0%")
+    assert "first refused: " in told
+
+
+def test_a_task_file_is_found_by_a_process_in_another_folder(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(folder)
+    file = TaskFile(Path("task.toml"))
+    (folder / "elsewhere").mkdir()
+    monkeypatch.chdir(folder / "elsewhere")
+    again = pickle.loads(pickle.dumps(file))
+    assert again.path == folder / "task.toml"
+    assert again.task.problem.scene.objects.keys() == {"post"}

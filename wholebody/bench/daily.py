@@ -1,11 +1,11 @@
-"""What is done every day, in seconds of the processor: reach maps, dragging in a browser, pictures and movies."""
+"""What is done every day, by processor and clock: reach maps, dragging in a browser, pictures and movies."""
 
 from __future__ import annotations
 
 import os
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from statistics import median
 
@@ -35,16 +35,20 @@ class DailyRow:
     Attributes:
         what: in words.
         count: places, frames or pictures.
+        processes: that worked beside each other.
         cpu: seconds of the processor of all processes, of one map, frame or picture; the median of frames.
         p95: likewise, of frames; 0 where there is one measurement.
+        clock: seconds by the clock, likewise; tells little on a machine that does other work.
         asked: seconds of the clock on two cores that are asked; 0 for none.
         told: counts of the outcome, in words.
     """
 
     what: str
     count: int
+    processes: int
     cpu: float
     p95: float
+    clock: float
     asked: float
     told: str
 
@@ -52,32 +56,46 @@ class DailyRow:
 ASKED = {50: 3.0, 10_000: 90.0}  # s: of a reach map of so many places on two cores
 
 
-def measure(*, quick: bool = False) -> Iterator[DailyRow]:
+def measure(part: str, *, quick: bool = False) -> Iterator[DailyRow]:
     """Measure one after the other.
 
     Args:
+        part: "maps", "drag" or "pictures".
         quick: the smallest map, and few frames.
     """
-    for counts in GRIDS[:1] if quick else GRIDS:
-        yield reach(counts)
-    yield drag(20 if quick else DRAG_FRAMES)
-    yield from pictures(4 if quick else MOVIE_FRAMES)
+    if part == "maps":
+        yield from maps(GRIDS[:1] if quick else GRIDS)
+    elif part == "drag":
+        yield drag(20 if quick else DRAG_FRAMES)
+    else:
+        yield from pictures(4 if quick else MOVIE_FRAMES)
 
 
-def reach(counts: tuple[int, int, int]) -> DailyRow:
-    """Map the right index finger of a seated woman over a desk with a monitor, by one process."""
+def maps(grids: Sequence[tuple[int, int, int]]) -> Iterator[DailyRow]:
+    """Each map by one process and by two; the second tells how many times faster it was."""
+    reach((2, 2, 2))  # loads what a first solve needs
+    for counts in grids:
+        one = reach(counts)
+        yield one
+        both = reach(counts, jobs=2)
+        yield replace(both, told=f"{one.clock / both.clock:.2f} times as fast as by one; {both.told}")
+
+
+def reach(counts: tuple[int, int, int], jobs: int = 1) -> DailyRow:
+    """Map the right index finger of a seated woman over a desk with a monitor."""
     scene = wb.Scene(wb.load("human", sex="female", stature=1.65)).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.70, 1.40, 0.03)), name="desk", at=(0.62, 0.0, 0.74))
     scene.add(wb.Box((0.03, 0.50, 0.32)), name="monitor", at=(0.72, 0.0, 0.98))
     held = [wb.Hold("pelvis"), wb.Hold("left_foot"), wb.Hold("right_foot")]
     problem = wb.Problem(scene, "sitting", constraints=held, clearance=0.005)
     low, high = np.array(CORNERS)
-    before = time.process_time()
-    found = wb.reach_map(problem, "right_index_tip", low, high, (high - low) / (np.array(counts) - 1))
-    spent = time.process_time() - before
+    before, began = processor_seconds(), time.perf_counter()
+    found = wb.reach_map(problem, "right_index_tip", low, high, (high - low) / (np.array(counts) - 1), jobs=jobs)
+    spent, clock = processor_seconds() - before, time.perf_counter() - began
     told = ", ".join(f"{count:,} {name}" for name, count in found.counts().items())
     places = int(np.prod(counts))
-    return DailyRow("reach map", places, spent, 0.0, ASKED.get(places, 0.0), told)
+    asked = ASKED.get(places, 0.0) if jobs > 1 else 0.0
+    return DailyRow("reach map", places, jobs, spent, 0.0, clock, asked, told)
 
 
 def drag(frames: int) -> DailyRow:
@@ -88,7 +106,7 @@ def drag(frames: int) -> DailyRow:
         place = (rng.uniform(0.35, 0.9), rng.uniform(-0.9, 0.9), rng.uniform(0.2, 1.6))
         scene.add(wb.Box(tuple(rng.uniform(0.05, 0.15, 3))), name=f"box {number}", at=place)
     problem = wb.Problem(scene, constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Balance()])
-    dragged, times, deepest = LiveDrag(problem), [], 0.0
+    dragged, times, clocks, deepest = LiveDrag(problem), [], [], 0.0
     with Scratch() as folder:
         page = LivePage(dragged, folder / "posture.toml", 8471)
         try:
@@ -96,14 +114,16 @@ def drag(frames: int) -> DailyRow:
             middle = dragged.place("right_palm") + (0.25, 0.0, 0.25)
             for turn in 2.0 * np.pi * np.arange(frames) / 100.0:
                 target = middle + 0.3 * np.array((np.sin(turn), 0.5 * np.sin(2.0 * turn), -np.cos(turn)))
-                before = time.thread_time()
+                before, began = time.thread_time(), time.perf_counter()
                 frame = page.follow(target)
                 times.append(time.thread_time() - before)
+                clocks.append(time.perf_counter() - began)
                 deepest = max(deepest, frame.overlap)
         finally:
             page.stop()
     p95 = float(np.quantile(times, 0.95))
-    return DailyRow("frame of a drag", frames, median(times), p95, 1 / 60, f"deepest overlap {1e3 * deepest:.4f} mm")
+    told = f"deepest overlap {1e3 * deepest:.4f} mm"
+    return DailyRow("frame of a drag", frames, 1, median(times), p95, median(clocks), 1 / 60, told)
 
 
 def pictures(frames: int) -> Iterator[DailyRow]:
@@ -123,16 +143,17 @@ def pictures(frames: int) -> Iterator[DailyRow]:
     with Scratch() as folder, wb.Viewer(scene) as viewer:
         viewer.show(first)
         viewer.picture(folder / "first.png", PICTURE)
-        before = processor_seconds()
+        before, began = processor_seconds(), time.perf_counter()
         viewer.show(last)
         viewer.picture(folder / "later.png", PICTURE)
-        yield DailyRow("picture after the first", 1, processor_seconds() - before, 0.0, 1.5, "960 x 720")
+        spent, clock = processor_seconds() - before, time.perf_counter() - began
+        yield DailyRow("picture after the first", 1, 1, spent, 0.0, clock, 1.5, "960 x 720")
         viewer.play(motion, 1 / 25)
         viewer.picture(folder / "begin.png", MOVIE)
-        before = processor_seconds()
+        before, began = processor_seconds(), time.perf_counter()
         viewer.movie(folder / "motion.gif", MOVIE)
-        spent = (processor_seconds() - before) / frames
-        yield DailyRow("picture of a movie", frames, spent, 0.0, 0.1, "640 x 480")
+        spent, clock = (processor_seconds() - before) / frames, (time.perf_counter() - began) / frames
+        yield DailyRow("picture of a movie", frames, 1, spent, 0.0, clock, 0.1, "640 x 480")
 
 
 def processor_seconds() -> float:
@@ -142,7 +163,7 @@ def processor_seconds() -> float:
         InputError: there is no /proc.
     """
     if not Path("/proc/self/stat").is_file():
-        raise InputError("measuring pictures needs /proc, which tells what Chromium spent; run it on Linux")
+        raise InputError("measuring needs /proc, which tells what other processes spent; run it on Linux")
     parent, spent = {}, {}
     for entry in Path("/proc").iterdir():
         try:
@@ -150,7 +171,8 @@ def processor_seconds() -> float:
         except OSError:  # it has ended
             continue
         if fields:
-            parent[int(entry.name)], spent[int(entry.name)] = int(fields[1]), int(fields[11]) + int(fields[12])
+            parent[int(entry.name)] = int(fields[1])
+            spent[int(entry.name)] = sum(map(int, fields[11:15]))  # its own, and that of its children that have ended
     total = 0
     for process in parent:
         above = process

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import is_number
+from wholebody.errors import InputError, UnknownNameError, nearest_names
 
 
 class Commands(Protocol):
@@ -15,6 +17,48 @@ class Commands(Protocol):
 
     def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
         """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
+
+
+NUMBERS = re.compile(r"-[\d.][\d.,eE+-]*")
+"""A negative number, or numbers joined by commas of which the first is negative."""
+
+JOINED = "X,Y,Z"
+"""How the help shows numbers that are joined by commas."""
+
+
+class Parser(argparse.ArgumentParser):
+    """A parser whose messages about unknown commands and options name the nearest known ones.
+
+    A word such as -0.3,0.5,1.2 is a value, as a negative number is for `argparse`.
+    """
+
+    def __init__(self, *given: Any, **settings: Any) -> None:
+        """As `argparse` does."""
+        super().__init__(*given, **settings)
+        self._negative_number_matcher = NUMBERS
+
+    def parse_known_args(  # type: ignore[override]
+        self, args: Sequence[str] | None = None, namespace: Any = None
+    ) -> tuple[argparse.Namespace, list[str]]:
+        """As `argparse` does; what a command does not know is told with the options of that command."""
+        found, rest = super().parse_known_args(args, namespace)
+        for word in rest[:1]:
+            if is_number(word) and any(option.metavar == JOINED for option in self._actions):
+                self.error(f"{word} belongs to no option; join numbers by commas, such as 0.3,-0.4,1.0")
+            if word.startswith("-") and not is_number(word):
+                self.error(f"no option is called {word!r}; {_did_you_mean(word, self._option_string_actions)}")
+        return found, rest
+
+    def error(self, message: str) -> NoReturn:
+        """Print the usage and the message, and end with 2."""
+        if wrong := re.search(r"invalid choice: '(.*)' \(choose from (.*)\)", message):
+            word, choices = wrong[1], [choice.strip("'") for choice in wrong[2].split(", ")]
+            message = f"{message}; {_did_you_mean(word, choices)}"
+        super().error(message)
+
+
+def _did_you_mean(word: str, known: Iterable[str]) -> str:
+    return f"did you mean {', '.join(nearest_names(word, tuple(known)))}?"
 
 
 PERSON = ("sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands")

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Sequence
 from importlib import import_module
 
+from wholebody.cli.arguments import Parser
 from wholebody.errors import WholebodyError
 from wholebody.version import __version__
 
@@ -34,7 +35,7 @@ exit codes:
 def parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     """Return the parser of some commands; it loads their modules alone."""
     shape = argparse.RawDescriptionHelpFormatter
-    top = argparse.ArgumentParser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
+    top = Parser(prog="wholebody", description=DESCRIPTION, epilog=EXIT_CODES, formatter_class=shape)
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:

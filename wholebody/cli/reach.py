@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.arguments import JOINED, Commands
 
 HELP = "map the places that a hand or another frame can reach"
 DESCRIPTION = """\
@@ -28,8 +28,8 @@ def add_to(commands: Commands) -> None:
     parser = commands.add_parser("reach", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
     parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file: figure, things, constraints")
     parser.add_argument("--frame", required=True, metavar="NAME", help="the frame that reaches")
-    parser.add_argument("--low", required=True, metavar="X,Y,Z", help="least corner of the grid, metres")
-    parser.add_argument("--high", required=True, metavar="X,Y,Z", help="greatest corner")
+    parser.add_argument("--low", required=True, metavar=JOINED, help="least corner of the grid, metres")
+    parser.add_argument("--high", required=True, metavar=JOINED, help="greatest corner")
     parser.add_argument("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)")
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)")
     parser.add_argument("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches")

@@ -69,6 +69,14 @@ class Ergonomics:
         made.append(("seat", "", "", self.seat))
         return made
 
+    def __str__(self) -> str:
+        """The table, a row a line."""
+        table = [("score", "left", "right", "worse"), *self.rows()]
+        wide = [max(len(row[column]) for row in table) for column in range(3)]
+        return "\n".join(
+            f"{score:{wide[0]}}  {left:{wide[1]}}  {right:{wide[2]}}  {worse}" for score, left, right, worse in table
+        )
+
     def summary(self) -> dict[str, Any]:
         """All of it as plain numbers and texts; angles in degrees."""
         scores = {}

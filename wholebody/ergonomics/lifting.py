@@ -88,6 +88,13 @@ class Lift:
         if self.load is not None:
             checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg")
 
+    def __str__(self) -> str:
+        """The limit, what makes it zero, and the lifting index of a load."""
+        none = [name for name, value in self.multipliers.items() if value == 0.0]
+        why = f" ({' and '.join(none)} = 0)" if none else ""
+        told = "" if self.index is None else f", lifting index {self.index:.2f} with {self.load:g} kg"
+        return f"at most {self.limit:.1f} kg by the NIOSH equation{why}{told}"
+
     @property
     def multipliers(self) -> dict[str, float]:
         """HM, VM, DM, AM, FM and CM by name, each 0 to 1."""

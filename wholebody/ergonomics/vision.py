@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi, radians
+from typing import Any
 
 import coal
 import numpy as np
@@ -97,6 +98,8 @@ class Sight:
 def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) -> Sight:
     """Whether a person in a posture sees a point, without turning the head.
 
+    A thing that the point is in, or on the surface of, is what is looked at and hides nothing.
+
     Args:
         scene: with a figure that has the frame "gaze".
         q: (nq,) posture.
@@ -131,14 +134,21 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
     turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (target - eyes) / distance)
     ray, at = coal.Capsule(RAY, length), coal.Transform3s(turn.matrix(), 0.5 * (eyes + target))
-    found, nearest = "", np.inf
-    for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True):
-        if owner in OWN:
-            continue
-        request, result = coal.CollisionRequest(), coal.CollisionResult()
-        there = coal.Transform3s(place.rotation, place.translation)
-        if coal.collide(piece.geometry, there, ray, at, request, result):
+    spot, found, nearest = coal.Transform3s(np.eye(3), target), "", np.inf
+    pieces = [
+        (piece.geometry, owner, place, coal.Transform3s(place.rotation, place.translation))
+        for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True)
+        if owner not in OWN
+    ]
+    looked_at = {owner for shape, owner, _, there in pieces if _meet(shape, there, coal.Sphere(RAY), spot)}
+    for shape, owner, place, there in pieces:
+        if owner not in looked_at and _meet(shape, there, ray, at):
             away = float(np.linalg.norm(np.asarray(place.translation) - eyes))
             if away < nearest:
                 found, nearest = owner, away
     return found
+
+
+def _meet(first: Any, there: coal.Transform3s, second: Any, at: coal.Transform3s) -> bool:
+    """Whether two convex shapes overlap."""
+    return bool(coal.collide(first, there, second, at, coal.CollisionRequest(), coal.CollisionResult()))

@@ -181,7 +181,7 @@ def body(
     if percentile is not None:
         if stature is not None and mass is not None:
             raise InputError("stature and mass are given, which leaves nothing to percentile; leave one out")
-        share = number(percentile, "percentile", 1.0, 99.0, "")
+        share = number(percentile, "percentile", 1.0, 99.0, "percent, such as 95")
         stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
         mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -19,6 +20,12 @@ from wholebody.records import as_dict
 
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
+
+FAR_OUT = 1.0
+"""Radians beyond a limit from which a value was probably meant in degrees."""
+
+SLIDING = "JointModelP"
+"""How the names of Pinocchio's prismatic joints begin."""
 
 HEAVIEST = 1e9
 """Kilograms: greatest mass carried by one joint."""
@@ -289,6 +296,11 @@ class Figure(checks.Settled):
         for name, given in values.items():
             joint = self.model.joints[self.joint_id(name)]
             value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
+            if joint.nq == 1 and not joint.shortname().startswith(SLIDING):
+                low, high = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
+                if not low - FAR_OUT <= value <= high + FAR_OUT and low <= np.radians(value) <= high:
+                    told = f"joint {name!r} is {value:g} rad, far out of its limits; {value:g} degrees are"
+                    warnings.warn(f"{told} {np.radians(value):.4g}", stacklevel=2)
             if name in self.followers:
                 q[joint.idx_q] = self.followers[name].leading(value)
             elif joint.nq == 1:

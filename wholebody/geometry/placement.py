@@ -60,8 +60,11 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         if np.isfinite(values).all() and np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROUNDING:
             raise InputError(f"{what}: the last row of the 4x4 matrix is {values[3].tolist()}, not [0, 0, 0, 1]")
         return _rigid(values[:3, :3], values[:3, 3], what)
+    angles = (
+        "; for angles give pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), position)" if values.shape == (6,) else ""
+    )
     raise InputError(
-        f"{what}: shape {values.shape} is none of (3,) position, (7,) position and quaternion, (4, 4) matrix"
+        f"{what}: shape {values.shape} is none of (3,) position, (7,) position and quaternion, (4, 4) matrix{angles}"
     )
 
 

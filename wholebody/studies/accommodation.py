@@ -52,7 +52,7 @@ class Accommodation:
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}"
+        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{self.records.first_refused()}"
 
 
 def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[str, dict[str, Any]]:

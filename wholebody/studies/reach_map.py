@@ -288,6 +288,12 @@ def _grid(low: Any, high: Any, step: Any) -> _Grid:
         steps = checks.numbers(step, (3,), f"{what}: step")
     if (steps < 1e-4).any():
         raise InputError(f"{what}: step is {steps.tolist()}; give 0.0001 m or more")
+    wide = most > least
+    if wide.any() and (steps[wide] > (most - least)[wide]).all():
+        size = ", ".join(f"{length:.4g}" for length in most - least)
+        raise InputError(
+            f"reach_map: step is {checks.shown(step)} m and the grid measures {size} m; give a smaller step"
+        )
     counts = np.floor((most - least) / steps + 1e-9) + 1
     if np.prod(counts) > MOST_PLACES:
         raise InputError(f"{what}: {np.prod(counts):.3g} places; give a greater step, at most {MOST_PLACES} places fit")

@@ -129,8 +129,13 @@ class Records(Sequence[SolveRecord]):
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
             f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
-            f"  goal missed most: {missed}"
+            f"  goal missed most: {missed}{self.first_refused()}"
         )  # fmt: skip
+
+    def first_refused(self) -> str:
+        """A line about the first that was refused, with its message; "" for none."""
+        first = next((one for one in self._records if one.outcome == REFUSED), None)
+        return "" if first is None else f"\n  first refused: {first.name}, {first.message}"
 
     def counts(self) -> dict[str, int]:
         """How many records have each outcome."""

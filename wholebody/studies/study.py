@@ -82,6 +82,7 @@ def study(
         make = file = TaskFile(checks.path(task, f"{what}: task"))
         chosen, mark = file.task.method if method is None else method, read_bytes(file.path, "task file")
     elif callable(task):
+        _check_takes_three(task, f"{what}: task")
         make, chosen, mark = task, "qp" if method is None else method, _source(task)
     else:
         raise InputError(f"study: task is {checks.shown(task)}; give the path of a task file, or a function")
@@ -109,6 +110,21 @@ def study(
             cases.append(Case(SolveRecord(", ".join(named.values()), factors=named), variant, asked))
         runs += runs_of(cases, RUN if warm_start else 1)
     return run_cases(runs, running, store)
+
+
+def _check_takes_three(task: Any, what: str) -> None:
+    """Refuse a function that cannot be called with a figure, a target and a layout."""
+    try:
+        told = inspect.signature(task)
+    except ValueError:  # a compiled function tells nothing
+        return
+    try:
+        told.bind(None, None, None)
+    except TypeError:
+        raise InputError(
+            f"{what} takes {told}; give one that takes a figure, a target and a layout, also where these do not vary: "
+            "def task(figure, target, layout)"
+        ) from None
 
 
 @dataclass(frozen=True)

@@ -31,6 +31,7 @@ class TaskFile:
             FileFormatError, UnknownNameError, InputError: as for `read_task`.
         """
         self.path = path
+        self._place = path.absolute()  # a process that reads it again may work in another folder
         self.contents = read_contents(path)
         self.task = task_from(self.contents, path)
 
@@ -79,7 +80,7 @@ class TaskFile:
         return task_from(with_values(self.contents, tables=tables), self.path).problem
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return TaskFile, (self.path,)
+        return TaskFile, (self._place,)
 
     def _figure(self, person: Mapping[str, Any]) -> Entry:
         entry = self.contents.one("figure")

@@ -150,8 +150,12 @@ def test_the_patches_cover_every_part_once() -> None:
         own = [patch for patch in patches if patch.name.startswith(f"{part.name}:")]
         corners = np.concatenate([patch.vertices[patch.faces].reshape(-1, 9) for patch in own])
         whole = part.surface.vertices[part.surface.faces].reshape(-1, 9)
-        assert len(corners) == len(whole)
-        np.testing.assert_array_equal(corners[np.lexsort(corners.T)], whole[np.lexsort(whole.T)])
+        assert len(whole) <= len(corners) < 1.7 * len(whole)  # some are cut at a border
+        uncut = {face.tobytes() for face in whole} & {face.tobytes() for face in corners}
+        assert len(uncut) > 0.6 * len(whole), part.name
+        assert volume(corners) == pytest.approx(volume(whole), rel=1e-9), part.name
+        _, numbers = np.unique(corners.reshape(-1, 3), axis=0, return_inverse=True)
+        assert is_closed(numbers.reshape(-1, 3)), part.name
         few = np.concatenate([patch.vertices[patch.coarse].reshape(-1, 9) for patch in own])
         assert 0 < len(few) < 0.7 * len(corners)
         places, numbers = np.unique(few.reshape(-1, 3), axis=0, return_inverse=True)

@@ -18,6 +18,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS
 from wholebody.figures.human import human_spec
 from wholebody.geometry.mesh_cache import cached_entry
+from wholebody.view.surface.borders import Bound, divided
 from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.nets import coarsened
@@ -93,13 +94,17 @@ class Surface(NamedTuple):
         place = np.array([names.index(segment) for segment in segments])
         found = []
         for part in self.parts:
-            strength = np.zeros((len(part.weights), len(names)))
+            weights = np.zeros((len(part.weights), len(segments)))
             for column in range(part.weights.shape[1]):
-                np.add.at(strength, (np.arange(len(strength)), place[part.bones[:, column]]), part.weights[:, column])
-            coarse = coarsened(part.surface)
-            owner, owner_coarse = (strength[faces].sum(axis=1).argmax(axis=1) for faces in (part.surface.faces, coarse))
+                np.add.at(weights, (np.arange(len(weights)), part.bones[:, column]), part.weights[:, column])
+            strength = np.zeros((len(weights), len(names)))
+            np.add.at(strength.T, place, weights.T)
+            bound = Bound(part.surface.vertices, part.surface.normals, weights, strength)
+            bound, fine, owner = divided(bound, part.surface.faces)
+            bound, coarse, owner_coarse = divided(bound, coarsened(part.surface))
+            bones, influence = bound.strongest()
             for number in np.unique(np.concatenate([owner, owner_coarse])):
-                faces, fewer = part.surface.faces[owner == number], coarse[owner_coarse == number]
+                faces, fewer = fine[owner == number], coarse[owner_coarse == number]
                 used, local = np.unique(np.concatenate([faces, fewer]), return_inverse=True)
                 local = local.reshape(-1, 3)
                 found.append(
@@ -107,12 +112,12 @@ class Surface(NamedTuple):
                         f"{part.name}:{names[number]}",
                         names[number],
                         part.color,
-                        part.surface.vertices[used],
-                        part.surface.normals[used],
+                        bound.vertices[used],
+                        bound.normals[used],
                         local[: len(faces)],
                         local[len(faces) :],
-                        part.bones[used],
-                        part.weights[used],
+                        bones[used],
+                        influence[used],
                     )
                 )
         return found

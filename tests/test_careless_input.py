@@ -1,0 +1,170 @@
+"""Legal but absurd input is warned of, and messages about wrong input name the mend."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.cli.main import main
+from wholebody.errors import nearest_names
+
+NAMES = ("left_hand", "right_hand", "left_palm", "right_palm", "right_index_tip", "left_index_tip", "head", "pelvis")
+
+
+@pytest.fixture(scope="module")
+def person() -> wb.Figure:
+    return wb.load("human")
+
+
+def problem(person: wb.Figure, **given: object) -> wb.Problem:
+    return wb.Problem(wb.Scene(person).add(wb.HalfSpace(), name="floor"), **given)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    "written", ["hand_left", "LeftHand", "l_hand", "hand_l", "Left Hand", "left-hand", "LEFT_HAND"]
+)
+def test_words_sides_and_case_are_recognised(written: str) -> None:
+    assert nearest_names(written, NAMES)[0] == "left_hand"
+
+
+def test_of_few_names_all_are_offered_if_none_is_alike() -> None:
+    assert set(nearest_names("ipopt", ("ccd", "dls", "newton", "placo", "qp"))) == {
+        "ccd",
+        "dls",
+        "newton",
+        "placo",
+        "qp",
+    }
+    assert nearest_names("QP", ("ccd", "dls", "newton", "placo", "qp"))[0] == "qp"
+    assert nearest_names("x", ()) == []
+
+
+def test_the_nearest_do_not_depend_on_the_order() -> None:
+    assert nearest_names("hand", NAMES) == nearest_names("hand", NAMES[::-1])
+
+
+@pytest.mark.parametrize(
+    ("shape", "told"),
+    [
+        (wb.Box((600, 1200, 40)), "600 x 1200 x 40 m"),
+        (wb.Sphere(300.0), "600 m"),
+        (wb.Cylinder(30.0, 750.0), "60 x 750 m"),
+        (wb.Mesh((450.0 * np.vstack([np.zeros(3), np.eye(3)]), [[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])),
+         "scale=0.001"),
+    ],
+)  # fmt: skip
+def test_a_thing_in_millimetres_is_warned_of(person: wb.Figure, shape: wb.Box, told: str) -> None:
+    with pytest.warns(UserWarning, match=told):
+        wb.Scene(person).add(shape, name="thing")
+
+
+@pytest.mark.parametrize(
+    "shape", [wb.HalfSpace(), wb.Box((200, 200, 0.1)), wb.Box((60, 30, 8)), wb.Box((0.6, 1.2, 0.04))]
+)
+def test_floors_and_rooms_are_not(person: wb.Figure, shape: wb.Box) -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        wb.Scene(person).add(shape, name="thing").move("thing", at=(20.0, 0.0, 0.0))
+
+
+def test_a_thing_that_is_moved_by_millimetres_is_warned_of(person: wb.Figure) -> None:
+    scene = wb.Scene(person).add(wb.Sphere(0.1), name="ball")
+    with pytest.warns(UserWarning, match="divide millimetres by 1000"):
+        scene.move("ball", at=(600.0, 0.0, 0.0))
+
+
+def test_angles_in_degrees_are_warned_of(person: wb.Figure) -> None:
+    start = person.posture("standing")
+    with pytest.warns(UserWarning, match=r"90 degrees are 1\.571"):
+        person.with_joints(start, {"left_elbow_flexion": 90})
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        person.with_joints(start, {"left_elbow_flexion": 3.0})  # a little out of the limits
+
+
+def test_frames_a_second_for_a_time_step_are_warned_of(person: wb.Figure) -> None:
+    with pytest.warns(UserWarning, match="give 1 / 60"):
+        wb.Clip(person, np.tile(person.posture("standing"), (3, 1)), dt=60, name="clip")
+
+
+@pytest.mark.parametrize(
+    ("color", "told"),
+    [
+        ("orang", r"did you mean orange"),
+        ("Light Grey", "did you mean lightgrey"),
+        ((255, 128, 0), "divide bytes by 255"),
+        ("#12", "'#rrggbb'"),
+    ],
+)
+def test_colours(person: wb.Figure, color: object, told: str) -> None:
+    with pytest.raises(wb.InputError, match=told):
+        wb.Scene(person).add(wb.Sphere(0.1), name="ball", color=color)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        ({"goals": [wb.Hold("left_foot")]}, r"give it in constraints=\[\.\.\.\]"),
+        ({"constraints": [wb.Point("left_palm", (0.5, 0.2, 1.0))]}, r"give it in goals=\[\.\.\.\]"),
+        ({"goals": [wb.Effort()]}, r"give it in measures=\[\.\.\.\]"),
+        ({"constraints": [wb.StepLimit(4.0), wb.Effort()]}, r"constraints\[1\] .*measures"),
+        ({"touching": ("right_hand", "floor")}, r"a list of pairs of names, such as \[\('right_hand', 'table'\)\]"),
+    ],
+)
+def test_terms_in_the_wrong_list(person: wb.Figure, given: dict[str, object], told: str) -> None:
+    with pytest.raises(wb.InputError, match=told):
+        problem(person, **given)
+
+
+@pytest.mark.parametrize(
+    ("call", "told"),
+    [
+        (lambda: wb.load("robots/arm.urdf"), "no such file in /"),
+        (lambda: wb.load("human", percentile=0.95), "percent, such as 95"),
+        (lambda: wb.Mesh("chair.stl"), "no such file in /"),
+        (lambda: wb.Mesh("/chair.stl"), "no such file$"),
+    ],
+)
+def test_messages_name_the_mend(call: Callable[[], object], told: str) -> None:
+    with pytest.raises(wb.WholebodyError, match=told):
+        call()
+
+
+def test_angles_of_a_placement(person: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match=r"rpyToMatrix"):
+        wb.Scene(person).add(wb.Sphere(0.1), name="ball", at=(0.6, 0.0, 0.7, 0.0, 0.0, 90.0))
+
+
+def test_a_reach_map_of_one_place_by_mistake(person: wb.Figure) -> None:
+    with pytest.raises(wb.InputError, match="step is 10 m"):
+        wb.reach_map(problem(person), "right_palm", (0.2, -0.5, 0.9), (0.6, 0.5, 1.2), step=10)
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["psoe", "task.toml"], "did you mean pose"),
+        (["pose", "task.toml", "--methd", "ccd"], "no option is called '--methd'; did you mean --method"),
+        (["bench", "compre"], "did you mean compare"),
+        (
+            ["reach", "task.toml", "--frame", "head", "--high", "1,1,1", "--low", "0.3", "-0.4", "1.0"],
+            "join numbers by commas",
+        ),
+    ],
+)
+def test_the_command_line(given: list[str], told: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(given)
+    assert ended.value.code == 2
+    assert told in capsys.readouterr().err
+
+
+def test_a_value_may_begin_with_a_negative_number(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    task = str(tmp_path / "task.toml")
+    assert main(["reach", task, "--frame", "left_palm", "--low", "-0.3,-0.4,1.0", "--high", "0.6,0.1,1.3"]) == 2
+    assert "task.toml" in capsys.readouterr().err  # the corners were understood, the task does not exist
