@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from wholebody.cli.arguments import Commands
 from wholebody.cli.bench.bodies import daily, human, robots
 from wholebody.cli.bench.comparing import compare, held_out, reproduce
@@ -24,6 +26,6 @@ COMMANDS = (
 def add_to(commands: Commands) -> None:
     """Add the command `bench` with its own commands."""
     parser = commands.add_parser("bench", help=HELP, description=DESCRIPTION)
-    kinds = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
+    kinds: Any = parser.add_subparsers(title="what to measure", metavar="WHAT", required=True)
     for command in COMMANDS:
         command.add_to(kinds)
