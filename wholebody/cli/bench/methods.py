@@ -33,6 +33,7 @@ def step(arguments: argparse.Namespace) -> None:
     from wholebody.bench.adapters import chosen_tools, differences
     from wholebody.bench.figure_track import figure_tracks
     from wholebody.bench.person_cost import person_costs
+    from wholebody.bench.step_goals import goal_lines
     from wholebody.bench.track import VARIANTS, track
     from wholebody.cli.demo import packaged_tasks
 
@@ -68,7 +69,7 @@ def step(arguments: argparse.Namespace) -> None:
         charts["step-distances"] = Chart(partial(step.least_distances, times), caption)
     publish(name, report, arguments, facts=facts, tables=tables, charts=charts)
     if not figures:
-        print("\n".join(step.goal_lines(rows)))
+        print("\n".join(goal_lines(rows)))
 
 
 @measuring(
