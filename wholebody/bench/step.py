@@ -21,11 +21,11 @@ from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
 from wholebody.bench.compare.statistics import BLOCK, NOTHING, quantile_ratio
 from wholebody.bench.report import render
-from wholebody.bench.step_goals import REFERENCE, goal_lines
 from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 from wholebody.errors import InputError
 
+REFERENCE = "placo"
 GREY = "#666666"
 THICK = "wholebody"  # drawn wide and first: with other solvers the same programs have the same answers, and hide it
 
@@ -223,7 +223,7 @@ def _ratio(name: str, mine: list[_Run], reference: list[_Run] | None, clock: str
 def step_report(
     rows: Sequence[StepRow], facts: Mapping[str, str], differences: Mapping[str, Sequence[str]],
     profile: Mapping[str, tuple[float, float]], refusals: Mapping[str, Mapping[str, str]] | None = None,
-    person: Sequence[Any] = (),
+    person: Sequence[Any] = (), goals: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
@@ -235,10 +235,10 @@ def step_report(
         refusals: of reaches of other figures than the human: the sentences of tools that do not take them, by reach
             and tool; None for the reaches of the human.
         person: rows of `person_cost`, what a person's defaults cost.
+        goals: sentences of `goal_lines`.
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]
-    goals = goal_lines(rows) if refusals is None else []
     return render(
         "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goals, track=setting,
         refusals=refusals, person=person, block=BLOCK,

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from wholebody.bench.step import REFERENCE, StepRow
 from wholebody.bench.track import CLEARANCE
 
-if TYPE_CHECKING:
-    from wholebody.bench.step import StepRow
-
-REFERENCE = "placo"
 JUDGED = ("free", "contact")  # reaches whose result is judged, beside their time
 HOT = ("wholebody", "wholebody/active_set")  # tools that begin from the last active set
 NOT_ASKED = (np.inf, np.inf)

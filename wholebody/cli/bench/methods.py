@@ -59,7 +59,8 @@ def step(arguments: argparse.Namespace) -> None:
     if not figures:
         humans = [track(name, steps) for name in VARIANTS]
         costs = person_costs(humans, packaged_tasks()["shelf"], PAIRS_OF_RUNS if repeats > 1 else 2)
-    report = step.step_report(rows, facts, stated, shares, refusals if figures else None, costs)
+    goals = [] if figures else goal_lines(rows)
+    report = step.step_report(rows, facts, stated, shares, refusals if figures else None, costs, goals)
     name = "step-figures" if figures else "step"
     tables: dict[str, Sequence[Any]] = {name: rows, f"{name}-times": times}
     charts = {f"{name}-times": Chart(partial(step.step_times, times), "Time of a step of every tool")}
@@ -68,8 +69,8 @@ def step(arguments: argparse.Namespace) -> None:
         caption = "Least distance of any pair after every step"
         charts["step-distances"] = Chart(partial(step.least_distances, times), caption)
     publish(name, report, arguments, facts=facts, tables=tables, charts=charts)
-    if not figures:
-        print("\n".join(goal_lines(rows)))
+    if goals:
+        print("\n".join(goals))
 
 
 @measuring(
