@@ -202,7 +202,7 @@ def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
     goal = MovingPoint(track.tip, np.array(track.targets[0]))
     speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
     bound = wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn)
-    kept = [*(wb.Hold(foot) for foot in track.feet), bound]
+    kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
     stated = wb.Problem(
         track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
     )  # fmt: skip
