@@ -36,7 +36,7 @@ def docs(tmp_path: Path) -> Path:
 
 
 def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("wholebody.cli.bench.step.PAIRS_OF_RUNS", 2)
+    monkeypatch.setattr("wholebody.cli.bench.methods.PAIRS_OF_RUNS", 2)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0

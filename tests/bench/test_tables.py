@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody.bench.machine import machine, sentence
-from wholebody.bench.step import StepRow, goal_lines
+from wholebody.bench.step import StepRow
+from wholebody.bench.step_goals import goal_lines, verdict
 from wholebody.bench.tables import read_rows, replace_section, write_rows
 from wholebody.errors import FileFormatError
 
@@ -104,3 +105,11 @@ def test_what_fell_short_is_said() -> None:
     assert not goal_lines([step_row(tool="wholebody/piqp", reach="free", ratio=0.5)])
     alone = step_row(tool="wholebody", reach="alone", ratio=math.nan, ratio_p95=math.nan)
     assert "nothing to compare with" in goal_lines([alone])[0]
+
+
+def test_a_target_within_an_interval_is_neither_reached_nor_missed_for_sure() -> None:
+    assert verdict((0.07, 0.06, 0.08), 0.08) == "reached"
+    assert verdict((0.07, 0.06, 0.09), 0.08) == "reached, with an interval that goes higher"
+    assert verdict((0.09, 0.07, 0.10), 0.08) == "missed, with an interval that goes lower"
+    assert verdict((0.10, 0.09, 0.12), 0.08) == "missed"
+    assert verdict((1e-4,), 1e-3) == "reached"

@@ -14,10 +14,10 @@ from pathlib import Path
 import numpy as np
 
 import wholebody as wb
-from wholebody.bench.adapters.own import MovingPoint
+from wholebody.bench.adapters.own import reach_problem
 from wholebody.bench.compare.statistics import median
 from wholebody.bench.step import quiet
-from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.bench.track import DT, Track
 from wholebody.tasks.base import Measure
 
 ASKED = 1.15  # times of what it costs without
@@ -64,24 +64,6 @@ def person_costs(courses: Sequence[Track], task: Path, repeats: int) -> list[Per
     return rows
 
 
-def reach_problem(course: Track, person: bool) -> tuple[wb.Problem, MovingPoint]:
-    """The problem of a reach with the default measures, and its goal; with a person's defaults or without."""
-    goal = MovingPoint(course.tip, np.array(course.targets[0]))
-    problem = wb.Problem(
-        course.scene,
-        course.start,
-        goals=[goal],
-        constraints=[
-            *(wb.Hold(foot) for foot in course.feet),
-            wb.StepLimit(JOINT_SPEED, root_velocity=ROOT_SPEED, root_turn=ROOT_TURN),
-        ],
-        clearance=course.clearance,
-        range_of_motion=person,
-        balance=None if person else False,
-    )
-    return problem, goal
-
-
 def without_defaults(problem: wb.Problem) -> wb.Problem:
     """The same problem without ranges of motion, reach cones and rhythm, and without balance if it is not stated."""
     measures: list[Measure] = [term for term in problem.measures if not isinstance(term, wb.Rhythm)]
@@ -100,7 +82,7 @@ def without_defaults(problem: wb.Problem) -> wb.Problem:
 
 def _follower(course: Track, person: bool) -> Callable[[], Iterator[float]]:
     """Follows a whole reach from standing; time of each step [us]."""
-    problem, goal = reach_problem(course, person)
+    problem, goal = reach_problem(course, range_of_motion=person, balance=None if person else False)
     tracker = wb.QP().tracker(problem, DT)
 
     def follow() -> Iterator[float]:

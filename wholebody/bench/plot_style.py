@@ -104,6 +104,13 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     return svg, png
 
 
+def band(panel: Any, y: float, value: float, ends: tuple[float, float], style: Style) -> Any:
+    """A figure as a marker on its interval, a band at a height; returns the marker, for a legend."""
+    panel.plot(ends, [y, y], color=style.color, linewidth=5.0, alpha=0.3, solid_capstyle="butt")
+    (line,) = panel.plot([value], [y], color=style.color, marker=style.marker, linestyle="")
+    return line
+
+
 DECADES = 2.6  # beyond which the labels of 2 and 5 would overlap their neighbours
 
 

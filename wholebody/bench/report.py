@@ -33,6 +33,13 @@ def render(name: str, **values: Any) -> str:
     return "\n".join(lines)
 
 
+def html(text: str) -> str:
+    """Markdown with tables as HTML."""
+    from markdown_it import MarkdownIt
+
+    return str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+
+
 @cache
 def _environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape

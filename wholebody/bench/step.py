@@ -28,11 +28,6 @@ from wholebody.errors import InputError
 REFERENCE = "placo"
 GREY = "#666666"
 THICK = "wholebody"  # drawn wide and first: with other solvers the same programs have the same answers, and hide it
-JUDGED = ("free", "contact")  # reaches whose result is judged, beside their time
-HOT = ("wholebody", "wholebody/active_set")  # tools that begin from the last active set
-NOT_ASKED = (np.inf, np.inf)
-ASKED = {**dict.fromkeys(HOT, (0.08, 0.10)), "wholebody/osqp": (0.35, 1.0)}
-"""Shares of the reference's median and p95 that steps should take at most; of other solvers nothing is asked."""
 
 
 @dataclass(frozen=True)
@@ -225,49 +220,10 @@ def _ratio(name: str, mine: list[_Run], reference: list[_Run] | None, clock: str
     return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
 
 
-def goal_lines(rows: Sequence[StepRow]) -> list[str]:
-    """What was to be reached and what was: a line for each of our solvers that something is asked of, on each reach."""
-    lines = []
-    for row in rows:
-        if not row.tool.startswith("wholebody"):
-            continue
-        hot = row.tool in HOT
-        median, p95 = ASKED.get(row.tool, NOT_ASKED)
-        if row.reach not in JUDGED:
-            median, p95 = (0.25, np.inf) if hot else NOT_ASKED
-        asked = [
-            (f"median {_span(row, 'ratio')} of {REFERENCE}'s", row.ratio, median),
-            (f"p95 {_span(row, 'ratio_p95')} of {REFERENCE}'s", row.ratio_p95, p95),
-        ]
-        if hot and row.reach in JUDGED:
-            others = [other for other in rows if other.reach == row.reach and not other.tool.startswith("wholebody")]
-            peers = [other.acceleration for other in others if np.isfinite(other.acceleration)]
-            short = 1e3 * CLEARANCE - row.least_mm
-            asked += [
-                (f"final error {row.final_error_mm:.2g} mm", row.final_error_mm, 1e-3),
-                (f"feet off by {row.foot_drift_mm:.2g} mm", row.foot_drift_mm, 2e-3),
-                (f"{max(short, 0.0):.2g} mm short of the clearance", short, 1e-3),
-                (f"acceleration {row.acceleration:.2f} rad/s²", row.acceleration, min(peers, default=np.nan)),
-            ]
-        parts = [
-            f"{name} (at most {most:.2g}: {'reached' if value <= most else 'missed'})"
-            for name, value, most in asked
-            if np.isfinite(value) and np.isfinite(most)
-        ]
-        if parts or hot:
-            lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
-    return lines
-
-
-def _span(row: StepRow, name: str) -> str:
-    value, low, high = (getattr(row, f"{name}{end}") for end in ("", "_low", "_high"))
-    return f"{value:.3f} [{low:.3f}, {high:.3f}]"
-
-
 def step_report(
     rows: Sequence[StepRow], facts: Mapping[str, str], differences: Mapping[str, Sequence[str]],
     profile: Mapping[str, tuple[float, float]], refusals: Mapping[str, Mapping[str, str]] | None = None,
-    person: Sequence[Any] = (),
+    person: Sequence[Any] = (), goals: Sequence[str] = (),
 ) -> str:  # fmt: skip
     """Tables of the tracking steps.
 
@@ -279,10 +235,10 @@ def step_report(
         refusals: of reaches of other figures than the human: the sentences of tools that do not take them, by reach
             and tool; None for the reaches of the human.
         person: rows of `person_cost`, what a person's defaults cost.
+        goals: sentences of `goal_lines`.
     """
     tools = dict.fromkeys(row.tool for row in rows)
     stated = [line for name in tools for line in differences.get(name, ())]
-    goals = goal_lines(rows) if refusals is None else []
     return render(
         "step.md", rows=rows, facts=facts, stated=stated, profile=profile, goals=goals, track=setting,
         refusals=refusals, person=person, block=BLOCK,

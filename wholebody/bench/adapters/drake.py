@@ -14,8 +14,9 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter, few
-from wholebody.bench.adapters.loop import kept_apart, pulls
+from wholebody.bench.adapters.loop import kept_apart, placements, pulls
 from wholebody.bench.adapters.one_call import OneCall
+from wholebody.bench.adapters.urdf import axis_of
 from wholebody.errors import InputError
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
@@ -67,8 +68,7 @@ class Drake(OneCall["_Plant"]):
 
     def depends_on(self, problem: Problem) -> tuple[Any, ...]:
         """The clearances, and where the pieces are."""
-        places = np.array([piece.placement.homogeneous for piece in problem.scene.geometry.geometryObjects])
-        return problem.clearances, places.tobytes()
+        return problem.clearances, placements(problem).tobytes()
 
     def build(self, problem: Problem) -> _Plant:
         """Build the plant."""
@@ -152,25 +152,15 @@ class _Plant:
         self.bodies.append(body)
         if joint.nq == 7 and index == 1:
             return  # drake lets a body without a joint float
-        kind = joint.shortname()
-        if joint.nv != 1 or not kind.startswith(("JointModelR", "JointModelP")):
-            raise InputError(
-                f"joint {name!r} is a {kind}; drake's plant is made for free roots, turning and sliding ones"
-            )
-        data = joint.createData()
-        joint.calc(data, pin.neutral(model))
-        motion = np.array(data.S).ravel()
-        slides = kind.startswith("JointModelP")
+        known = axis_of(model, index, "drake's plant is made for free roots, turning and sliding ones")
         at = self.plant.AddFrame(
             FixedOffsetFrame(f"{name}, before", parent.body_frame(), _pose(model.jointPlacements[index]))
         )
         lower, upper = (-np.inf, np.inf)
         if joint.nq == 1:
             lower, upper = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-        made = (PrismaticJoint if slides else RevoluteJoint)(
-            name, at, body.body_frame(), motion[:3] if slides else motion[3:], lower, upper
-        )
-        self.plant.AddJoint(made)
+        joint_class = PrismaticJoint if known.kind == "prismatic" else RevoluteJoint
+        self.plant.AddJoint(joint_class(name, at, body.body_frame(), known.axis, lower, upper))
         self._addresses.append((name, joint))
 
     def _paired(self, problem: Problem) -> list[tuple[Any, Any]]:

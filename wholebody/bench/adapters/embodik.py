@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, Adapter, few
-from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, pulls, size
+from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, placements, pulls, size
 from wholebody.bench.adapters.urdf import joint_name, piece_name, write_urdf
 from wholebody.files import Scratch
 from wholebody.methods.base import named_terms
@@ -74,7 +74,8 @@ class EmbodikLoop(Loop):
         """Write and read the model."""
         return _EmbodikStepper(problem)
 
-    def _unsupported(self, problem: Problem) -> list[str]:
+    def unsupported(self, problem: Problem) -> list[str]:
+        """What embodik cannot express."""
         refused = [where for where, term in named_terms(problem) if not isinstance(term, self.kinds)]
         free = problem.scene.figure.root == "free"
         return [*refused, "a free root (its URDF reader hangs all things on the root)"] if free else refused
@@ -92,7 +93,7 @@ class _EmbodikStepper:
         """Make the solver anew, since it keeps a memory of its steps, and the model where objects moved."""
         import embodik
 
-        if not np.array_equal(self._places(), self._placed):
+        if not np.array_equal(placements(self._problem), self._placed):
             self._read()
         problem = self._problem
         self._solver = solver = embodik.KinematicsSolver(self._robot)
@@ -142,16 +143,12 @@ class _EmbodikStepper:
 
         with Scratch() as folder:
             self._robot = embodik.RobotModel(str(write_urdf(self._problem.scene, self._frames, folder)))
-        self._placed, model, robot = self._places(), self._model, self._robot
+        self._placed, model, robot = placements(self._problem), self._model, self._robot
         self._index, self._dof = np.arange(model.nq), np.arange(model.nv)
         for number in range(1, model.njoints):
             joint, name = model.joints[number], joint_name(number)
             self._index[joint.idx_q : joint.idx_q + joint.nq] = robot.get_joint_config_index(name) + np.arange(joint.nq)
             self._dof[joint.idx_v] = robot.get_joint_velocity_index(name)
-
-    def _places(self) -> Array:
-        """Placements (n, 4, 4) of all pieces in what carries them."""
-        return np.array([piece.placement.homogeneous for piece in self._problem.scene.geometry.geometryObjects])
 
     def _keep_apart(self, room: float) -> None:
         """State the pairs: one least distance, and others for the pairs that have another."""

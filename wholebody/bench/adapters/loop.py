@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import operator
 import time
-from abc import ABC, abstractmethod
+from abc import ABC
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.bench.adapters.one_call import Outside
 from wholebody.figures.figure import Figure
 from wholebody.methods import differential
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError, named_terms, refusal
+from wholebody.methods.base import named_terms
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import Iteration, Settings
@@ -29,6 +28,7 @@ ITERATIONS = 200  # most, where nothing else is said
 STEPS = 10  # fewest of a frame where things move: rows keep what is beyond a clearance, and ask for the goal beside
 ROOM = 0.02  # m: pairs keep at least this beyond their clearances where things move: pink's default
 AHEAD = 1.5  # times as far as a thing moved in a frame, pairs keep beyond their clearances
+OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
 DECAY = 0.6  # of the measures' weight from one iteration to the next
 
 
@@ -55,19 +55,16 @@ class Stepper(differential.Stepper, Protocol):
         """
 
 
-class Loop(ABC):
+class Loop(Outside[Stepper], ABC):
     """A tool as a method: refuses what it cannot express, builds its model, and iterates its steps.
 
     Attributes:
-        tolerance: metres and radians to which goals and constraints are met.
-        iterations: most steps.
         kinds: terms that the tool can express, besides holds of whole frames.
         longest: most that anything moves in one step, radians and shares of the figure's size.
         margin: most that a pair keeps beyond its clearance, as a share of the figure's size: 1 mm for a person. Less
             fits into narrower gaps, more is against what linearised rows leave out.
     """
 
-    name: str
     longest: ClassVar[float] = 0.05
     margin: ClassVar[float] = 7e-4
     kinds: ClassVar[tuple[type, ...]] = (
@@ -77,35 +74,13 @@ class Loop(ABC):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
-        if not 1e-10 <= tolerance <= 0.1:
-            raise InputError(f"tolerance is {tolerance}; give metres from 1e-10 to 0.1")
-        self.tolerance, self.iterations = tolerance, ITERATIONS if iterations is None else iterations
-        self._built: tuple[tuple[Any, ...], Stepper] | None = None
+        super().__init__(tolerance, iterations)
         self._places: Array | None = None
         self._kept = 0.0
 
-    @abstractmethod
-    def build(self, problem: Problem) -> Stepper:
-        """Build the tool's model of a problem.
-
-        Raises:
-            InputError: the tool has no joint or shape of a kind that is needed.
-        """
-
-    def prepare(self, problem: Problem) -> None:
-        """Build what a solve needs.
-
-        Raises:
-            InputError: the tool cannot express the problem, or its scene changed after it was stated.
-        """
-        problem.check_fresh()
-        refused = self._unsupported(problem)
-        if refused:
-            raise UnsupportedTermError(self.name, refused)
-        asked = problem.scene, problem.goals, problem.constraints, problem.bounds, problem.measures, problem.clearances
-        same = self._built is not None and all(map(operator.is_, self._built[0], asked))
-        if not same:  # another start alone needs no other model
-            self._built = (asked, self.build(problem))
+    def depends_on(self, problem: Problem) -> tuple[Any, ...]:
+        """All but the start, which alone needs no other model."""
+        return problem.scene, problem.goals, problem.constraints, problem.bounds, problem.measures, problem.clearances
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture.
@@ -118,13 +93,12 @@ class Loop(ABC):
             InputError: the tool cannot express the problem, or its scene changed after it was stated.
         """
         began = time.perf_counter()
-        self.prepare(problem)
-        assert self._built is not None
-        stepper, room = self._built[1], self._room(problem)
+        stepper, room = self.ready(problem), self._room(problem)
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
-        settings = Settings(self.tolerance, self.iterations, longest, DECAY, best=True)
+        most = ITERATIONS if self.iterations is None else self.iterations
+        settings = Settings(self.tolerance, most, longest, DECAY, best=True)
         if room:
-            settings = with_values(settings, best=False, least=min(STEPS, self.iterations))
+            settings = with_values(settings, best=False, least=min(STEPS, most))
         with problem.borrow() as workspace, Control(None, progress) as control:
             stepper.begin(room)
             run = Iteration(problem, workspace, stepper, settings, control)
@@ -143,15 +117,7 @@ class Loop(ABC):
         self._kept = max(self._kept, ROOM, AHEAD * moved) if moved else self._kept
         return self._kept
 
-    def accepts(self, problem: Problem) -> str | None:
-        """None where the tool can express all terms; else the sentence that names those that it cannot."""
-        return refusal(self.name, self._unsupported(problem))
-
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """What follows the goals of a problem by solving every step anew."""
-        return SolvingTracker(self, problem, dt)
-
-    def _unsupported(self, problem: Problem) -> list[str]:
+    def unsupported(self, problem: Problem) -> list[str]:
         """What the tool cannot express, each with the reason where it is not plain."""
         refused = []
         for where, term in named_terms(problem):
@@ -160,6 +126,11 @@ class Loop(ABC):
             elif not isinstance(term, self.kinds):
                 refused.append(where)
         return refused
+
+
+def placements(problem: Problem) -> Array:
+    """Placements (n, 4, 4) of all pieces in what carries them."""
+    return np.array([piece.placement.homogeneous for piece in problem.scene.geometry.geometryObjects])
 
 
 def pulls(problem: Problem) -> list[Pull]:

@@ -14,7 +14,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import NEAR, Loop, Stepper, kept_apart, longest_moves, pulls, size
+from wholebody.bench.adapters.loop import NEAR, OUT, Loop, Stepper, kept_apart, longest_moves, placements, pulls, size
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 from wholebody.figures.figure import Figure
@@ -24,7 +24,6 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
 HOLDING = 10.0  # cost of what is held, where goals cost 1
-OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
 COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
 
 
@@ -101,7 +100,7 @@ class _MinkStepper:
         import mink
 
         problem, scene = self._problem, self._problem.scene
-        if room != self._room or not np.array_equal(self._places(), self._placed):
+        if room != self._room or not np.array_equal(placements(self._problem), self._placed):
             self._room = room
             self._compile()
         model = self._mujoco
@@ -147,11 +146,7 @@ class _MinkStepper:
 
         self._mujoco = mujoco.MjModel.from_xml_string(self._text())
         self._configuration = mink.Configuration(self._mujoco)
-        self._limits, self._placed = self._made_limits(), self._places()
-
-    def _places(self) -> Array:
-        """Placements (n, 4, 4) of all pieces in what carries them."""
-        return np.array([piece.placement.homogeneous for piece in self._problem.scene.geometry.geometryObjects])
+        self._limits, self._placed = self._made_limits(), placements(self._problem)
 
     def _site(self, place: Place, offset: Array | None = None) -> str:
         """Name of the site of a frame, or of a point in it; noted, so that the model gets it."""

@@ -10,6 +10,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from wholebody.bench.adapters.urdf import axis_of
 from wholebody.errors import InputError
 from wholebody.scene import Scene
 
@@ -60,22 +61,16 @@ def _body(model: Any, index: int, parent: ElementTree.Element) -> ElementTree.El
         ElementTree.SubElement(body, "inertial", pos="0 0 0", mass="1e-6", diaginertia="1e-9 1e-9 1e-9")
     if joint.nq == 7:
         ElementTree.SubElement(body, "freejoint", name=name)
-    elif joint.nv == 1 and joint.shortname().startswith(("JointModelR", "JointModelP")):
-        ElementTree.SubElement(body, "joint", {"name": name} | _motion(model, joint))
     else:
-        raise InputError(
-            f"joint {name!r} is a {joint.shortname()}; MJCF is written for free roots, turning and sliding joints"
-        )
+        ElementTree.SubElement(body, "joint", {"name": name} | _motion(model, index))
     return body
 
 
-def _motion(model: Any, joint: Any) -> dict[str, str]:
+def _motion(model: Any, index: int) -> dict[str, str]:
     """Kind, axis and limits of a joint of one degree of freedom."""
-    data = joint.createData()
-    joint.calc(data, pin.neutral(model))
-    motion = np.array(data.S).ravel()  # what the joint's own motion slides along and turns about
-    slides = joint.shortname().startswith("JointModelP")
-    attributes = {"type": "slide" if slides else "hinge", "axis": _text(motion[:3] if slides else motion[3:])}
+    joint = model.joints[index]
+    known = axis_of(model, index, "MJCF is written for free roots, turning and sliding joints")
+    attributes = {"type": "slide" if known.kind == "prismatic" else "hinge", "axis": _text(known.axis)}
     if joint.nq == 1:
         limits = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
         if np.isfinite(limits).all():

@@ -1,4 +1,4 @@
-"""Tools that find a posture by one call: they have no step that comparisons could repeat."""
+"""Tools as methods: what all of them have, and those that find a posture by one call, with no step to repeat."""
 
 from __future__ import annotations
 
@@ -17,22 +17,18 @@ from wholebody.solution import Solution, TraceEntry
 Built = TypeVar("Built")
 
 
-class OneCall(SolvesAnew, ABC, Generic[Built]):
-    """A tool as a method; `Built` is what it keeps from one solve to the next, and makes in `prepare`.
+class Outside(SolvesAnew, ABC, Generic[Built]):
+    """A tool as a method: refuses what it cannot express, and keeps what it builds while that is right.
 
     Attributes:
         name: as in reports.
         kinds: the terms that it can express.
-        way: how it finds a posture, as solutions say it.
-        failure: why there is none, where it finds none.
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most iterations; None for the tool's own default.
     """
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]
-    way: ClassVar[str]
-    failure: ClassVar[str]
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
@@ -47,11 +43,11 @@ class OneCall(SolvesAnew, ABC, Generic[Built]):
 
     @abstractmethod
     def build(self, problem: Problem) -> Built:
-        """What the tool needs besides goals, constraints and the start."""
+        """What the tool needs besides what may change.
 
-    @abstractmethod
-    def found(self, built: Built, problem: Problem) -> tuple[Array | None, bool]:
-        """The tool's posture (nq,), None where it has none, and whether it says that the posture meets everything."""
+        Raises:
+            InputError: the tool has no joint or shape of a kind that is needed.
+        """
 
     def unsupported(self, problem: Problem) -> list[str]:
         """Names of what the tool cannot express."""
@@ -67,25 +63,10 @@ class OneCall(SolvesAnew, ABC, Generic[Built]):
         Raises:
             InputError: the tool cannot express the problem, or its scene changed after it was stated.
         """
-        self._ready(problem)
+        self.ready(problem)
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
-
-        Raises:
-            InputError: the tool cannot express the problem, or its scene changed after it was stated.
-        """
-        began = time.perf_counter()
-        built, figure = self._ready(problem), problem.scene.figure
-        entry = TraceEntry(0.0, 0.0, 0.0, 0.0)
-        with problem.borrow(), Control(None, progress) as control:
-            q, met = self.found(built, problem)
-            q = figure.clamp(problem.start if q is None else q)
-            control.tell(entry)
-        ending = Ending(q, True, 1, (entry,), self.way, "time", "" if met else self.failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
-
-    def _ready(self, problem: Problem) -> Built:
+    def ready(self, problem: Problem) -> Built:
+        """The same, and return it."""
         problem.check_fresh()
         refused = self.unsupported(problem)
         if refused:
@@ -94,6 +75,38 @@ class OneCall(SolvesAnew, ABC, Generic[Built]):
         if self._built is None or not all(map(_same, self._built[0], asked)):
             self._built = asked, self.build(problem)
         return self._built[1]
+
+
+class OneCall(Outside[Built], ABC):
+    """A tool that is called once.
+
+    Attributes:
+        way: how it finds a posture, as solutions say it.
+        failure: why there is none, where it finds none.
+    """
+
+    way: ClassVar[str]
+    failure: ClassVar[str]
+
+    @abstractmethod
+    def found(self, built: Built, problem: Problem) -> tuple[Array | None, bool]:
+        """The tool's posture (nq,), None where it has none, and whether it says that the posture meets everything."""
+
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
+        """Find a posture.
+
+        Raises:
+            InputError: the tool cannot express the problem, or its scene changed after it was stated.
+        """
+        began = time.perf_counter()
+        built, figure = self.ready(problem), problem.scene.figure
+        entry = TraceEntry(0.0, 0.0, 0.0, 0.0)
+        with problem.borrow(), Control(None, progress) as control:
+            q, met = self.found(built, problem)
+            q = figure.clamp(problem.start if q is None else q)
+            control.tell(entry)
+        ending = Ending(q, True, 1, (entry,), self.way, "time", "" if met else self.failure)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
 
 def _same(first: Any, second: Any) -> bool:

@@ -197,27 +197,27 @@ class MovingPoint(Goal):
         return Wrench(rows, self._joint)
 
 
+def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
+    """The problem of a reach with its feet and bounds on speed, and its goal, whose target is moved afterwards."""
+    goal = MovingPoint(track.tip, np.array(track.targets[0]))
+    speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
+    bound = wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn)
+    kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
+    stated = wb.Problem(
+        track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
+    )  # fmt: skip
+    return stated, goal
+
+
 class WholebodyTool(Tool):
     """One program a step, with the workspace of the step before."""
 
     def __init__(self, track: Track, solver: str = "") -> None:
         """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
         self.name = f"wholebody/{solver}" if solver else "wholebody"
-        self._target = np.array(track.targets[0])
-        speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
-        self.problem = wb.Problem(
-            track.scene,
-            track.start,
-            goals=[MovingPoint(track.tip, self._target)],
-            constraints=[
-                *(wb.Hold(foot) for foot in track.feet),
-                wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn),
-            ],
-            measures=[wb.Displacement()],
-            clearance=track.clearance,
-            range_of_motion=False,  # the other tools cannot be told of what a person keeps
-            balance=False,
-        )
+        # the other tools cannot be told of what a person keeps
+        self.problem, goal = reach_problem(track, measures=[wb.Displacement()], range_of_motion=False, balance=False)
+        self._target = goal.target
         self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
         self._q = np.array(track.start)
         self._told: list[tuple[int, bool]] = []

@@ -14,7 +14,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import FIRST_FIT, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, longest_moves, pulls, size
+from wholebody.bench.adapters.loop import OUT, Loop, Stepper, kept_apart, longest_moves, pulls, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
@@ -36,8 +36,8 @@ def pink_adapter() -> Adapter:
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
         f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
         f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
-        f"{GAIN} a step, safe_displacement_gain 0 (1, its default, in budgets of first fit), d_min "
-        f"{1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
+        f"{GAIN} a step ({OUT} beside things that move), safe_displacement_gain 0 (1, its default, in budgets of first "
+        f"fit), d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
         "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
         differences=(
             f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
@@ -114,7 +114,10 @@ class _PinkStepper:
         self._barriers = (
             [
                 SelfCollisionBarrier(
-                    min(NEAREST, pairs), gain=GAIN, safe_displacement_gain=self._safe, d_min=self._least + room
+                    min(NEAREST, pairs),
+                    gain=OUT if room else GAIN,
+                    safe_displacement_gain=self._safe,
+                    d_min=self._least + room,
                 )
             ]
             if pairs

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from wholebody.bench.adapters.loop import size
 from wholebody.errors import InputError
-from wholebody.figures.urdf_writing import FOLLOWS, add_joint, exact, urdf_axis
+from wholebody.figures.urdf_writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene import Scene
 
 ROOT = "root"
@@ -73,11 +73,7 @@ def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: st
     Raises:
         InputError: a joint of another kind.
     """
-    joint, known = model.joints[index], urdf_axis(model, index)
-    if known is None or joint.shortname() == FOLLOWS:
-        raise InputError(
-            f"joint {model.names[index]!r} is a {joint.shortname()}; URDF is written for turning and sliding joints"
-        )
+    joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
     speed = float(model.velocityLimit[joint.idx_v])
     limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < FAST else FAST}
     if joint.nq == 1:
@@ -85,6 +81,18 @@ def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: st
         limit["upper"] = model.upperPositionLimit[joint.idx_q]
     place = model.jointPlacements[index]
     add_joint(top, joint_name(index), known.kind, parent, child, origin=place, axis=known.axis, limit=limit)
+
+
+def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
+    """Kind and axis of a joint that turns about or slides along one axis by itself.
+
+    Raises:
+        InputError: a joint of another kind; `written_for` ends the sentence.
+    """
+    known, kind = urdf_axis(model, index), model.joints[index].shortname()
+    if known is None or kind == FOLLOWS:
+        raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
+    return known
 
 
 def _fixed(top: ElementTree.Element, name: str, joint: int, place: pin.SE3) -> ElementTree.Element:

@@ -13,6 +13,7 @@ import numpy as np
 
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Outcome
 from wholebody.bench.attack.running import Ended, put
+from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.report import render
 from wholebody.bench.tables import write_text
 
@@ -37,15 +38,11 @@ _QUOTED = re.compile(r"'[^']*'|\"[^\"]*\"|\([^)]*\)")
 
 def report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
     """Return the counts as Markdown."""
-    from scipy.stats import binomtest
-
     kinds = []
     for kind in KINDS:
         found = counted(rows, kind)
         if found.total():
-            kinds.append(
-                (ATTACKED[kind], found, binomtest(found["wrong"], found.total()).proportion_ci(method="wilson").high)
-            )
+            kinds.append((ATTACKED[kind], found, wilson(found["wrong"], found.total())[1]))
     statuses: list[str | None] = ["solved", "unreachable", "infeasible", "stalled", None]
     solves = [(status, count, times) for status in statuses for count, *times in [percentiles(rows, status)] if count]
     asked = any(one.kind == "solve" for one in rows)

@@ -170,13 +170,9 @@ def _in_doubt(results: Results, ranked: Sequence[Standing], rows: Sequence[Summa
 
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
-    from scipy.stats import binomtest
-
     mine = [row for row in rows if row.method == standing.method and row.refused < row.cases]
-    for row in mine:
-        solved = binomtest(round(row.success * row.cases), row.cases) if not row.refused else None
-        if solved is not None and solved.proportion_ci(method="wilson").high >= GOOD:
-            return []
+    if any(not row.refused and row.success_high >= GOOD for row in mine):
+        return []
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
     return [

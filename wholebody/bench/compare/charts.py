@@ -191,8 +191,7 @@ def overview(
                 (right, row.mean_ms, row.mean_low_ms, row.mean_high_ms),
             )
             for panel, value, low, high in spans:
-                panel.plot([low, high], [y, y], color=seen.color, linewidth=5.0, alpha=0.3, solid_capstyle="butt")
-                (drawn[name],) = panel.plot([value], [y], color=seen.color, marker=seen.marker, linestyle="")
+                drawn[name] = plot_style.band(panel, y, value, (low, high), seen)
     for panel in (left, right):
         panel.set_yticks(range(len(titles)), list(titles.values()) if panel is left else [""] * len(titles))
         panel.set_ylim(len(titles) - 0.5, -0.5)

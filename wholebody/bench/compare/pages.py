@@ -16,7 +16,7 @@ from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.report import render, upfirst
+from wholebody.bench.report import html, render, upfirst
 from wholebody.bench.tables import write_text
 
 FOLDER = "pages"
@@ -94,13 +94,14 @@ def page_name(kind: str, name: str) -> str:
 def _page(
     folder: Path, name: str, title: str, text: str, links: Mapping[str, str], charts: Sequence[tuple[Path, Path]]
 ) -> Path:
-    from markdown_it import MarkdownIt
-
-    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
-    drawn = [drawn_within(svg, svg.stem, "") for svg, _ in charts]
-    path = folder / FOLDER / name
     others = [(other, file) for other, file in links.items() if file != name]
-    write_text(path, render("page.html", title=title, body=body, drawn=drawn, links=others) + "\n")
+    return write_page(folder / FOLDER / name, title, text, [svg for svg, _ in charts], others)
+
+
+def write_page(path: Path, title: str, text: str, charts: Sequence[Path], links: Sequence[tuple[str, str]]) -> Path:
+    """Write Markdown as a page with SVG charts within, and links: what each is to, and its file."""
+    drawn = [drawn_within(svg, svg.stem, "") for svg in charts]
+    write_text(path, render("page.html", title=title, body=html(text), drawn=drawn, links=links) + "\n")
     return path
 
 

@@ -25,7 +25,7 @@ from wholebody.bench.compare.scenes import OPENING, Scene, chosen, draw
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.compare.summary import GOOD, exclusions, kernel_of, summaries
-from wholebody.bench.report import formatted, render
+from wholebody.bench.report import formatted, html, render
 from wholebody.bench.tables import replace_section, write_rows, write_text
 
 PAGE = "report.html"
@@ -127,9 +127,7 @@ def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Se
 
     `charts` are SVG and PNG by name, of which the SVG goes into the page; the subtitle says when and on what.
     """
-    from markdown_it import MarkdownIt
-
-    text = MarkdownIt("commonmark", {"html": False}).enable("table").render(as_markdown(given, True, "charts"))
+    text = html(as_markdown(given, True, "charts"))
     text = text.replace("<ul>", '<ul class="advice">', 1)
     text = re.sub(rf"<td[^>]*>([^<]{{{LONG},}})</td>", r'<td class="text">\1</td>', text)
     text = PICTURE.sub(lambda found: drawn_within(charts[found[1]][0], found[1], found[2]), text)

@@ -260,37 +260,23 @@ def _look(method: str) -> dict[str, Any]:
 
 def _about(drawing: Drawing, before: Clip) -> tuple[str, Callable[[Clip], Array]]:
     """Title and measure, metres a frame, of the third chart."""
-    if drawing.armed:
-        held = _placements(before, HANDS)
+    rising = drawing.clip == RISE and not drawing.armed
+    names = ("left_foot", "right_foot") if rising else HANDS
+    stood = _placements(before, names)
 
-        def slipped(clip: Clip) -> Array:
-            now = _placements(clip, HANDS)
-            return np.array(
-                [np.linalg.norm(a.actInv(b).translation - c.actInv(d).translation)
-                 for (a, b), (c, d) in zip(now, held, strict=True)]
-            )  # fmt: skip
-
-        return "left hand from its place on the weapon, mm", slipped
-    if drawing.clip == RISE:
-        feet = ("left_foot", "right_foot")
-        stood = _placements(before, feet)
-
-        def away(clip: Clip) -> Array:
-            now = _placements(clip, feet)
-            return np.array(
-                [max(np.linalg.norm(a.translation - b.translation) for a, b in zip(one, other, strict=True))
-                 for one, other in zip(now, stood, strict=True)]
-            )  # fmt: skip
-
-        return "farthest foot from where it was, mm", away
-
-    def moved(clip: Clip) -> Array:
+    def apart(clip: Clip) -> Array:
+        now = _placements(clip, names)
+        if drawing.armed:
+            places = [(a.actInv(b), c.actInv(d)) for (a, b), (c, d) in zip(now, stood, strict=True)]
+            return np.array([np.linalg.norm(here.translation - there.translation) for here, there in places])
         return np.array(
             [max(np.linalg.norm(a.translation - b.translation) for a, b in zip(one, other, strict=True))
-             for one, other in zip(_placements(clip, HANDS), _placements(before, HANDS), strict=True)]
+             for one, other in zip(now, stood, strict=True)]
         )  # fmt: skip
 
-    return "farthest hand from where it was, mm", moved
+    if drawing.armed:
+        return "left hand from its place on the weapon, mm", apart
+    return f"farthest {'foot' if rising else 'hand'} from where it was, mm", apart
 
 
 def _placements(clip: Clip, names: Sequence[str]) -> list[list[Any]]:

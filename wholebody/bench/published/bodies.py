@@ -64,7 +64,8 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     order = _order(figure, read)
     joints = [joint for joint in read.names if joint != "universe" and joint in figure.joints]
     place = {joint: model.joints[figure.joint_id(joint)] for joint in joints}
-    limits = {int(k): (float(a), float(b)) for k, a, b in zip(*_limits(figure), strict=True)}
+    known = figure.limits
+    limits = {int(k): (float(a), float(b)) for k, a, b in zip(known.idx_q, known.lower, known.upper, strict=True)}
     bounds = {joint: limits[place[joint].idx_q] for joint in joints if place[joint].idx_q in limits}
     content = {
         "format": "wholebody body",
@@ -91,11 +92,6 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
         ],
     }
     return BodyFiles(name, text, content, order, links)
-
-
-def _limits(figure: Figure) -> tuple[Indices, Array, Array]:
-    known = figure.limits
-    return known.idx_q, known.lower, known.upper
 
 
 def _links(model: pin.Model) -> tuple[str, ...]:

@@ -8,10 +8,12 @@ from math import inf, isfinite
 from pathlib import Path
 from typing import Any
 
+from numpy import nan_to_num
+
 from wholebody.bench import plot_style
-from wholebody.bench.compare.pages import drawn_within
+from wholebody.bench.compare.pages import write_page
 from wholebody.bench.compare.rankings import in_words
-from wholebody.bench.compare.statistics import Interval, Ranking, ranking, ratio
+from wholebody.bench.compare.statistics import Ranking, ranking, ratio
 from wholebody.bench.plot_style import Style, method_style
 from wholebody.bench.published.answers import read_answers
 from wholebody.bench.published.judging import ANSWERED, Judged, SetScore, Verdict, judge, set_score
@@ -99,7 +101,7 @@ def boards(verdicts: Sequence[Verdict], sets: Sequence[str]) -> list[Board]:
         for seed in ("near", "far"):
             rows = [(v.answers.method, row) for v in verdicts for row in v.sets if (row.set, row.seed) == (name, seed)]
             if rows:
-                rows.sort(key=lambda entry: (-_known(entry[1].share.value), entry[1].mean_seconds.value))
+                rows.sort(key=lambda entry: (-nan_to_num(entry[1].share.value, nan=-1.0), entry[1].mean_seconds.value))
                 made.append(Board(name, seed, tuple(rows), _leading(rows), _ranked(verdicts, name, seed)))
     return made
 
@@ -125,10 +127,6 @@ def _ranked(verdicts: Sequence[Verdict], name: str, seed: str) -> Ranking | None
     return ranking(costs)
 
 
-def _known(value: float) -> float:
-    return value if isfinite(value) else -1.0
-
-
 def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     """What follows from a board, in plain English."""
     if not board.leading:
@@ -137,10 +135,10 @@ def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     best = dict(board.rows)[first].share
     said = [f"**{first}** solves {100 * best.value:.0f} % [{100 * best.low:.0f}, {100 * best.high:.0f}]."]
     if others:
-        said.append(f"{_listed(others)} cannot be told apart from it by what they solve.")
+        said.append(f"{', '.join(others)} cannot be told apart from it by what they solve.")
     below = [name for name, row in board.rows if name not in board.leading and not row.refused]
     if below:
-        said.append(f"{_listed(below)} {'solves' if len(below) == 1 else 'solve'} fewer.")
+        said.append(f"{', '.join(below)} {'solves' if len(below) == 1 else 'solve'} fewer.")
     said += _faster(board, verdicts)
     if board.ranking:
         said.append(f"Mean ranks by time, 1 being the fastest: {in_words(board.ranking)}")
@@ -169,10 +167,6 @@ def _faster(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     return said
 
 
-def _listed(names: Sequence[str]) -> str:
-    return ", ".join(names)
-
-
 def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[Board]:
     """Write the page and its charts into a folder; return the boards."""
     index = read_index(problems)
@@ -183,12 +177,8 @@ def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[Boar
         sentences=lambda board: sentences(board, verdicts), words=words,
         units={verdict.answers.method: _in_kernels(verdict) for verdict in verdicts},
     )  # fmt: skip
-    from markdown_it import MarkdownIt
-
-    body = MarkdownIt("commonmark", {"html": False}).enable("table").render(text)
-    drawn = [drawn_within(svg, svg.stem, "") for svg in charts]
     write_text(out / "leaderboard.md", text + "\n")
-    write_text(out / PAGE, render("page.html", title="Leaderboard", body=body, drawn=drawn, links=[]) + "\n")
+    write_page(out / PAGE, "Leaderboard", text, charts, [])
     return found
 
 
@@ -213,7 +203,9 @@ def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> l
                     y = place + 0.7 * ((number + 0.5) / len(part) - 0.5)
                     spans = ((axes[0][0], rows[name].share, 100.0), (axes[0][1], rows[name].mean_seconds, 1e3))
                     for panel, span, scale in spans:
-                        handles[name] = _span(panel, y, span, scale, seen[name]) or handles.get(name)
+                        if isfinite(span.value):
+                            ends = scale * span.low, scale * span.high
+                            handles[name] = plot_style.band(panel, y, scale * span.value, ends, seen[name])
         labels = [f"{words(board.set)}, {board.seed}" for board in found]
         for panel, texts in zip(axes[0], (labels, [""] * len(labels)), strict=True):
             panel.set_yticks(range(len(found)), texts)
@@ -221,9 +213,8 @@ def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> l
         axes[0][0].set(xlabel="solved [%]", xlim=(-2.0, 102.0))
         plot_style.plain_log(axes[0][1])
         axes[0][1].set(xlabel="mean time; one that is not solved counts 10 s [ms]")
-        known = {name: handle for name, handle in handles.items() if handle is not None}
-        if known:
-            chart.legend(list(known.values()), list(known), loc="outside lower center", ncols=3, frameon=False)
+        if handles:
+            chart.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False)
         drawn.append(plot_style.save(chart, out / "charts" / f"leaderboard-{first // MOST + 1}")[0])
     return drawn
 
@@ -239,15 +230,6 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
     return found
 
 
-def _span(panel: Any, y: float, span: Interval, scale: float, style: Style) -> Any:
-    """A figure and its interval as a band; None where there is none."""
-    if not isfinite(span.value):
-        return None
-    panel.plot([scale * span.low, scale * span.high], [y, y], color=style.color, linewidth=5.0, alpha=0.3)
-    (line,) = panel.plot([scale * span.value], [y], color=style.color, marker=style.marker, linestyle="")
-    return line
-
-
 def summary(found: Sequence[Board]) -> Mapping[str, str]:
     """Who leads each set, for the command line."""
-    return {f"{words(board.set)}, {board.seed}": _listed(board.leading) or "nobody" for board in found}
+    return {f"{words(board.set)}, {board.seed}": ", ".join(board.leading) or "nobody" for board in found}

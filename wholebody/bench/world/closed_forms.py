@@ -68,6 +68,17 @@ def _engine(
     return RigidBodies(scene, gravity=(0.0, 0.0, -GRAVITY if weight else 0.0))
 
 
+def _pass(engine: RigidBodies, frames: int) -> None:
+    for _ in range(frames):
+        engine.advance(DT)
+
+
+def _grown(engine: RigidBodies, frames: int) -> float:
+    """Largest gain of energy in one of some frames, joules; at least 0."""
+    energies = [engine.energy(), *(engine.advance(DT).energy for _ in range(frames))]
+    return max(0.0, float(np.diff(energies).max()))
+
+
 def _stuff(restitution: float, friction: float) -> wb.Material:
     return wb.Material("stuff", others=(restitution, friction))
 
@@ -95,8 +106,7 @@ def _sliding() -> list[ClosedRow]:
     speed, friction = 2.0, 0.3
     body = wb.Body(mass=1.0, velocity=(speed, 0.0, 0.0))
     engine = _engine((wb.Box((0.2, 0.2, 0.1)), (FAR, 0.0, LOW + 0.05 + SKIN), body))
-    for _ in range(60):
-        engine.advance(DT)
+    _pass(engine, 60)
     way = float(engine.placement("0").translation[0]) - FAR
     return [ClosedRow("box slides to rest", "way, m", way, speed**2 / (2.0 * friction * GRAVITY), 5e-3)]
 
@@ -109,8 +119,7 @@ def _slope() -> list[ClosedRow]:
         start = pin.SE3(turned, turned @ np.array([FAR, 0.0, LOW + 0.05 + SKIN]))
         body = (wb.Box((0.2, 0.2, 0.1)), start, wb.Body(mass=1.0))
         engine = _engine(body, floor=(float(np.sin(angle)), 0.0, float(np.cos(angle))))
-        for _ in range(60):
-            engine.advance(DT)
+        _pass(engine, 60)
         way = float((turned.T @ (engine.placement("0").translation - start.translation))[0])
         pull = max(0.0, 0.5 * GRAVITY * float(np.sin(angle) - 0.3 * np.cos(angle)))
         rows.append(ClosedRow(f"slope of {tangent}, friction 0.3", "way in 1 s, m", way, pull, 3e-4))
@@ -122,8 +131,7 @@ def _cradle() -> list[ClosedRow]:
     come = (wb.Sphere(0.05), (FAR - 0.2, 0, 0), wb.Body(8e3, material=steel, velocity=(1.5, 0.0, 0.0)))
     row = [(wb.Sphere(0.05), (FAR + pitch * k, 0, 0), wb.Body(8e3, material=steel)) for k in range(1, 5)]
     engine = _engine(come, *row, floor=None, weight=False)
-    for _ in range(60):
-        engine.advance(DT)
+    _pass(engine, 60)
     speeds = [float(engine.twist(str(k))[0]) for k in range(5)]
     return [
         ClosedRow("Newton's cradle of five", "speed of the last, m/s", speeds[-1], 1.5, 1e-9),
@@ -139,8 +147,7 @@ def _rolling() -> list[ClosedRow]:
     start = normal * (LOW + 0.1 + SKIN)
     ball = (wb.Sphere(0.1), start, wb.Body(material=_stuff(0.0, 0.5)))
     engine = _engine(ball, floor=(float(normal[0]), 0.0, float(normal[2])))
-    for _ in range(60):
-        engine.advance(DT)
+    _pass(engine, 60)
     speed = float(engine.twist("0")[:3] @ np.array([np.cos(angle), 0.0, -np.sin(angle)]))
     return [
         ClosedRow("ball rolls down a slope", "speed after 1 s, m/s", speed, 5.0 / 7.0 * GRAVITY * np.sin(angle), 1e-3)
@@ -161,10 +168,7 @@ def colliding(rng: np.random.Generator, at: float) -> list[tuple[wb.Shape, Array
 
 def _collisions() -> list[ClosedRow]:
     engine = _engine(*colliding(np.random.default_rng(0), FAR), floor=None, weight=False)
-    momentum, energy, grew = engine.momentum(), engine.energy(), 0.0
-    for _ in range(22):
-        frame = engine.advance(DT)
-        grew, energy = max(grew, frame.energy - energy), frame.energy
+    momentum, grew = engine.momentum(), _grown(engine, 22)
     off = float(np.abs(engine.momentum() - momentum).max())
     return [
         ClosedRow("four things collide freely", "change of momentum, kg m/s and kg m2/s", off, 0.0, 1e-10),
@@ -216,8 +220,7 @@ def _door() -> list[ClosedRow]:
     ball = wb.Body(mass=2.0, material=stuff, velocity=(speed, 0.0, 0.0))
     panel = (wb.Box((0.04, 0.9, 2.0)), (FAR, 0.0, 0.0), door)
     engine = _engine(panel, (wb.Sphere(0.1), (FAR - 0.3, out, 0.0), ball), floor=None, weight=False)
-    for _ in range(10):
-        engine.advance(DT)
+    _pass(engine, 10)
     lever, about = 0.45 + out, 20.0 * (0.04**2 + 0.9**2) / 12.0 + 20.0 * 0.45**2
     turn = (1.0 + share) * 2.0 * speed * lever / (about + 2.0 * lever**2)
     return [ClosedRow("ball strikes a door", "its turning, rad/s", -float(engine.twist("0")[5]), turn, 2e-3 * turn)]
@@ -237,11 +240,7 @@ def _ending() -> list[ClosedRow]:
     )
     rows = []
     for name, thing, most in cases:
-        engine, grew = _engine(thing), 0.0
-        energy = engine.energy()
-        for _ in range(120):
-            frame = engine.advance(DT)
-            grew, energy = max(grew, frame.energy - energy), frame.energy
+        grew = _grown(_engine(thing), 120)
         rows.append(ClosedRow(name, "largest gain of energy in a frame, J", grew, 0.0, most))
     return rows
 

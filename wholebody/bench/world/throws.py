@@ -171,3 +171,12 @@ def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed:
         "swift" if swift else "human", person, thing, speed, len(depths), 1e3 * max(depths),
         int((np.array(depths) > DEEP).sum()), avoidable, named, silent, 1e3 * float(np.median(times)),
     )  # fmt: skip
+
+
+def all_throws(count: int, quick: bool = False) -> Iterator[ThrowRow]:
+    """Throw everything at everybody with both limits, `count` times each; where quick, at one speed."""
+    for swift in (True, False):
+        for person in PERSONS:
+            for thing in SHAPES:
+                for speed in SPEEDS[2:3] if quick else SPEEDS:
+                    yield throws(thing, speed, person, swift, count)

@@ -1,0 +1,104 @@
+"""`wholebody bench export`, `judge`, `leaderboard`: problems as files, and what anybody's answers to them are worth."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.bench.tables import write_text
+from wholebody.cli.bench.command import command, count, listed, option, seed
+from wholebody.errors import InputError
+
+WIDTH = 230  # columns of the judge's table, also where the terminal has fewer
+PROBLEMS = option("--problems", type=Path, required=True, metavar="DIR", help="folder of the exported problems")
+
+
+@command(
+    "export",
+    "the problem sets as files for any program",
+    """\
+Write the problems of the sets as files that any program reads: JSON with a schema, the body as URDF, meshes as OBJ, two
+seeds each (near: the start; far: random), what must hold, and apart from them a posture that solves each, with measures
+of how hard it is. The same sets, number and seed give the same files. They are in the public domain (CC0).""",
+    option("folder", type=Path, metavar="DIR", help="a folder that does not exist yet"),
+    listed("--sets", "problem sets (default: all)"),
+    count("--per-set", None, "problems of each set (default: 200)"),
+    seed("of all problems"),
+)
+def export(arguments: argparse.Namespace) -> None:
+    """Export."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
+    from wholebody.bench.published.export import export
+
+    sets = [problem_set(name) for name in dict.fromkeys(arguments.sets or SETS)]
+    per_set = arguments.per_set or CASES
+    if arguments.seed < 0:
+        raise InputError(f"--seed is {arguments.seed}; give 0 or more")
+    console = Console()
+    with Progress(console=console) as bar:
+        task = bar.add_task("writing", total=per_set * len(sets))
+        index = export(
+            sets, per_set, arguments.seed, arguments.folder, lambda name: bar.update(task, advance=1, description=name)
+        )
+    console.print(f"wrote {per_set * len(sets)} problems, listed in {index}", highlight=False, soft_wrap=True)
+
+
+@command(
+    "judge",
+    "score anybody's answers to published problems",
+    """\
+Score a file of answers to problems that `wholebody bench export` wrote, whatever program wrote the answers: goals,
+overlap of all pairs, clearances, joint limits, what is held, and effort above the best known. The scenes are rebuilt
+from the files by Pinocchio and coal alone. Prints a table, and writes every figure as JSON. Answers that are malformed
+are refused with one sentence that names the entry.""",
+    option("answers", type=Path, metavar="ANSWERS.json", help="as answers.schema.json says"),
+    PROBLEMS,
+    option("--out", type=Path, metavar="FILE", help="where the verdict is written (default: ANSWERS.verdict.json)"),
+)
+def judge(arguments: argparse.Namespace) -> None:
+    """Judge."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from wholebody.bench.published.answers import read_answers
+    from wholebody.bench.published.judging import as_json, judge
+    from wholebody.bench.published.reading import dumped
+    from wholebody.bench.published.words import COLUMNS, cells, left_out
+
+    verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
+    out = arguments.out or arguments.answers.with_suffix(".verdict.json")
+    write_text(out, dumped(as_json(verdict)))
+    console = Console()
+    console.width = max(console.width, WIDTH)
+    table = Table(title=verdict.answers.method)
+    for name in COLUMNS:
+        table.add_column(name, justify="left" if name in COLUMNS[:2] else "right")
+    for row in verdict.sets:
+        table.add_row(*cells(row))
+    console.print(table)
+    for line in left_out(verdict):
+        console.print(line, highlight=False, markup=False, soft_wrap=True)
+    console.print(f"wrote {out}", highlight=False, soft_wrap=True)
+
+
+@command(
+    "leaderboard",
+    "a page from a folder of answers",
+    """\
+Judge every file of answers in a folder, and write a page that compares them: tables, charts and sentences that say who
+solves most, and who cannot be told apart.""",
+    option("folder", type=Path, metavar="DIR", help="with a file of answers for each method"),
+    PROBLEMS,
+    option("--out", type=Path, default=Path("out/leaderboard"), metavar="DIR", help="for the page"),
+)
+def leaderboard(arguments: argparse.Namespace) -> None:
+    """Judge and compare."""
+    from wholebody.bench.published.leaderboard import PAGE, judge_folder, publish, summary
+
+    found = publish(judge_folder(arguments.folder, arguments.problems), arguments.problems, arguments.out)
+    for name, leading in summary(found).items():
+        print(f"{name}: {leading}")
+    print(f"wrote {arguments.out / PAGE}")
