@@ -185,6 +185,53 @@ def test_solves_and_steps_compile_nothing_beyond_what_one_call_compiles(root: Pa
     assert rest == []
 
 
+COLLECTOR = """
+import gc
+from wholebody.compiled import compiled
+from numba.core import event
+
+class Look(event.Listener):
+    def on_start(self, event):
+        print(gc.isenabled(), end=" ")
+
+    on_end = on_start
+
+def made(x):
+    return x + 1.0
+
+for collects in (True, False):
+    loop = compiled()(made)
+    (gc.enable if collects else gc.disable)()
+    event.register("numba:run_pass", look := Look())
+    loop(1.0)
+    event.unregister("numba:run_pass", look)
+    print()
+    print(gc.isenabled())
+"""
+
+
+def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(root: Path, tmp_path: Path) -> None:
+    path = tmp_path / "asks.py"
+    path.write_text(COLLECTOR)
+    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    first, after_first, second, after_second = done.stdout.splitlines()
+    assert set(first.split()) == {"False"}
+    assert (after_first, set(second.split()), after_second) == ("True", set(), "False")
+
+
+def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Path) -> None:
+    """A process ends in the middle, as one that the system ends for want of memory; the loops are compiled all the same."""
+    ends = "import os\nif __import__('multiprocessing').parent_process() is not None:\n    os._exit(1)\n"
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(ends + LOOP)
+    path = tmp_path / "asks.py"
+    path.write_text(IN_PROCESSES)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path), "2"], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]
+    assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
+
+
 def test_kept_loops_are_read_back_without_scipy(root: Path) -> None:
     # numba's array functions (numba.np.arraymath) load scipy.linalg, a tenth of the time that `wholebody pose` needs.
     compiled.compile_all()

@@ -51,9 +51,9 @@ def lay(
                 least = k
         i, j = (least + 1) % 3, (least + 2) % 3
         size = np.sqrt(normal[c, i] ** 2 + normal[c, j] ** 2)
-        axes[c, 0] = normal[c]
         axes[c, 1, least], axes[c, 1, i], axes[c, 1, j] = 0.0, -normal[c, j] / size, normal[c, i] / size
         for k in range(3):
+            axes[c, 0, k] = normal[c, k]
             i, j = (k + 1) % 3, (k + 2) % 3
             axes[c, 2, k] = normal[c, i] * axes[c, 1, j] - normal[c, j] * axes[c, 1, i]
         for side in range(2):

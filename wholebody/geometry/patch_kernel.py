@@ -187,7 +187,8 @@ def patch_ends(
                 rows = filled - begun
                 for row in range(rows):
                     contact[first_begun + row] = contact[begun + row]
-                    place[first_begun + row] = place[begun + row]
+                    for k in range(3):
+                        place[first_begun + row, k] = place[begun + row, k]
                     gap[first_begun + row] = gap[begun + row]
                 filled = first_begun + rows
         if filled - first_begun > most_ends:
