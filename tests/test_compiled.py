@@ -221,7 +221,7 @@ def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(
 
 
 def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Path) -> None:
-    """A process ends in the middle, as one that the system ends for want of memory; the loops are compiled all the same."""
+    """A process ends in the middle, as the system ends one for want of memory; all loops are compiled."""
     ends = "import os\nif __import__('multiprocessing').parent_process() is not None:\n    os._exit(1)\n"
     (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(ends + LOOP)
     path = tmp_path / "asks.py"
