@@ -93,6 +93,41 @@ def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
         assert len(told) == 1
 
 
+INNER = """
+from wholebody.compiled import compiled
+
+@compiled(inner=True)
+def half(x):
+    return 0.5 * x
+
+@compiled()
+def quarter(x):
+    return 0.5 * half(x)
+"""
+
+
+def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(INNER)
+    (tmp_path / "wholebody" / "loop_of_a_test.py").write_text(
+        LOOP.replace("return 2.0 * x", "return 4.0 * half(x)") + "from wholebody.loop_of_another_test import half\n"
+    )
+    asks = """
+from wholebody.loop_of_another_test import half, quarter
+print(quarter(6.0))
+try:
+    half(6.0)
+except TypeError as error:
+    print(str(error).replace(" ", "_"))
+"""
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    refused = "half_is_compiled_for_calls_from_compiled_functions_only"
+    first, _ = run(asks, **kept)
+    assert [first[0], *first[4:]] == ["3.0", "1.5", refused]
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(path.read_text() + "\n")  # compiled anew with what was kept of the other
+    assert run(asks, **kept)[0] == first
+
+
 IN_PROCESSES = """
 import sys
 from wholebody import compiled

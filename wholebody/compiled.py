@@ -53,20 +53,28 @@ F = TypeVar("F", bound=Callable[..., Any])
 _compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True}
 
 
-def compiled(**options: Any) -> Callable[[F], F]:
+def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     """Let numba compile a function at its first call, and cache the result.
 
     The cache is beside the file, or in the user's cache folder if that is not writable; NUMBA_CACHE_DIR names another
     folder. If no folder is writable, every process compiles anew.
 
     Args:
+        inner: whether only compiled functions call it. It is compiled sooner then, and calling it from Python raises a
+            TypeError.
         options: what `numba.njit` takes, such as error_model and fastmath.
     """
-    loop_type = _loop_type()
+    loop_type = _inner_type() if inner else _loop_type()
     _watch()
 
     def decorate(function: F) -> F:
-        target = {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options}
+        target = {
+            "nopython": True,
+            "boundscheck": None,
+            "no_cfunc_wrapper": True,
+            "no_cpython_wrapper": inner,
+            **options,
+        }
         loop: F = loop_type(function, targetoptions=target)
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
@@ -134,6 +142,17 @@ def _loop_type() -> Any:
             return super().get_call_template(args, {name: unliteral(kind) for name, kind in kws.items()})
 
     return Loop
+
+
+@lru_cache(maxsize=1)
+def _inner_type() -> Any:
+    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
+
+    class Inner(_loop_type()):  # type: ignore[misc]
+        def __call__(self, *args: Any, **named: Any) -> Any:
+            raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
+
+    return Inner
 
 
 @lru_cache(maxsize=1)

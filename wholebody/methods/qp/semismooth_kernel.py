@@ -108,7 +108,7 @@ def minimise(
     return used
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _look(elastic: Array, least: Array, x: Array, violated: Array, pushing: Mask) -> bool:
     """By how much each elastic row is violated at x (n,) and whether it pushes; whether that differs from before."""
     changed = False
@@ -119,7 +119,7 @@ def _look(elastic: Array, least: Array, x: Array, violated: Array, pushing: Mask
     return changed
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _differentiate(
     diagonal: Array,
     linear: Array,
@@ -142,7 +142,7 @@ def _differentiate(
             add(-elastic_weight[j] * violated[j], elastic[j], gradient)
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _line_minimum(
     base: float, rise: float, violated: Array, speed: Array, elastic_weight: Array, longest: float, whole: float
 ) -> float:
