@@ -93,6 +93,41 @@ def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
         assert len(told) == 1
 
 
+INNER = """
+from wholebody.compiled import compiled
+
+@compiled(inner=True)
+def half(x):
+    return 0.5 * x
+
+@compiled()
+def quarter(x):
+    return 0.5 * half(x)
+"""
+
+
+def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(INNER)
+    (tmp_path / "wholebody" / "loop_of_a_test.py").write_text(
+        LOOP.replace("return 2.0 * x", "return 4.0 * half(x)") + "from wholebody.loop_of_another_test import half\n"
+    )
+    asks = """
+from wholebody.loop_of_another_test import half, quarter
+print(quarter(6.0))
+try:
+    half(6.0)
+except TypeError as error:
+    print(str(error).replace(" ", "_"))
+"""
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    refused = "half_is_compiled_for_calls_from_compiled_functions_only"
+    first, _ = run(asks, **kept)
+    assert [first[0], *first[4:]] == ["3.0", "1.5", refused]
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(path.read_text() + "\n")  # compiled anew with what was kept of the other
+    assert run(asks, **kept)[0] == first
+
+
 IN_PROCESSES = """
 import sys
 from wholebody import compiled
@@ -183,6 +218,53 @@ def test_solves_and_steps_compile_nothing_beyond_what_one_call_compiles(root: Pa
     first, *rest = done.stdout.splitlines()
     assert {0, 1, 2} <= set(json.loads(first))  # contacts of a step
     assert rest == []
+
+
+COLLECTOR = """
+import gc
+from wholebody.compiled import compiled
+from numba.core import event
+
+class Look(event.Listener):
+    def on_start(self, event):
+        print(gc.isenabled(), end=" ")
+
+    on_end = on_start
+
+def made(x):
+    return x + 1.0
+
+for collects in (True, False):
+    loop = compiled()(made)
+    (gc.enable if collects else gc.disable)()
+    event.register("numba:run_pass", look := Look())
+    loop(1.0)
+    event.unregister("numba:run_pass", look)
+    print()
+    print(gc.isenabled())
+"""
+
+
+def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(root: Path, tmp_path: Path) -> None:
+    path = tmp_path / "asks.py"
+    path.write_text(COLLECTOR)
+    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    first, after_first, second, after_second = done.stdout.splitlines()
+    assert set(first.split()) == {"False"}
+    assert (after_first, set(second.split()), after_second) == ("True", set(), "False")
+
+
+def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Path) -> None:
+    """A process ends in the middle, as the system ends one for want of memory; all loops are compiled."""
+    ends = "import os\nif __import__('multiprocessing').parent_process() is not None:\n    os._exit(1)\n"
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(ends + LOOP)
+    path = tmp_path / "asks.py"
+    path.write_text(IN_PROCESSES)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path), "2"], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True"]
+    assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
 
 
 def test_kept_loops_are_read_back_without_scipy(root: Path) -> None:

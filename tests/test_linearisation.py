@@ -358,3 +358,20 @@ def test_joints_that_follow_others_and_round_joints(tmp_path):
         for _ in range(50):
             q = figure.clamp(pin.integrate(figure.model, figure.neutral, rng.normal(size=figure.model.nv)))
             assert_same(lineariser.at(q, 0.5), plain.at(q, 0.5))
+
+
+def test_a_relaxed_lineariser_leaves_the_one_it_was_made_of_as_it_was(problem) -> None:
+    """Where speeds are bounded, pairs that cannot come near in a step are left out by clearances of its own."""
+    lineariser = problem.lineariser(problem.workspace(), 0.02)
+    before = lineariser.at(problem.start, 0.3).contacts.number
+    assert len(lineariser.relaxed(0.1).at(problem.start, 0.3).contacts.number) < len(before)
+    np.testing.assert_array_equal(lineariser.at(problem.start, 0.3).contacts.number, before)
+
+
+def test_clearances_that_change_where_they_are_count_from_the_next_take(problem) -> None:
+    lineariser, clearances = problem.lineariser(problem.workspace(), 0.02), problem.clearances.copy()
+    before = lineariser.at(problem.start, 0.3).contacts.number
+    lineariser.take(lineariser.goals, clearances)
+    clearances += 0.05
+    lineariser.take(lineariser.goals, clearances)
+    assert len(lineariser.at(problem.start, 0.3).contacts.number) > len(before)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import time
@@ -12,21 +13,17 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import lru_cache
 from importlib import import_module
+from itertools import zip_longest
 from typing import Any, TypeVar
 
 TOGETHER = (
-    ("wholebody.dynamics.loops",),
     (
         "wholebody.methods.qp.active_set",
         "wholebody.methods.qp.semismooth_newton",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
-        "wholebody.methods.qp.curved_reach",
-        "wholebody.methods.qp.escaping",
-        "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.osqp_solver",
-        "wholebody.methods.qp.solvers.split_form",
     ),
+    ("wholebody.dynamics.loops",),
     ("wholebody.linearisation",),
     (
         "wholebody.geometry.contact_rows",
@@ -35,6 +32,13 @@ TOGETHER = (
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.newton.linear_algebra.normal_equations",
+    ),
+    (
+        "wholebody.methods.qp.curved_reach",
+        "wholebody.methods.qp.escaping",
+        "wholebody.methods.qp.turning",
+        "wholebody.methods.qp.solvers.osqp_solver",
+        "wholebody.methods.qp.solvers.split_form",
     ),
 )
 """Modules with compiled loops, in groups that call no loops of each other, those first that take longest to compile.
@@ -46,23 +50,31 @@ LOOPS = tuple(name for names in TOGETHER for name in names)
 
 F = TypeVar("F", bound=Callable[..., Any])
 
-_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0}
+_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True}
 
 
-def compiled(**options: Any) -> Callable[[F], F]:
+def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
     """Let numba compile a function at its first call, and cache the result.
 
     The cache is beside the file, or in the user's cache folder if that is not writable; NUMBA_CACHE_DIR names another
     folder. If no folder is writable, every process compiles anew.
 
     Args:
+        inner: whether only compiled functions call it. It is compiled sooner then, and calling it from Python raises a
+            TypeError.
         options: what `numba.njit` takes, such as error_model and fastmath.
     """
-    loop_type = _loop_type()
+    loop_type = _inner_type() if inner else _loop_type()
     _watch()
 
     def decorate(function: F) -> F:
-        target = {"nopython": True, "boundscheck": None, "no_cfunc_wrapper": True, **options}
+        target = {
+            "nopython": True,
+            "boundscheck": None,
+            "no_cfunc_wrapper": True,
+            "no_cpython_wrapper": inner,
+            **options,
+        }
         loop: F = loop_type(function, targetoptions=target)
         with suppress(RuntimeError):  # numba: cannot cache function, no locator available
             loop.enable_caching()  # type: ignore[attr-defined]
@@ -78,7 +90,7 @@ def compile_all(names: Sequence[str] = LOOPS) -> None:
 
 
 def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGETHER) -> None:
-    """Compile groups of modules in processes beside each other, as far as they are not in the cache, and load them.
+    """Compile groups of modules in processes beside each other, as far as they are not in the cache.
 
     A process that ends early, for want of memory say, leaves its loops to this one.
     """
@@ -88,8 +100,11 @@ def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGET
         from multiprocessing import get_context
 
         logging.getLogger(__name__).info("compiling the inner loops in %d processes, unless they are kept", processes)
-        with suppress(BrokenProcessPool), ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-            list(pool.map(compile_all, groups))
+        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+            tasks = []
+            with suppress(BrokenProcessPool):
+                tasks += [pool.submit(compile_all, names) for names in groups]
+        groups = [names for names, task in zip_longest(groups, tasks) if task is None or task.exception() is not None]
     for names in groups:
         compile_all(names)
 
@@ -130,8 +145,19 @@ def _loop_type() -> Any:
 
 
 @lru_cache(maxsize=1)
+def _inner_type() -> Any:
+    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
+
+    class Inner(_loop_type()):  # type: ignore[misc]
+        def __call__(self, *args: Any, **named: Any) -> Any:
+            raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
+
+    return Inner
+
+
+@lru_cache(maxsize=1)
 def _watch() -> None:
-    """Log the first compilation, and count the time of all."""
+    """Log the first compilation, count the time of all, and let none be stopped by the garbage collector."""
     from numba.core import event
 
     class Listener(event.Listener):  # type: ignore[misc]
@@ -140,6 +166,8 @@ def _watch() -> None:
         def on_start(self, event: Any) -> None:
             if _compiling["depth"] == 0:
                 _compiling["since"] = time.thread_time()
+                _compiling["collects"] = gc.isenabled()
+                gc.disable()  # numba makes millions of objects that stay: to look through them is an eighth of the time
             _compiling["depth"] += 1
             if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
                 self.told = True
@@ -149,6 +177,8 @@ def _watch() -> None:
             _compiling["depth"] -= 1
             if _compiling["depth"] == 0:
                 _compiling["seconds"] += time.thread_time() - _compiling["since"]
+                if _compiling["collects"]:
+                    gc.enable()
 
     event.register("numba:compile", Listener())
 

@@ -11,7 +11,7 @@ from wholebody.residual_kernel import SMALL, inverse_left, rotation_vector
 from wholebody.term_entries import Integers
 
 
-@compiled()
+@compiled(inner=True)
 def coordinates(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """Joints with a plain coordinate: see `tasks.Posture`."""
     for e in range(len(targets)):
@@ -19,7 +19,7 @@ def coordinates(targets: Array, places: Integers, q: Array, value: Array, jacobi
         jacobian[places[e, 0], places[e, 2]] = 1.0
 
 
-@compiled()
+@compiled(inner=True)
 def coupled_ranges(tables: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """See `tasks.range_of_motion.CoupledRow`."""
     for e in range(len(tables)):
@@ -31,7 +31,7 @@ def coupled_ranges(tables: Array, places: Integers, q: Array, value: Array, jaco
                 jacobian[row, places[e, 2 + 2 * k]] -= tables[e, k]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def elliptic_ranges(tables: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """See `tasks.range_of_motion.EllipticRow`."""
     for e in range(len(tables)):
@@ -49,7 +49,7 @@ def elliptic_ranges(tables: Array, places: Integers, q: Array, value: Array, jac
                     jacobian[row, places[e, j + 1]] -= size * angle / (limit * limit)
 
 
-@compiled()
+@compiled(inner=True)
 def turns(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """Joints that turn for ever, whose coordinates are a cosine and a sine."""
     for e in range(len(targets)):
@@ -59,7 +59,7 @@ def turns(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
         jacobian[places[e, 0], places[e, 2]] = 1.0
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Array) -> None:
     """Free roots: log of the motion from the target, and its derivative by a motion in the root's own frame.
 
@@ -116,7 +116,7 @@ def roots(targets: Array, places: Integers, q: Array, value: Array, jacobian: Ar
                 )
 
 
-@compiled()
+@compiled(inner=True)
 def root_distances(tables: Array, places: Integers, q: Array, measure: Array) -> None:
     """Squared distance of a free root, see `tasks.distance.SquaredDistance`; its curvature is always the same."""
     if not len(tables):
@@ -134,7 +134,7 @@ def root_distances(tables: Array, places: Integers, q: Array, measure: Array) ->
                 measure[0, v] += 2.0 * force * slope[i, v]
 
 
-@compiled()
+@compiled(inner=True)
 def rhythms(
     elevations: Array,
     elevation_places: Integers,
@@ -177,7 +177,7 @@ def rhythms(
         _square(lumbars[e, 0], excess, slopes, at, measure, squares, len(elevations) + e)
 
 
-@compiled()
+@compiled(inner=True)
 def _square(
     weight: float, excess: float, slopes: Array, at: Integers, measure: Array, squares: Array, row: int
 ) -> None:
@@ -196,7 +196,7 @@ def _square(
             measure[2, at[k]] += 2.0 * weight * abs(slopes[k]) * steep
 
 
-@compiled()
+@compiled(inner=True)
 def _rotation(unit: Array, turn: Array) -> None:
     """Rotation (3, 3) of a unit quaternion x, y, z, w."""
     x, y, z, w = unit[0], unit[1], unit[2], unit[3]
@@ -205,7 +205,7 @@ def _rotation(unit: Array, turn: Array) -> None:
     turn[2, 0], turn[2, 1], turn[2, 2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
 
 
-@compiled()
+@compiled(inner=True)
 def heights(
     tables: Array,
     entries: Integers,

@@ -152,6 +152,7 @@ class Lineariser:
         self._passing: Passing | None = None
         self._grow(64)
         self._approach = self._largest_approach()
+        self._most: Array | None = None
         self.take(goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array) -> None:
@@ -169,7 +170,8 @@ class Lineariser:
                 self._term_wrench, self._passing = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
-        self._most = None if self._approach is None else clearances + self._approach
+        if self._approach is not None:
+            self._most = np.add(clearances, self._approach, out=self._most)
 
     def goal_rows(self) -> list[int]:
         """How many rows each goal has."""
@@ -182,6 +184,7 @@ class Lineariser:
     def relaxed(self, depth: float) -> Lineariser:
         """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
         other = copy(self)
+        other._most = None  # it needs its own room
         other.take(self.goals, self.clearances - depth)
         return other
 

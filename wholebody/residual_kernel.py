@@ -19,7 +19,7 @@ SMALL = 1e-4
 """Angle [rad] below which the series of log and its derivative are exact to rounding."""
 
 
-@compiled()
+@compiled(inner=True)
 def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
     """Rotation (3, 3) and origin (3,) in the world of a frame with the place `part` (12,) in a joint (4, 3)."""
     for i in range(3):
@@ -33,7 +33,7 @@ def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
                 turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.residuals.PlacementResidual`."""
     if not len(tables):
@@ -84,7 +84,7 @@ def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, va
                         wrench[row + i, 3 + j] += left[i, k] * base_turn[j, k]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def rotation_vector(turn: Array, angle: Array) -> None:
     """Rotation vector (3,) of a rotation (3, 3), by way of its quaternion, which is exact at every angle.
 
@@ -114,7 +114,7 @@ def rotation_vector(turn: Array, angle: Array) -> None:
     angle[0], angle[1], angle[2] = scale * x, scale * y, scale * z
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def inverse_left(angle: Array, left: Array) -> None:
     """Inverse (3, 3) of the left Jacobian of SO(3) at a rotation vector (3,): 1 - [a]/2 + c [a]^2.
 
@@ -137,7 +137,7 @@ def inverse_left(angle: Array, left: Array) -> None:
     left[1, 2], left[2, 1] = c * y * z + 0.5 * x, c * y * z - 0.5 * x
 
 
-@compiled()
+@compiled(inner=True)
 def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Plane`."""
     if not len(tables):
@@ -157,7 +157,7 @@ def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value
             wrench[row, 3 + i] = place[j] * tables[e, 3 + k] - place[k] * tables[e, 3 + j]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.Axis`."""
     if not len(tables):
@@ -217,7 +217,7 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                     wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
     if not len(tables):
@@ -242,7 +242,7 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
             wrench[row, 3 + i] = world[j] * local[k] - world[k] * local[j]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.range_of_motion.TwistRow`."""
     if not len(tables):
@@ -270,7 +270,7 @@ def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value
             wrench[row, 3 + i] = base[i, 0] * along[0] + base[i, 1] * along[1] + base[i, 2] * along[2]
 
 
-@compiled()
+@compiled(inner=True)
 def _turned(joint: Array, part: Array, turn: Array) -> None:
     """Rotation (3, 3) in the world of a frame with the rotation `part` (9,) in a joint (4, 3)."""
     for i in range(3):
@@ -280,7 +280,7 @@ def _turned(joint: Array, part: Array, turn: Array) -> None:
                 turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
-@compiled()
+@compiled(inner=True)
 def _dot(edge: Array, part: int, direction: Array) -> float:
     """A plane of an edge times a direction (3,)."""
     product: float = (
@@ -289,7 +289,7 @@ def _dot(edge: Array, part: int, direction: Array) -> float:
     return product
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def signed_angle(edges: Array, direction: Array, gradient: Array) -> float:
     """Angle of a unit direction (3,) to the nearest edge (k, 15) of a cone, positive inside; writes its gradient."""
     count = len(edges)
@@ -335,7 +335,7 @@ def signed_angle(edges: Array, direction: Array, gradient: Array) -> float:
     return angle
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _inward(edges: Array, direction: Array, gradient: Array) -> None:
     """Direction into the cone at a place on its edge."""
     nearest, least = 0, np.inf

@@ -47,13 +47,13 @@ from wholebody.term_entries import (
 )
 
 
-@compiled()
+@compiled(inner=True)
 def _floats(flat: Array, layout: Integers, table: int) -> Array:
     start, rows, columns = layout[table, 0], layout[table, 1], layout[table, 2]
     return flat[start : start + rows * columns].reshape((rows, columns))
 
 
-@compiled()
+@compiled(inner=True)
 def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
     start, rows, columns = layout[table, 3], layout[table, 4], layout[table, 5]
     return flat[start : start + rows * columns].reshape((rows, columns))
@@ -162,7 +162,7 @@ def linearise(
     )  # fmt: skip
 
 
-@compiled()
+@compiled(inner=True)
 def _row(
     wrench: Array, joint: int, against: int, columns: Array, bodies: Integers, column: Integers, row: Array
 ) -> None:
@@ -188,7 +188,7 @@ def _row(
             against = bodies[at, 0]
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _mass_centers(
     tables: Array,
     entries: Integers,
@@ -228,7 +228,7 @@ def _mass_centers(
             jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
 
 
-@compiled()
+@compiled(inner=True)
 def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) -> None:
     for v in range(box.shape[1]):
         box[0, v], box[1, v] = -np.inf, np.inf
@@ -245,7 +245,7 @@ def _box(limits: Array, places: Integers, boxes: Array, q: Array, box: Array) ->
             box[1, v] = min(max(box[1, v], low), high)
 
 
-@compiled()
+@compiled(inner=True)
 def _measures(
     distances: Array, distance_places: Integers, joints: Array, joint_places: Integers, q: Array, measure: Array
 ) -> None:

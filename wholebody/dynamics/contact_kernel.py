@@ -51,9 +51,9 @@ def lay(
                 least = k
         i, j = (least + 1) % 3, (least + 2) % 3
         size = np.sqrt(normal[c, i] ** 2 + normal[c, j] ** 2)
-        axes[c, 0] = normal[c]
         axes[c, 1, least], axes[c, 1, i], axes[c, 1, j] = 0.0, -normal[c, j] / size, normal[c, i] / size
         for k in range(3):
+            axes[c, 0, k] = normal[c, k]
             i, j = (k + 1) % 3, (k + 2) % 3
             axes[c, 2, k] = normal[c, i] * axes[c, 1, j] - normal[c, j] * axes[c, 1, i]
         for side in range(2):
@@ -79,7 +79,7 @@ def lay(
         mobility[c, 1] = mean + np.sqrt((0.5 * (gram[1, 1] - gram[2, 2])) ** 2 + gram[1, 2] ** 2)
 
 
-@compiled()
+@compiled(inner=True)
 def coupling(c: int, row: int, other: int, jacobian: Array, answer: Array) -> float:
     """Change of the relative velocity along one axis of a point by a unit impulse along another."""
     total = 0.0
@@ -89,7 +89,7 @@ def coupling(c: int, row: int, other: int, jacobian: Array, answer: Array) -> fl
     return total
 
 
-@compiled()
+@compiled(inner=True)
 def relative(c: int, row: int, bodies: Indices, jacobian: Array, twist: Array) -> float:
     """Velocity of B's point relative to A's along an axis of a contact point."""
     a, b = bodies[c, 0], bodies[c, 1]
@@ -99,7 +99,7 @@ def relative(c: int, row: int, bodies: Indices, jacobian: Array, twist: Array) -
     return total
 
 
-@compiled()
+@compiled(inner=True)
 def push(c: int, row: int, impulse: float, bodies: Indices, answer: Array, twist: Array) -> None:
     """Change the velocities by an impulse along an axis of a contact point: on B, and its opposite on A."""
     a, b = bodies[c, 0], bodies[c, 1]

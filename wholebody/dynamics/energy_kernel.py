@@ -32,7 +32,7 @@ LARGEST = 1.05  # of s: an island with joints that hardly moves is not made to m
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
-@compiled()
+@compiled(inner=True)
 def _kinetic(mass: float, rotation: Array, inertia: Array, twist: Array, turning: Array) -> float:
     angular_momentum(rotation, inertia, twist[3:], turning)
     total = 0.0
@@ -41,7 +41,7 @@ def _kinetic(mass: float, rotation: Array, inertia: Array, twist: Array, turning
     return 0.5 * total
 
 
-@compiled()
+@compiled(inner=True)
 def _islands(
     bodies: Indices,
     impulse: Array,
@@ -213,7 +213,7 @@ def settle(
             )  # fmt: skip
 
 
-@compiled()
+@compiled(inner=True)
 def _scale(
     island: int,
     free: bool,
@@ -254,7 +254,7 @@ def _scale(
                 twist[b, k] -= (1.0 - share) * own[k]
 
 
-@compiled()
+@compiled(inner=True)
 def _seen(b: int, free: bool, position: Array, twist: Array, centre: Array, whole: Array, own: Array) -> None:
     """Write the velocities (6,) of a body seen from the island that moves as one."""
     for k in range(6):
@@ -267,7 +267,7 @@ def _seen(b: int, free: bool, position: Array, twist: Array, centre: Array, whol
             own[3 + k] -= whole[3 + k]
 
 
-@compiled()
+@compiled(inner=True)
 def _as_one(
     island: int,
     root: Indices,

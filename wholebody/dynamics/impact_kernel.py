@@ -115,7 +115,7 @@ def resolve(
     return most, False
 
 
-@compiled()
+@compiled(inner=True)
 def _single(
     c: int,
     bodies: Indices,
@@ -150,7 +150,7 @@ def _single(
         impulse[row] = part
 
 
-@compiled()
+@compiled(inner=True)
 def _lose(
     chosen: Indices,
     bodies: Indices,

@@ -16,7 +16,7 @@ LARGEST_TURN = 0.1  # rad: of one midpoint step; smaller is more accurate and sl
 STILL = 1e-12  # rad/s: slower than this a body does not turn
 
 
-@compiled()
+@compiled(inner=True)
 def exponential(turn: Array, rotation: Array) -> None:
     """Write the rotation (3, 3) by a rotation vector (3,)."""
     angle = np.sqrt(turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2)
@@ -36,7 +36,7 @@ def exponential(turn: Array, rotation: Array) -> None:
     rotation[2, 1] += sine * turn[0]
 
 
-@compiled()
+@compiled(inner=True)
 def _turned(turn: Array, rotation: Array, result: Array) -> None:
     """Write exp(turn) rotation."""
     by = np.empty((3, 3))
@@ -46,7 +46,7 @@ def _turned(turn: Array, rotation: Array, result: Array) -> None:
             result[i, j] = by[i, 0] * rotation[0, j] + by[i, 1] * rotation[1, j] + by[i, 2] * rotation[2, j]
 
 
-@compiled()
+@compiled(inner=True)
 def _spin(rotation: Array, inverse: Array, momentum: Array, spin: Array) -> None:
     """Write the angular velocity R I^-1 R^T L."""
     local, other = np.empty(3), np.empty(3)
@@ -58,7 +58,7 @@ def _spin(rotation: Array, inverse: Array, momentum: Array, spin: Array) -> None
         spin[i] = rotation[i, 0] * other[0] + rotation[i, 1] * other[1] + rotation[i, 2] * other[2]
 
 
-@compiled()
+@compiled(inner=True)
 def angular_momentum(rotation: Array, inertia: Array, spin: Array, result: Array) -> None:
     """Write the angular momentum R I R^T w (3,) of a body about its centre of mass."""
     _spin(rotation, inertia, spin, result)
@@ -111,14 +111,14 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
         _write(now, rotation)
 
 
-@compiled()
+@compiled(inner=True)
 def _write(rotation: Array, result: Array) -> None:
     for i in range(3):
         for j in range(3):
             result[i, j] = rotation[i, j]
 
 
-@compiled()
+@compiled(inner=True)
 def _orthonormal(rotation: Array) -> None:
     """Remove rounding from a rotation: one step of Newton's iteration for the polar factor."""
     product = np.empty((3, 3))

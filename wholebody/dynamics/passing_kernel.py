@@ -146,7 +146,7 @@ def doubtful(
     return doubts
 
 
-@compiled()
+@compiled(inner=True)
 def _share(start: float, end: float, least: float) -> float:
     """Share of the way from a start to an end on which a value that changes linearly is not below the least one."""
     if end >= least:
@@ -154,7 +154,7 @@ def _share(start: float, end: float, least: float) -> float:
     return 0.0 if start <= least else (start - least) / (start - end)
 
 
-@compiled()
+@compiled(inner=True)
 def _carried(direction: Array, before: Array, after: Array) -> Array:
     """A direction (3,) that turns with a piece, after it; placements (4, 3)."""
     result = np.zeros(3)
@@ -165,7 +165,7 @@ def _carried(direction: Array, before: Array, after: Array) -> Array:
     return result
 
 
-@compiled()
+@compiled(inner=True)
 def _part(
     pair: Indices,
     direction: Array,

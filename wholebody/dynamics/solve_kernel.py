@@ -92,7 +92,7 @@ def _visit(
     return change, step * step * each + (one * one + two * two) * side, True
 
 
-@compiled(error_model="numpy", fastmath=FAST)
+@compiled(inner=True, error_model="numpy", fastmath=FAST)
 def _hold(
     first: int,
     chosen: Indices,

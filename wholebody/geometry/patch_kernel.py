@@ -9,7 +9,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
 
 
-@compiled()
+@compiled(inner=True)
 def snap_normals(
     wide: Indices,
     pair: Indices,
@@ -60,14 +60,14 @@ def snap_normals(
                 _to_frame(placement[own], normal[c], sign, turned)
 
 
-@compiled()
+@compiled(inner=True)
 def _to_frame(placement: Array, vector: Array, sign: float, turned: Array) -> None:
     """Write a vector (3,) of the world, times a sign, in the axes of a piece."""
     for i in range(3):
         turned[i] = sign * (placement[i, 0] * vector[0] + placement[i, 1] * vector[1] + placement[i, 2] * vector[2])
 
 
-@compiled()
+@compiled(inner=True)
 def patch_ends(
     wide: Indices,
     pair: Indices,
@@ -187,7 +187,8 @@ def patch_ends(
                 rows = filled - begun
                 for row in range(rows):
                     contact[first_begun + row] = contact[begun + row]
-                    place[first_begun + row] = place[begun + row]
+                    for k in range(3):
+                        place[first_begun + row, k] = place[begun + row, k]
                     gap[first_begun + row] = gap[begun + row]
                 filled = first_begun + rows
         if filled - first_begun > most_ends:
@@ -198,7 +199,7 @@ def patch_ends(
     return contact[:filled], place[:filled], gap[:filled]
 
 
-@compiled()
+@compiled(inner=True)
 def _farthest_first(place: Array, gap: Array, witness: Array, distance: float, setback: float, count: int) -> None:
     """Move `count` places of a contact to the front, with their gaps: each the farthest from those before it.
 
@@ -294,7 +295,7 @@ def contact_rows(
     return count + len(owner)
 
 
-@compiled()
+@compiled(inner=True)
 def _wrench(normal: Array, point: Array, wrench: Array) -> None:
     """[n, x cross n]."""
     for k in range(3):

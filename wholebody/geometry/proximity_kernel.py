@@ -10,7 +10,7 @@ from wholebody.compiled import compiled
 from wholebody.geometry.memory_views import RESULT_FIRST
 
 
-@compiled()
+@compiled(inner=True)
 def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> None:
     """Add to `travelled` (n,) how far a point of each piece can have moved since `last`, and renew `last`.
 
@@ -39,7 +39,7 @@ def travel(placement: Array, last: Array, reach: Array, travelled: Array) -> Non
             travelled[i] += np.sqrt(shift)
 
 
-@compiled()
+@compiled(inner=True)
 def bound_by_boxes(placement: Array, half: Array, extent: Array) -> None:
     """Write half the sizes (n, 3) of boxes along the world's axes about boxes along the pieces' own into `extent`."""
     for i in range(len(half)):
@@ -50,7 +50,7 @@ def bound_by_boxes(placement: Array, half: Array, extent: Array) -> None:
             extent[i, k] = total
 
 
-@compiled()
+@compiled(inner=True)
 def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> float:
     """A lower bound of the signed distance of two pieces: the gap between the spheres or the boxes about them."""
     square = 0.0
@@ -63,7 +63,7 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
     return gap
 
 
-@compiled()
+@compiled(inner=True)
 def cull(
     placement: Array,
     pairs: Indices,
@@ -168,7 +168,7 @@ def gather(
     return count, broken
 
 
-@compiled()
+@compiled(inner=True)
 def mark(active: NDArray[np.bool_], pairs: Indices, marked: Indices, before: int, index: Indices, count: int) -> bool:
     """Set the entries (first, second) of the pairs ``index[:count]`` in a matrix that has those of ``marked[:before]``.
 

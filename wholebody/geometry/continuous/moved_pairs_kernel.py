@@ -79,7 +79,7 @@ def far_moved(
     return found[:kept]
 
 
-@compiled()
+@compiled(inner=True)
 def _between(placements: Array, first: int, second: int) -> float:
     """Distance of two pieces' origins."""
     total = 0.0
@@ -88,7 +88,7 @@ def _between(placements: Array, first: int, second: int) -> float:
     return float(np.sqrt(total))
 
 
-@compiled()
+@compiled(inner=True)
 def _seen(before: Array, after: Array, carrier: int, other: int, reach: float, arc: float, endless: float) -> float:
     """Largest motion of a point of a piece in the axes of another one."""
     shift, turn = 0.0, 0.0

@@ -130,7 +130,7 @@ def lower_bounds(
         bound[k] = best
 
 
-@compiled()
+@compiled(inner=True)
 def _curvature(
     first: int, second: int, gap: float, joint: Indices, turn: Array, speeds: Array, carries: NDArray[np.bool_],
     reach: Array,
@@ -152,7 +152,7 @@ def _curvature(
     return total
 
 
-@compiled()
+@compiled(inner=True)
 def _support(
     piece: int, x: float, y: float, z: float, points: Array, first_point: Indices, radius: Array, radii: Array
 ) -> float:
@@ -166,7 +166,7 @@ def _support(
     return float(most + radius[piece])
 
 
-@compiled()
+@compiled(inner=True)
 def _above(
     carrier: int, other: int, normal: Array, height: float, place: Array, points: Array, first_point: Indices,
     radius: Array, radii: Array,

@@ -207,7 +207,7 @@ def greatest_error(here: Array, there: Array, points: Mask) -> float:
     return worst
 
 
-@compiled()
+@compiled(inner=True)
 def _slide(
     line: Array,
     values: Array,
@@ -235,7 +235,7 @@ def _slide(
     return float(new - old)
 
 
-@compiled()
+@compiled(inner=True)
 def _turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> tuple[float, float, float]:
     """A vector turned about a line's unit axis (Rodrigues)."""
     ux, uy, uz = line[0], line[1], line[2]

@@ -71,7 +71,7 @@ def solve_growing(
     return rounds
 
 
-@compiled()
+@compiled(inner=True)
 def _contains(sorted_keys: Indices, key: int) -> bool:
     """Whether keys (k,) in ascending order contain one; numba's searchsorted would load scipy.linalg at every start."""
     low, high = 0, len(sorted_keys)

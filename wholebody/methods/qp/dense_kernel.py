@@ -11,7 +11,7 @@ SWEEPS = 30  # over all rows in one projection, at most
 LEAST = 1e-9  # of the square of a row that moves anything, and m or rad by which a row is violated
 
 
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+@compiled(inner=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def dot(a: Array, b: Array) -> float:
     """The product of two vectors."""
     total = 0.0
@@ -20,14 +20,14 @@ def dot(a: Array, b: Array) -> float:
     return total
 
 
-@compiled()
+@compiled(inner=True)
 def add(factor: float, row: Array, total: Array) -> None:
     """Add a multiple of a row to a vector, in place."""
     for i in range(len(total)):
         total[i] += factor * row[i]
 
 
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+@compiled(inner=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
     """Lower triangle (size, size) of the products of rows, four at a time."""
     n = stacked.shape[1]
@@ -49,7 +49,7 @@ def gram(scaled: Array, stacked: Array, size: int, system: Array) -> None:
             s += 1
 
 
-@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
+@compiled(inner=True, error_model="numpy", fastmath={"contract", "reassoc"})
 def solve(system: Array, right: Array) -> bool:
     """Solve a symmetric positive definite system in place by Cholesky's L L'; false where it is not one."""
     size = len(right)

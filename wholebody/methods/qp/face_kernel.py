@@ -9,7 +9,7 @@ from wholebody.compiled import compiled
 from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def minimise_on_face(
     diagonal: Array,
     linear: Array,
@@ -83,7 +83,7 @@ def minimise_on_face(
     return finite
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _minimise_in_columns(
     stacked: Array,
     right: Array,

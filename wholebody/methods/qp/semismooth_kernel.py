@@ -42,7 +42,9 @@ def minimise(
     inverse, trial, gradient, way, end = np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
     violated, speed = np.empty(k), np.empty(k)
     for r in range(m):
-        stacked[r], right[r], compliance[r] = rows[r], target[r], 1.0 / weight[r]
+        right[r], compliance[r] = target[r], 1.0 / weight[r]
+        for i in range(n):
+            stacked[r, i] = rows[r, i]
     for i in range(n):
         x[i] = min(max(x[i], lower[i]), upper[i])
     _look(elastic, least, x, violated, pushing)
@@ -56,7 +58,9 @@ def minimise(
         size = m
         for j in range(k):
             if pushing[j]:
-                stacked[size], right[size], compliance[size] = elastic[j], least[j], 1.0 / elastic_weight[j]
+                right[size], compliance[size] = least[j], 1.0 / elastic_weight[j]
+                for i in range(n):
+                    stacked[size, i] = elastic[j, i]
                 size += 1
         if not minimise_on_face(
             diagonal, linear, lower, upper, at_lower, at_upper, stacked, right, compliance, size, row_tolerance, scaled,
@@ -104,7 +108,7 @@ def minimise(
     return used
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _look(elastic: Array, least: Array, x: Array, violated: Array, pushing: Mask) -> bool:
     """By how much each elastic row is violated at x (n,) and whether it pushes; whether that differs from before."""
     changed = False
@@ -115,7 +119,7 @@ def _look(elastic: Array, least: Array, x: Array, violated: Array, pushing: Mask
     return changed
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _differentiate(
     diagonal: Array,
     linear: Array,
@@ -138,7 +142,7 @@ def _differentiate(
             add(-elastic_weight[j] * violated[j], elastic[j], gradient)
 
 
-@compiled(error_model="numpy")
+@compiled(inner=True, error_model="numpy")
 def _line_minimum(
     base: float, rise: float, violated: Array, speed: Array, elastic_weight: Array, longest: float, whole: float
 ) -> float:

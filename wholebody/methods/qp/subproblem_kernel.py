@@ -175,7 +175,7 @@ def program(
         least[r] = min(violated[r], most)
 
 
-@compiled()
+@compiled(inner=True)
 def _middle(values: Array) -> float:
     """Entry that half of the values (n,) are less than."""
     ordered = values.copy()

@@ -109,7 +109,7 @@ def bent(
     return worst
 
 
-@compiled()
+@compiled(inner=True)
 def _seen_from(
     place: Array,
     reach: float,
