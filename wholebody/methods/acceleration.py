@@ -26,24 +26,36 @@ class Anderson:
 
     def reset(self) -> None:
         """Begin anew: after a rejected step, or when other constraints are at work."""
+        self._step: Array | None = None  # of which the way is not known yet
         self._steps: list[Array] = []
         self._ways: list[Array] = []
 
-    def propose(self, step: Array) -> Array | None:
-        """The accelerated step for the plain one (k,), or None while too little is known."""
-        self._steps.append(step)
-        if len(self._steps) < 3:
+    def propose(self, step: Array, stretch: float = STRETCH) -> Array | None:
+        """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little is known.
+
+        The plain step is remembered once `went` tells the way.
+        """
+        self._step = step
+        if len(self._steps) < 2:
             return None
-        changes = np.diff(np.array(self._steps[-DEPTH - 1 :]), axis=0).T
-        ways = np.array(self._ways[-changes.shape[1] :]).T
+        steps, ways = [*self._steps[-DEPTH:], step], np.array(self._ways[-DEPTH:]).T
+        changes = np.diff(np.array(steps), axis=0).T
         coefficients = np.linalg.lstsq(changes, step, rcond=None)[0]
         fast: Array = step - (ways + changes) @ coefficients
         if not np.isfinite(fast).all():
             return None
-        longest = STRETCH * float(np.abs(step).max())
+        longest = stretch * float(np.abs(step).max())
         size = float(np.abs(fast).max())
         return fast if size <= longest else fast * (longest / size)
 
+    def forget(self) -> None:
+        """Forget all steps but the last that was proposed for: an accelerated one was rejected."""
+        self._steps.clear()
+        self._ways.clear()
+
     def went(self, way: Array) -> None:
         """Remember the way that was gone after the last step was proposed."""
-        self._ways.append(way)
+        if self._step is not None:
+            self._steps.append(self._step)
+            self._ways.append(way)
+            self._step = None

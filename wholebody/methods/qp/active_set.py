@@ -75,6 +75,19 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
+def without_gradient(program: QuadraticProgram, active: ActiveSet) -> Array | None:
+    """Minimiser (n,) of a program with g = 0 on the face of an active set, clipped to the box; None: not finite."""
+    program.check_shapes(active)
+    kernel, x = compiled_kernel(), np.empty(program.size)
+    parts = (
+        program.diagonal, program.rows, program.target, program.weight, program.elastic, program.least,
+        program.elastic_weight, program.lower, program.upper,
+    )  # fmt: skip
+    work = np.empty(kernel.work_size(program.size, len(program.target), len(program.least)))
+    finite = kernel.minimise_without_gradient(*map(np.ascontiguousarray, parts), *active, ROW_TOLERANCE, work, x)
+    return x if finite else None
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
@@ -89,5 +102,8 @@ def compiled_kernel() -> Any:
     )
     active_set_kernel.solve_growing(
         *program, index, index, mask, mask.copy(), row, row, np.ones(6), work, np.zeros(1, dtype=np.intp), np.zeros(1)
+    )
+    active_set_kernel.minimise_without_gradient(
+        one, *program[2:], mask, mask.copy(), row, ROW_TOLERANCE, work, np.zeros(1)
     )
     return active_set_kernel
