@@ -75,12 +75,21 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
-def without_gradient(program: QuadraticProgram, active: ActiveSet) -> Array | None:
-    """Minimiser (n,) of a program with g = 0 on the face of an active set, clipped to the box; None: not finite."""
+def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array) -> Array | None:
+    """Minimiser of a program with g = 0 and its active set fixed.
+
+    Args:
+        program: what to solve.
+        active: the set.
+        target: (m,) targets of the soft rows, in the place of the program's.
+
+    Returns:
+        (n,) the minimiser, clipped to the box; None where it is not finite.
+    """
     program.check_shapes(active)
     kernel, x = compiled_kernel(), np.empty(program.size)
     parts = (
-        program.diagonal, program.rows, program.target, program.weight, program.elastic, program.least,
+        program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
     work = np.empty(kernel.work_size(program.size, len(program.target), len(program.least)))

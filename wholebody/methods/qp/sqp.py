@@ -215,7 +215,7 @@ class SQP:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat = answer.x, None, False
         if self._measures and here.violation.total <= WIDTH:
-            parts = parts_of(program, answer)
+            parts = parts_of(program, answer, self._shift)
         if parts is not None:
             saved = self.subproblem.bending(program, here.rows, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))

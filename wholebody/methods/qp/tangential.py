@@ -33,9 +33,17 @@ class Parts(NamedTuple):
     tangential: Array
 
 
-def parts_of(program: QuadraticProgram, answer: QPSolution) -> Parts | None:
-    """The parts of the answer of a program; None where its face has no normal part."""
-    normal = without_gradient(program, answer.active)
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Parts | None:
+    """The parts of the answer of a program; None where its face has no normal part.
+
+    Args:
+        program: of a step.
+        answer: its answer.
+        shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
+    """
+    target = program.target.copy()
+    target[: len(shift)] += shift
+    normal = without_gradient(program, answer.active, target)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 
