@@ -36,6 +36,7 @@ FULL_STEP_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after 
 FULL_STEP_GAIN = 0.05  # share of the violation that a step must take away, or full steps end
 LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
+WITHIN_STEP = 1.0  # m per rad of the last step: nor farther than this; more rows, or more that is met unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
 PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
@@ -65,12 +66,13 @@ class LocalSolution(NamedTuple):
 
 
 class Iterate(NamedTuple):
-    """A posture that was looked at."""
+    """A posture that was looked at, and the longest entry of the step that led there, radians or metres."""
 
     at: Linearisation
     rows: Rows
     violation: Violation
     placed: Placed
+    longest: float = np.inf
 
 
 class Step(NamedTuple):
@@ -245,19 +247,19 @@ class SQP:
             self._ahead.reset()
         fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
         if fast is not None:
-            leap = self._iterate_at(pin.integrate(self.lineariser.state.model, here.at.q, fast))
+            leap = self._moved(here, fast)
             acceptance = self._judge(here, leap, step.predicted)
             if acceptance.accepted and not self._jumps(here, leap):
-                self._record(leap, fast, "accelerated")
+                self._record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
             self._ahead.refused()
         dq = step.dq
-        there = self._iterate_at(pin.integrate(self.lineariser.state.model, here.at.q, dq))
+        there = self._moved(here, dq)
         acceptance = self._judge(here, there, step.predicted)
         promising = not acceptance.accepted and self._promises(here, there)
         if (acceptance.accepted or promising) and self._jumps(here, there):
             acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
-        self._record(there, dq, "tentative" if promising else acceptance.by)
+        self._record(there, "tentative" if promising else acceptance.by)
         if promising:
             self._anchor = here
             self._ahead.reset()
@@ -269,7 +271,7 @@ class SQP:
             return None
         if not acceptance.accepted:
             self._stretch = 1.0
-            self._radius = 0.3 * min(float(np.abs(dq).max(initial=0.0)), self._radius)
+            self._radius = 0.3 * min(there.longest, self._radius)
             self._damping = max(0.3, 2.0 * self._damping) if acceptance.by != "rejected measure" else self._damping
             self._shift = np.zeros_like(self._shift)
             self._ahead.reset()
@@ -289,13 +291,12 @@ class SQP:
             self._full_step, self._damping = False, 0.0
         if acceptance.by == "goal":
             self._funnel.narrow(here.violation.total, there.violation.total)
-        longest = float(np.abs(way).max(initial=0.0))
-        if not self._full_step and here.violation.left > self._pull and longest < 0.25 * self._radius:
+        if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
             if not self._full_step:
                 self._damping *= 0.3
-            if longest > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
+            if there.longest > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
@@ -317,13 +318,18 @@ class SQP:
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
-    def _iterate_at(self, q: Array) -> Iterate:
-        within = min(max(LEAST_WITHIN, ERROR_CLAMP * self._radius), MOST_WITHIN)
+    def _moved(self, here: Iterate, way: Array) -> Iterate:
+        """Where a way (nv,) leads."""
+        q = pin.integrate(self.lineariser.state.model, here.at.q, way)
+        return self._iterate_at(q, float(np.abs(way).max(initial=0.0)))
+
+    def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
+        within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
         at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within))
+        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within), longest)
 
     def _judge(self, here: Iterate, there: Iterate, predicted: PredictedReduction) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
@@ -339,7 +345,7 @@ class SQP:
             self._measures,
         )
 
-    def _record(self, there: Iterate, dq: Array, what: str) -> None:
+    def _record(self, there: Iterate, what: str) -> None:
         note = f"{self.note}: {what}" if self.note else what
         violation = there.violation
         self.trace.append(
@@ -347,7 +353,7 @@ class SQP:
                 violation.left,
                 max(violation.hold, violation.elastic),
                 there.at.measure,
-                float(np.abs(dq).max(initial=0.0)),
+                there.longest,
                 note,
             )
         )
