@@ -75,13 +75,14 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
-def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array) -> Array | None:
+def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
     """Minimiser of a program with g = 0 and its active set fixed.
 
     Args:
         program: what to solve.
         active: the set.
         target: (m,) targets of the soft rows, in the place of the program's.
+        work: room; see `active_set_kernel.work_size`.
 
     Returns:
         (n,) the minimiser, clipped to the box; None where it is not finite.
@@ -92,7 +93,6 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
         program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
-    work = np.empty(kernel.work_size(program.size, len(program.target), len(program.least)))
     finite = kernel.minimise_without_gradient(*map(np.ascontiguousarray, parts), *active, ROW_TOLERANCE, work, x)
     return x if finite else None
 

@@ -142,7 +142,7 @@ class SQP:
         here = self._iterate_at(start)
         self._funnel = Funnel(here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
-        working_set = WorkingSet(self.solver)
+        self._working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
         while count < self.iterations and not self.control.over:
@@ -159,7 +159,7 @@ class SQP:
                 self._shift,
                 self._measures,
             )
-            answer = working_set.solve(program, here.rows.key)
+            answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
             if self._settled(here, step):
                 if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
@@ -217,7 +217,7 @@ class SQP:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat = answer.x, None, False
         if self._measures and here.violation.total <= WIDTH:
-            parts = parts_of(program, answer, self._shift)
+            parts = parts_of(program, answer, self._shift, self._working_set)
         if parts is not None:
             saved = self.subproblem.bending(program, here.rows, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))

@@ -19,8 +19,8 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.methods.acceleration import STRETCH, Anderson
-from wholebody.methods.qp.active_set import without_gradient
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.working_set import WorkingSet
 
 ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
 SHORTER, LONGER = 1.0 / 3.0, 2.0  # factors of the longest extrapolation after one was rejected, and taken
@@ -33,17 +33,18 @@ class Parts(NamedTuple):
     tangential: Array
 
 
-def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Parts | None:
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, working_set: WorkingSet) -> Parts | None:
     """The parts of the answer of a program; None where its face has no normal part.
 
     Args:
         program: of a step.
         answer: its answer.
         shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
+        working_set: that found the answer.
     """
     target = program.target.copy()
     target[: len(shift)] += shift
-    normal = without_gradient(program, answer.active, target)
+    normal = working_set.without_gradient(program, answer.active, target)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 
