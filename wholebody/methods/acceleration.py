@@ -9,6 +9,8 @@ linear sequence. From the last few, the combination that would have made the ste
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 
 from wholebody.arrays import Array
@@ -38,14 +40,13 @@ class Anderson:
         self._step = step
         if len(self._steps) < 2:
             return None
-        steps, ways = [*self._steps[-DEPTH:], step], np.array(self._ways[-DEPTH:]).T
-        changes = np.diff(np.array(steps), axis=0).T
-        coefficients = np.linalg.lstsq(changes, step, rcond=None)[0]
-        fast: Array = step - (ways + changes) @ coefficients
-        if not np.isfinite(fast).all():
+        steps, ways = np.array([*self._steps[-DEPTH:], step]), np.array(self._ways[-DEPTH:])
+        changes = steps[1:] - steps[:-1]
+        coefficients = np.linalg.lstsq(changes.T, step, rcond=None)[0]
+        fast: Array = step - coefficients @ (ways + changes)
+        longest, size = stretch * float(np.abs(step).max()), float(np.abs(fast).max())
+        if not isfinite(size):
             return None
-        longest = stretch * float(np.abs(step).max())
-        size = float(np.abs(fast).max())
         return fast if size <= longest else fast * (longest / size)
 
     def forget(self) -> None:
