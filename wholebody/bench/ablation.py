@@ -179,7 +179,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     return {
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
         "the watchdog": (SQP, "_promises", lambda self, here, there: False),
-        "acceleration": (Anderson, "propose", lambda self, dq: None),
+        "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "feasibility first": (Search, "_feasibility_first", lambda self, start: self.best),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "relaxed probes": (Search, "_relaxed_probes", lambda self, starts: iter(())),

@@ -53,7 +53,7 @@ class State:
         """Allocate Pinocchio's data for `model`."""
         instance(model, pin.Model, "model", "give figure.model")
         self.model = model
-        self.data = model.createData()
+        self.data = pin.Data(model)
         self.q: Array = pin.neutral(model)
         self.support = joint_support(model)
         self.parents: NDArray[np.intp] = np.array(list(model.parents), dtype=np.intp)

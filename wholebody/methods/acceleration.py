@@ -9,6 +9,8 @@ linear sequence. From the last few, the combination that would have made the ste
 
 from __future__ import annotations
 
+from math import isfinite
+
 import numpy as np
 
 from wholebody.arrays import Array
@@ -26,24 +28,35 @@ class Anderson:
 
     def reset(self) -> None:
         """Begin anew: after a rejected step, or when other constraints are at work."""
+        self._step: Array | None = None  # of which the way is not known yet
         self._steps: list[Array] = []
         self._ways: list[Array] = []
 
-    def propose(self, step: Array) -> Array | None:
-        """The accelerated step for the plain one (k,), or None while too little is known."""
-        self._steps.append(step)
-        if len(self._steps) < 3:
+    def propose(self, step: Array, stretch: float = STRETCH) -> Array | None:
+        """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little is known.
+
+        The plain step is remembered once `went` tells the way.
+        """
+        self._step = step
+        if len(self._steps) < 2:
             return None
-        changes = np.diff(np.array(self._steps[-DEPTH - 1 :]), axis=0).T
-        ways = np.array(self._ways[-changes.shape[1] :]).T
-        coefficients = np.linalg.lstsq(changes, step, rcond=None)[0]
-        fast: Array = step - (ways + changes) @ coefficients
-        if not np.isfinite(fast).all():
+        steps, ways = np.array([*self._steps[-DEPTH:], step]), np.array(self._ways[-DEPTH:])
+        changes = steps[1:] - steps[:-1]
+        coefficients = np.linalg.lstsq(changes.T, step, rcond=None)[0]
+        fast: Array = step - coefficients @ (ways + changes)
+        longest, size = stretch * float(np.abs(step).max()), float(np.abs(fast).max())
+        if not isfinite(size):
             return None
-        longest = STRETCH * float(np.abs(step).max())
-        size = float(np.abs(fast).max())
         return fast if size <= longest else fast * (longest / size)
+
+    def forget(self) -> None:
+        """Forget all steps but the last that was proposed for: an accelerated one was rejected."""
+        self._steps.clear()
+        self._ways.clear()
 
     def went(self, way: Array) -> None:
         """Remember the way that was gone after the last step was proposed."""
-        self._ways.append(way)
+        if self._step is not None:
+            self._steps.append(self._step)
+            self._ways.append(way)
+            self._step = None

@@ -63,7 +63,8 @@ def test_what_is_left_free_minimises_the_measures(planar_arm):
             turn = np.arctan2(wrist[1], wrist[0]) - np.arctan2(0.3 * np.sin(bend), 0.4 + 0.3 * np.cos(bend))
             best = min(best, float(((np.array([turn, bend, last - turn - bend]) - start) ** 2).sum()))
     assert solution.assessment.measure == pytest.approx(best, rel=1e-6)
-    assert solution.assessment.optimality < 1e-5
+    # the measures, whose curvature is 2, may be higher by tolerance (1 + measure)
+    assert solution.assessment.optimality < np.sqrt(1e-8 * (1.0 + best))
 
 
 @pytest.mark.parametrize("beyond", [0.001, 1.0])

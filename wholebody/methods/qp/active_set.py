@@ -75,6 +75,28 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
+def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
+    """Minimiser of a program with g = 0 and its active set fixed.
+
+    Args:
+        program: what to solve.
+        active: the set.
+        target: (m,) targets of the soft rows, in the place of the program's.
+        work: room; see `active_set_kernel.work_size`.
+
+    Returns:
+        (n,) the minimiser, clipped to the box; None where it is not finite.
+    """
+    program.check_shapes(active)
+    kernel, x = compiled_kernel(), np.empty(program.size)
+    parts = (
+        program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
+        program.elastic_weight, program.lower, program.upper,
+    )  # fmt: skip
+    finite = kernel.minimise_without_gradient(*map(np.ascontiguousarray, parts), *active, ROW_TOLERANCE, work, x)
+    return x if finite else None
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
@@ -89,5 +111,8 @@ def compiled_kernel() -> Any:
     )
     active_set_kernel.solve_growing(
         *program, index, index, mask, mask.copy(), row, row, np.ones(6), work, np.zeros(1, dtype=np.intp), np.zeros(1)
+    )
+    active_set_kernel.minimise_without_gradient(
+        one, *program[2:], mask, mask.copy(), row, ROW_TOLERANCE, work, np.zeros(1)
     )
     return active_set_kernel

@@ -218,3 +218,53 @@ def primal_dual_active_set(
         mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
         mask[place] = not mask[place]
     return False
+
+
+@compiled(error_model="numpy")
+def minimise_without_gradient(
+    diagonal: Array,
+    rows: Array,
+    target: Array,
+    weight: Array,
+    elastic: Array,
+    least: Array,
+    elastic_weight: Array,
+    lower: Array,
+    upper: Array,
+    at_lower: Mask,
+    at_upper: Mask,
+    pushing: Mask,
+    row_tolerance: float,
+    work: Array,
+    x: Array,
+) -> bool:
+    """Minimiser x (n,) of a program with g = 0 and its active set fixed, clipped to the bounds.
+
+    `work` (see `work_size`) is room; the others are as for `primal_dual_active_set`.
+
+    Returns:
+        Whether it is finite.
+    """
+    n, m, k = len(diagonal), len(target), len(least)
+    most = m + k
+    stacked, begin = work[: most * n].reshape((most, n)), most * n
+    scaled, begin = work[begin:][: most * n].reshape((most, n)), begin + most * n
+    table, begin = work[begin:][: most * most], begin + most * most
+    right, compliance, multiplier = work[begin:][:most], work[begin + most :][:most], work[begin + 2 * most :][:most]
+    begin += 3 * most + k
+    inverse, gradient, trial = work[begin:][:n], work[begin + n :][:n], work[begin + 2 * n :][:n]
+    size = 0
+    for r in range(m):
+        stacked[size], right[size], compliance[size] = rows[r], target[r], 1.0 / weight[r]
+        size += 1
+    for j in range(k):
+        if pushing[j]:
+            stacked[size], right[size], compliance[size] = elastic[j], least[j], 1.0 / elastic_weight[j]
+            size += 1
+    finite = minimise_on_face(
+        diagonal, np.zeros(n), lower, upper, at_lower, at_upper, stacked, right, compliance, size, row_tolerance,
+        scaled, table, inverse, trial, multiplier, gradient, x,
+    )  # fmt: skip
+    for i in range(n):
+        x[i] = min(max(x[i], lower[i]), upper[i])
+    return finite

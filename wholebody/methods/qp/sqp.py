@@ -19,12 +19,12 @@ from wholebody.arrays import Array
 from wholebody.geometry.continuous.moved_pairs import Placed
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
-from wholebody.methods.acceleration import Anderson
 from wholebody.methods.control import Control
-from wholebody.methods.qp.funnel import Funnel, PredictedReduction, StepAcceptance
+from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
+from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
@@ -36,6 +36,7 @@ FULL_STEP_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after 
 FULL_STEP_GAIN = 0.05  # share of the violation that a step must take away, or full steps end
 LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
+WITHIN_STEP = 1.0  # m per rad of the last step: nor farther than this; more rows, or more that is met unseen
 SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
 PATIENCE = 6
 PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
@@ -43,7 +44,6 @@ UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the mea
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to mend
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
-LAST_STRETCH = 2e-3  # violation foreseen to go, below which steps may be extrapolated
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
@@ -66,12 +66,31 @@ class LocalSolution(NamedTuple):
 
 
 class Iterate(NamedTuple):
-    """A posture that was looked at."""
+    """A posture that was looked at, and the longest entry of the step that led there, radians or metres."""
 
     at: Linearisation
     rows: Rows
     violation: Violation
     placed: Placed
+    longest: float = np.inf
+
+
+class Step(NamedTuple):
+    """What a program says about the way from a posture.
+
+    Attributes:
+        dq: (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain.
+        parts: the answer's parts; None far from the goals, and where measures do not count.
+        flat: whether the tangential part saves less of the measures than counts.
+        answer: (nv,) the program's answer.
+        predicted: what the step is to bring.
+    """
+
+    dq: Array
+    parts: Parts | None
+    flat: bool
+    answer: Array
+    predicted: PredictedReduction
 
 
 @dataclass
@@ -114,7 +133,7 @@ class SQP:
         self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not mended
-        self._memory = Anderson()
+        self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0
 
@@ -123,7 +142,7 @@ class SQP:
         here = self._iterate_at(start)
         self._funnel = Funnel(here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
-        working_set = WorkingSet(self.solver)
+        self._working_set = WorkingSet(self.solver)
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
         while count < self.iterations and not self.control.over:
@@ -140,12 +159,9 @@ class SQP:
                 self._shift,
                 self._measures,
             )
-            answer = working_set.solve(program, here.rows.key)
-            predicted = PredictedReduction(
-                here.violation.total - self.subproblem.violation(here.rows, answer.x).total,
-                self.subproblem.saving(program, here.rows, answer.x),
-            )
-            if self._settled(here, answer, predicted):
+            answer = self._working_set.solve(program, here.rows.key)
+            step = self._foreseen(here, program, answer)
+            if self._settled(here, step):
                 if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
                     renewals -= 1
                     self._radius, self._damping, self._full_step = FIRST_RADIUS, 0.0, False
@@ -155,7 +171,7 @@ class SQP:
             if self._unimproved >= UNIMPROVED:
                 converged = True
                 break
-            there = self._advance(here, program, answer, predicted)
+            there = self._advance(here, program, step)
             if there is not None:
                 here = there
                 self._keep(here)
@@ -165,7 +181,7 @@ class SQP:
                         break
                     if self._measures:
                         self._measures, history = False, []
-                        self._memory.reset()
+                        self._ahead.reset()
                 elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
                     self._measures = True
             elif self._anchor is not None:
@@ -197,9 +213,22 @@ class SQP:
     def _pull(self) -> float:
         return ERROR_CLAMP * self._radius * self._stretch
 
-    def _settled(self, here: Iterate, answer: QPSolution, predicted: PredictedReduction) -> bool:
+    def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
+        """What the answer of a program is to bring; near the goals, what its two parts are."""
+        x, parts, flat = answer.x, None, False
+        if self._measures and here.violation.total <= WIDTH:
+            parts = parts_of(program, answer, self._shift, self._working_set)
+        if parts is not None:
+            saved = self.subproblem.bending(program, here.rows, parts.tangential)
+            flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
+            x = parts.normal if flat else x  # what is asked is met at once, to second order
+        violation = self.subproblem.violation(here.rows, x).total
+        predicted = PredictedReduction(here.violation.total - violation, self.subproblem.saving(program, here.rows, x))
+        return Step(x, parts, flat, answer.x, predicted)
+
+    def _settled(self, here: Iterate, step: Step) -> bool:
         """Whether nothing worth having is foreseen."""
-        violation = here.violation
+        violation, predicted = here.violation, step.predicted
         held = max(violation.hold, violation.elastic) <= self.tolerance
         worth = max(
             0.05 * self.tolerance,
@@ -207,33 +236,33 @@ class SQP:
         )
         if violation.worst > self.tolerance and predicted.violation > worth:
             return False
-        if not self._measures:
+        if not self._measures or step.flat:
             return True
-        still = float(np.abs(answer.x).max(initial=0.0)) <= 10.0 * self.tolerance
+        still = float(np.abs(step.dq).max(initial=0.0)) <= 10.0 * self.tolerance
         return still or predicted.measure <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
 
-    def _advance(
-        self, here: Iterate, program: QuadraticProgram, answer: QPSolution, predicted: PredictedReduction
-    ) -> Iterate | None:
+    def _advance(self, here: Iterate, program: QuadraticProgram, step: Step) -> Iterate | None:
         """Go where the program says, or farther along what the last steps foretell; None if neither is good."""
-        dq = answer.x
-        fast = self._memory.propose(dq) if self._measures and predicted.violation <= LAST_STRETCH else None
+        if step.parts is None:
+            self._ahead.reset()
+        fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
         if fast is not None:
-            fast = np.clip(fast, program.lower, program.upper)
-            leap = self._iterate_at(pin.integrate(self.lineariser.state.model, here.at.q, fast))
-            if self._judge(here, leap, predicted).by == "measure" and not self._jumps(here, leap):
-                self._record(leap, fast, "accelerated")
-                return self._take(leap, program, dq, fast)
-        there = self._iterate_at(pin.integrate(self.lineariser.state.model, here.at.q, dq))
-        acceptance = self._judge(here, there, predicted)
+            leap = self._moved(here, fast)
+            acceptance = self._judge(here, leap, step.predicted)
+            if acceptance.accepted and not self._jumps(here, leap):
+                self._record(leap, "accelerated")
+                return self._take(here, leap, program, step, fast, acceptance)
+            self._ahead.refused()
+        dq = step.dq
+        there = self._moved(here, dq)
+        acceptance = self._judge(here, there, step.predicted)
         promising = not acceptance.accepted and self._promises(here, there)
         if (acceptance.accepted or promising) and self._jumps(here, there):
             acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
-        self._record(there, dq, "tentative" if promising else acceptance.by)
-        step = float(np.abs(dq).max(initial=0.0))
+        self._record(there, "tentative" if promising else acceptance.by)
         if promising:
             self._anchor = here
-            self._memory.reset()
+            self._ahead.reset()
             self._shift = np.zeros_like(self._shift)
             return there
         if not acceptance.accepted and self._full_step:
@@ -242,37 +271,40 @@ class SQP:
             return None
         if not acceptance.accepted:
             self._stretch = 1.0
-            self._radius = 0.3 * min(step, self._radius)
+            self._radius = 0.3 * min(there.longest, self._radius)
             self._damping = max(0.3, 2.0 * self._damping) if acceptance.by != "rejected measure" else self._damping
             self._shift = np.zeros_like(self._shift)
-            self._memory.reset()
+            self._ahead.reset()
             return None
+        return self._take(here, there, program, step, dq, acceptance)
+
+    def _take(
+        self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, way: Array,
+        acceptance: StepAcceptance,
+    ) -> Iterate:  # fmt: skip
+        """Note that a way was gone, and how far the next may go.
+
+        What would be left of the rows' violation after the program's own answer, because the measures pull, is asked
+        for in the next one (method of multipliers).
+        """
         if self._full_step and there.violation.total > (1.0 - FULL_STEP_GAIN) * here.violation.total:
             self._full_step, self._damping = False, 0.0
         if acceptance.by == "goal":
-            self._memory.reset()
             self._funnel.narrow(here.violation.total, there.violation.total)
-        if not self._full_step and here.violation.left > self._pull and step < 0.25 * self._radius:
+        if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
             if not self._full_step:
                 self._damping *= 0.3
-            if step > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
+            if there.longest > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
                 self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
-        return self._take(there, program, dq, dq)
-
-    def _take(self, there: Iterate, program: QuadraticProgram, dq: Array, way: Array) -> Iterate:
-        """Note that a step was taken.
-
-        What would be left of the rows' violation after the program's own step dq, because the measures pull, is asked
-        for in the next one (method of multipliers).
-        """
-        self._memory.went(way)
+        if step.parts is not None and not step.flat:
+            self._ahead.went(step.parts, way, way is not step.dq)
         self._anchor = None
         asked = len(self._shift)
-        residual = program.rows[:asked] @ dq - program.target[:asked]
+        residual = program.rows[:asked] @ step.answer - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
         return there
 
@@ -286,13 +318,18 @@ class SQP:
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
-    def _iterate_at(self, q: Array) -> Iterate:
-        within = min(max(LEAST_WITHIN, ERROR_CLAMP * self._radius), MOST_WITHIN)
+    def _moved(self, here: Iterate, way: Array) -> Iterate:
+        """Where a way (nv,) leads."""
+        q = pin.integrate(self.lineariser.state.model, here.at.q, way)
+        return self._iterate_at(q, float(np.abs(way).max(initial=0.0)))
+
+    def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
+        within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
         at = self.lineariser.at(q, within)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within))
+        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within), longest)
 
     def _judge(self, here: Iterate, there: Iterate, predicted: PredictedReduction) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
@@ -308,7 +345,7 @@ class SQP:
             self._measures,
         )
 
-    def _record(self, there: Iterate, dq: Array, what: str) -> None:
+    def _record(self, there: Iterate, what: str) -> None:
         note = f"{self.note}: {what}" if self.note else what
         violation = there.violation
         self.trace.append(
@@ -316,7 +353,7 @@ class SQP:
                 violation.left,
                 max(violation.hold, violation.elastic),
                 there.at.measure,
-                float(np.abs(dq).max(initial=0.0)),
+                there.longest,
                 note,
             )
         )

@@ -183,9 +183,16 @@ class Subproblem:
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
         """By how much the measures of a program lessen, to second order, with the displacement x (nv,)."""
-        turned = program.rows[len(rows.soft_error) :] @ x
-        bent = (program.diagonal * x) @ x + (program.weight[len(rows.soft_error) :] * turned) @ turned
-        return -float(program.linear @ x + 0.5 * bent) / self.scale
+        return -float(program.linear @ x) / self.scale - self.bending(program, rows, x)
+
+    def bending(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
+        """Half of x' H x with the measures' curvature H in a program: what a tangential part x (nv,) saves."""
+        soft = len(rows.soft_error)
+        bent = (program.diagonal * x) @ x
+        if len(program.weight) > soft:
+            turned = program.rows[soft:] @ x
+            bent += (program.weight[soft:] * turned) @ turned
+        return 0.5 * float(bent) / self.scale
 
     def program(
         self,

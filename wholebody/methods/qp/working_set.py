@@ -6,7 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Mask
-from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE, compiled_kernel
+from wholebody.methods.qp.active_set import (
+    BOUND_TOLERANCE,
+    FULL_CORRECTIONS,
+    ROW_TOLERANCE,
+    compiled_kernel,
+    without_gradient,
+)
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import compiled_kernel as semismooth_kernel
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
@@ -53,6 +59,11 @@ class WorkingSet:
             self.held = None  # correcting the same set once more would end the same
         return self._round_by_round(program, key)
 
+    def without_gradient(self, program: QuadraticProgram, active: ActiveSet, target: Array) -> Array | None:
+        """Minimiser of a program with g = 0 and its active set fixed; see `active_set.without_gradient`."""
+        self._make_room(program)
+        return without_gradient(program, active, target, self._work)
+
     def reset(self) -> None:
         """Drop the guess."""
         self.held = None
@@ -66,9 +77,7 @@ class WorkingSet:
     def _from_the_last(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
         """The answer by the active set of the program before, corrected; None where that does not settle."""
         n, k = program.size, len(key)
-        size = self._kernel.work_size(n, len(program.target), k)
-        if size > len(self._work):
-            self._work = np.empty(2 * size)
+        self._make_room(program)
         if 2 * k > len(self._places):
             self._places = np.empty(4 * k, dtype=np.intp)
         x: Array = np.empty(n)
@@ -84,6 +93,11 @@ class WorkingSet:
             return None
         self._remember(active, key)
         return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
+
+    def _make_room(self, program: QuadraticProgram) -> None:
+        size = self._kernel.work_size(program.size, len(program.target), len(program.least))
+        if size > len(self._work):
+            self._work = np.empty(2 * size)
 
     def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """The answer where nothing is known, or the solver has to be asked."""

@@ -1,0 +1,119 @@
+"""The two parts of a step, and where the part along the constraints leads, against dense linear algebra."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.reference import active_set as reference
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.registry import make_solver
+from wholebody.methods.qp.tangential import ALONG, Extrapolation, Parts, parts_of
+from wholebody.methods.qp.working_set import WorkingSet
+
+NO_SHIFT = np.zeros(0)
+
+
+def free_program(n: int) -> QuadraticProgram:
+    """A program of n variables without rows, in a box that holds nothing."""
+    none, rows, wide = np.zeros(0), np.zeros((0, n)), np.full(n, 1e6)
+    return QuadraticProgram(np.ones(n), np.zeros(n), rows, none, none, rows, none, none, -wide, wide)
+
+
+def parts(program: QuadraticProgram, shift: np.ndarray = NO_SHIFT) -> tuple[Parts, QPSolution]:
+    """The parts of the program's answer, and the answer."""
+    solver = make_solver("active_set")
+    answer = solver.solve_cold(program)
+    return parts_of(program, answer, shift, WorkingSet(solver)), answer
+
+
+def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_program):
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        program = random_program(rng, int(rng.integers(4, 40)), int(rng.integers(1, 9)), int(rng.integers(0, 20)))
+        split, answer = parts(program)
+        expected = reference.minimise_on_face(replace(program, linear=np.zeros(program.size)), answer.active).x
+        assert split.normal == pytest.approx(np.clip(expected, program.lower, program.upper), abs=1e-9)
+        assert split.normal + split.tangential == pytest.approx(answer.x, abs=1e-12)
+
+
+def test_the_tangential_part_saves_half_of_its_curvature(random_program):
+    """What the measures g'x + x'Dx/2 are lower at x than at n, against t'Dt/2, with rows as hard as rounding allows."""
+    rng = np.random.default_rng(1)
+    for _ in range(40):
+        program = random_program(rng, int(rng.integers(6, 30)), int(rng.integers(1, 5)), 0)
+        program = replace(program, weight=np.full(len(program.target), 1e9), lower=program.lower - 1e3,
+                          upper=program.upper + 1e3)  # fmt: skip
+        (n, t), answer = parts(program)
+
+        def measures(at, program=program):
+            return program.linear @ at + 0.5 * (program.diagonal * at) @ at
+
+        assert measures(n) - measures(answer.x) == pytest.approx(0.5 * (program.diagonal * t) @ t, rel=1e-4, abs=1e-6)
+        assert program.rows @ t == pytest.approx(0.0, abs=1e-5)
+
+
+def test_the_shift_of_the_multipliers_makes_up_for_a_gradient_that_the_normal_part_has_not():
+    """One soft row of finite weight: the normal part meets the error itself, not the error and the shift."""
+    program = replace(
+        free_program(2), linear=np.array([0.0, 3.0]), rows=np.array([[1.0, 1.0]]), target=np.array([0.1 - 0.02]),
+        weight=np.array([1e6]),
+    )  # fmt: skip
+    split, _ = parts(program, np.array([0.02]))
+    assert split.normal == pytest.approx([0.05, 0.05], abs=1e-6)
+
+
+def test_held_bounds_stay_held():
+    program = replace(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=np.full(3, -2.0), upper=np.full(3, 2.0))
+    split, answer = parts(program)
+    assert answer.active.same(ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
+    assert split.tangential == pytest.approx([0.0, 1.0, -0.5])
+
+
+def gone(ahead: Extrapolation, sizes: list[float]) -> None:
+    """Steps of these sizes along the first axis, whose normal parts are along the second."""
+    for size in sizes:
+        split = Parts(np.array([0.0, size**2]), np.array([size, 0.0]))
+        ahead.propose(split, free_program(2))
+        ahead.went(split, split.normal + split.tangential, False)
+
+
+def test_steps_that_shrink_by_a_factor_are_taken_to_their_limit():
+    """1 + 1/2 + 1/4 + ... along the constraints; the normal part is the program's own, whatever the others were."""
+    ahead = Extrapolation()
+    gone(ahead, [0.4, 0.2])
+    assert ahead.propose(Parts(np.array([0.0, 7.0]), np.array([0.1, 0.0])), free_program(2)) == pytest.approx(
+        [0.2, 7.0]
+    )
+
+
+def test_steps_that_grow_are_followed_and_not_turned_back():
+    """Where the measures curve downwards the sequence has its limit behind; that is where they are flat, not least."""
+    ahead = Extrapolation()
+    gone(ahead, [0.1, 0.13])
+    split = Parts(np.zeros(2), np.array([0.169, 0.0]))
+    assert ahead.propose(split, free_program(2)) == pytest.approx([ALONG * 0.169, 0.0])
+
+
+def test_a_refused_proposal_shortens_the_next_ones_until_one_is_taken():
+    ahead, factors = Extrapolation(), []
+    for _ in range(3):
+        gone(ahead, [0.1, 0.13])
+        split = Parts(np.zeros(2), np.array([0.169, 0.0]))
+        factors.append(float(ahead.propose(split, free_program(2))[0] / 0.169))
+        ahead.refused()
+    assert factors == pytest.approx([3.0, 2.0, 1.0])
+    gone(ahead, [0.1, 0.13])
+    split = Parts(np.zeros(2), np.array([0.169, 0.0]))
+    ahead.went(split, ahead.propose(split, free_program(2)), True)
+    split = Parts(np.zeros(2), np.array([0.2, 0.0]))
+    assert ahead.propose(split, free_program(2))[0] / 0.2 > 1.0
+
+
+def test_proposals_stay_in_the_box():
+    ahead = Extrapolation()
+    gone(ahead, [0.4, 0.2])
+    program = replace(free_program(2), lower=np.full(2, -0.15), upper=np.full(2, 0.15))
+    assert ahead.propose(Parts(np.zeros(2), np.array([0.1, 0.0])), program) == pytest.approx([0.15, 0.0])

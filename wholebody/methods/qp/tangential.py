@@ -1,0 +1,82 @@
+"""A step near the goals in two parts, and where the part along the constraints leads.
+
+On the face of a program's active set its answer x is the sum of a *normal* part n, which meets the rows, and a
+*tangential* part t, which lessens the measures along them (Byrd 1987; Omojokun 1989):
+
+    n = the program's answer with g = 0 on that face,    t = x - n,    n' H t = 0,
+
+where H = D + S' S is the measures' curvature. So t lessens the measures by t' H t / 2. Because H does not know how the
+constraints are curved, the tangential parts of one step after the other form a linear sequence, or grow where the
+measures curve downwards along the constraints. The normal parts follow the square of the step and have no law of their
+own; they would spoil an extrapolation.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.arrays import Array
+from wholebody.methods.acceleration import STRETCH, Anderson
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.working_set import WorkingSet
+
+ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
+SHORTER, LONGER = 1.0 / 3.0, 2.0  # factors of the longest extrapolation after one was rejected, and taken
+
+
+class Parts(NamedTuple):
+    """A step in two parts, (n,) each."""
+
+    normal: Array
+    tangential: Array
+
+
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, working_set: WorkingSet) -> Parts | None:
+    """The parts of the answer of a program; None where its face has no normal part.
+
+    Args:
+        program: of a step.
+        answer: its answer.
+        shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
+        working_set: that found the answer.
+    """
+    target = program.target.copy()
+    target[: len(shift)] += shift
+    normal = working_set.without_gradient(program, answer.active, target)
+    return None if normal is None else Parts(normal, answer.x - normal)
+
+
+class Extrapolation:
+    """Where the tangential parts of the last steps lead."""
+
+    def __init__(self) -> None:
+        """Begin with nothing known."""
+        self._memory = Anderson()
+        self._longest = STRETCH  # plain tangential parts
+
+    def propose(self, parts: Parts, program: QuadraticProgram) -> Array | None:
+        """The extrapolated step (n,) within the box of the program; None while too little is known."""
+        plain = parts.tangential
+        fast = self._memory.propose(plain, self._longest)
+        if fast is None:
+            return None
+        if fast @ (program.diagonal * plain) <= 0.0:  # back to where the measures are flat and curve downwards
+            fast = min(ALONG, self._longest) * plain
+        return np.clip(parts.normal + fast, program.lower, program.upper)
+
+    def went(self, parts: Parts, way: Array, extrapolated: bool) -> None:
+        """Remember the way (n,) that was gone after the last proposal, and whether it was the proposed one."""
+        self._memory.went(way - parts.normal)
+        if extrapolated:
+            self._longest = min(LONGER * self._longest, STRETCH)
+
+    def refused(self) -> None:
+        """Go less far the next time, from what is learnt from now on."""
+        self._memory.forget()
+        self._longest = max(SHORTER * self._longest, 1.0)
+
+    def reset(self) -> None:
+        """Begin anew: other constraints are at work."""
+        self._memory.reset()
