@@ -97,7 +97,7 @@ class Effort(DistanceMeasure):
     the figure's `effort_weights` for gamma: moving the spine costs more than moving an arm.
 
     The angles of a ball joint that is made of three hinges count one by one, which is not the square of its rotation
-    vector: near an arm stretched to the side two of them turn it alike. `RotationEffort` counts the rotation vector, and
+    vector: near an arm stretched to the side two of them turn it alike. `RotationEffort` counts the rotation vector;
     docs/theory/person.md says how far the two are apart.
 
     Attributes:
