@@ -247,13 +247,10 @@ def _measures(
     curvature = np.zeros(model.nv)
     places = coordinates(model)
     for term in measures:
-        if type(term) in (tasks.Effort, tasks.Displacement) and _distances(
-            term.distance, term.weight, model, places, parts
-        ):
-            curvature += term.weight * term.distance.curvature
-        elif type(term) is tasks.RotationEffort and _distances(term.others, term.weight, model, places, parts):
-            curvature += term.weight * term.others.curvature
-            for ball in term.balls:
+        distance = _distance(term)
+        if distance is not None and _distances(distance, term.weight, model, places, parts):
+            curvature += term.weight * distance.curvature
+            for ball in term.balls if isinstance(term, tasks.RotationEffort) else ():
                 numbers = np.concatenate([ball.axes.ravel(), ball.start.ravel(), term.weight * ball.weights])
                 parts[BALL].append(((*ball.idx_q, *ball.idx_v), numbers))
         elif type(term) is tasks.Discomfort:
@@ -280,6 +277,13 @@ def _measures(
         else:
             others.append(term)
     return tuple(others), curvature
+
+
+def _distance(term: Measure) -> SquaredDistance | None:
+    """The part of a measure that is a squared distance; None for other classes, and for a subclass."""
+    if type(term) is tasks.Effort or type(term) is tasks.Displacement:
+        return term.distance
+    return term.others if type(term) is tasks.RotationEffort else None
 
 
 def _distances(

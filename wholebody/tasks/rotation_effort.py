@@ -99,7 +99,7 @@ class RotationEffort(Measure):
 
     def gradient(self, state: State) -> Array:
         """(nv,) derivative [rad]."""
-        result = self.others.gradient(state).copy()
+        result: Array = self.others.gradient(state).copy()
         for ball in self.balls:
             residuals, rows = ball.residuals(state.q)
             result[list(ball.idx_v)] += 2.0 * residuals @ rows
@@ -107,7 +107,7 @@ class RotationEffort(Measure):
 
     def curvature(self, state: State) -> Array:
         """(nv,) that of the other joints, and row sums of the squares' second derivative of Gauss and Newton."""
-        result = self.others.curvature.copy()
+        result: Array = self.others.curvature.copy()
         for ball in self.balls:
             steep = np.abs(ball.residuals(state.q)[1])
             result[list(ball.idx_v)] = 2.0 * steep.T @ steep.sum(axis=1) + LEAST_CURVATURE
