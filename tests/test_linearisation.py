@@ -292,6 +292,23 @@ def test_squares_are_the_second_derivative_where_they_vanish(problem, measures):
     np.testing.assert_allclose(at.curvature - at.squared, 0.0, atol=1.01 * least)
 
 
+class OwnEffort(wb.RotationEffort):
+    """The same measure as a class that the compiled pass does not know."""
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_ball_joints_are_compiled_as_their_class_says(problem, seed):
+    scene, q = problem.scene, posture(problem, seed)
+    made = [wb.Problem(scene, measures=[kind(2.0), wb.Rhythm()]) for kind in (wb.RotationEffort, OwnEffort)]
+    known, own = (each.lineariser(each.workspace()).at(q, 0.0) for each in made)
+    assert known.measure == pytest.approx(own.measure)
+    np.testing.assert_allclose(known.gradient, own.gradient, atol=1e-9)
+    np.testing.assert_allclose(known.curvature, own.curvature, rtol=1e-9)
+    # The class has rows for all joints; compiled, the root and joints that count one by one stay on the diagonal.
+    whole = [at.squares.T @ at.squares + np.diag(at.curvature - at.squared) for at in (known, own)]
+    np.testing.assert_allclose(whole[0][6:, 6:], whole[1][6:, 6:], atol=1e-5)
+
+
 def test_goals_that_move_keep_the_plan_and_other_goals_renew_it(problem):
     """Targets alone are written anew; another class, frame or number of goals is another plan."""
     q = posture(problem, 5)

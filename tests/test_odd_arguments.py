@@ -398,7 +398,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "StepLimit", Call(wb.StepLimit, limit, solve_it)
     yield "StepLimit(joint)", Call(lambda v: wb.StepLimit(joints={"joint1": v}), {"v": 1.0}, solve_it)
     yield "Rhythm", Call(wb.Rhythm, {"weight": 1.0}, on_a_person)
-    for kind in (wb.Effort, wb.Discomfort, wb.Displacement, wb.PotentialEnergy):
+    for kind in (wb.Effort, wb.RotationEffort, wb.Discomfort, wb.Displacement, wb.PotentialEnergy):
         yield kind.__name__, Call(kind, {"weight": 1.0}, solve_it)
     yield "State", Call(State, {"model": arm.model})
     yield "State.update", Call(state.update, {"q": q})

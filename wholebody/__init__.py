@@ -117,6 +117,7 @@ if TYPE_CHECKING:
         ReachCones,
         Relative,
         Rhythm,
+        RotationEffort,
         Sit,
         Stand,
         StepLimit,
@@ -199,6 +200,7 @@ __all__ = [
     "Relative",
     "Result",
     "Rhythm",
+    "RotationEffort",
     "Rula",
     "RulaParts",
     "Scene",
@@ -323,7 +325,7 @@ _MODULES = {
     "wholebody.taskfile": "Result Task read_result read_task write_result write_task",
     "wholebody.tasks": "Axis Balance Bound CenterOfMass Constraint Discomfort Displacement Effort Frame Freeze Goal "
     "Hold Measure Orientation Plane Point Posture PotentialEnergy RangeOfMotion ReachCones Relative Rhythm "
-    "StepLimit Grasp Lean Sit Stand Touch",
+    "RotationEffort StepLimit Grasp Lean Sit Stand Touch",
     "wholebody.view": "Viewer",
 }
 _HOME = {name: module for module, names in _MODULES.items() for name in names.split()}

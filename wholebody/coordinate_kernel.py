@@ -177,6 +177,48 @@ def rhythms(
         _square(lumbars[e, 0], excess, slopes, at, measure, squares, len(elevations) + e)
 
 
+@compiled(inner=True, error_model="numpy")
+def balls(tables: Array, places: Integers, q: Array, measure: Array, squares: Array, first: int) -> None:
+    """Ball joints, see `tasks.rotation_effort.BallJoint`; their squares begin at the row `first`."""
+    if not len(tables):
+        return
+    turn, axes, part, away = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    vector, left, slopes, at = np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3, dtype=np.int64)
+    for e in range(len(tables)):
+        own, start, weights = tables[e, :9].reshape((3, 3)), tables[e, 9:18].reshape((3, 3)), tables[e, 18:21]
+        turn[:] = 0.0
+        for i in range(3):
+            turn[i, i] = 1.0
+        for k in range(3):
+            for i in range(3):
+                axes[i, k] = turn[i, 0] * own[k, 0] + turn[i, 1] * own[k, 1] + turn[i, 2] * own[k, 2]
+            # A turn about an axis, after Rodrigues; applied to the left of what was turned before.
+            cosine, sine = np.cos(q[places[e, k]]), np.sin(q[places[e, k]])
+            x, y, z = axes[0, k], axes[1, k], axes[2, k]
+            for j in range(3):
+                a, b, c = turn[0, j], turn[1, j], turn[2, j]
+                along = (1.0 - cosine) * (x * a + y * b + z * c)
+                part[0, j] = cosine * a + sine * (y * c - z * b) + along * x
+                part[1, j] = cosine * b + sine * (z * a - x * c) + along * y
+                part[2, j] = cosine * c + sine * (x * b - y * a) + along * z
+            turn[:] = part
+            at[k] = places[e, 3 + k]
+        for i in range(3):
+            for j in range(3):
+                away[i, j] = turn[i, 0] * start[j, 0] + turn[i, 1] * start[j, 1] + turn[i, 2] * start[j, 2]
+        rotation_vector(away, vector)
+        inverse_left(vector, left)
+        for k in range(3):
+            excess = own[k, 0] * vector[0] + own[k, 1] * vector[1] + own[k, 2] * vector[2]
+            for j in range(3):
+                slopes[j] = 0.0
+                for i in range(3):
+                    slopes[j] += own[k, i] * (
+                        left[i, 0] * axes[0, j] + left[i, 1] * axes[1, j] + left[i, 2] * axes[2, j]
+                    )
+            _square(weights[k], excess, slopes, at, measure, squares, first + 3 * e + k)
+
+
 @compiled(inner=True)
 def _square(
     weight: float, excess: float, slopes: Array, at: Integers, measure: Array, squares: Array, row: int

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.compiled import compiled
 from wholebody.coordinate_kernel import (
+    balls,
     coordinates,
     coupled_ranges,
     elliptic_ranges,
@@ -21,6 +22,7 @@ from wholebody.residual_kernel import axis_errors, cones, planes, residuals, twi
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.term_entries import (
     AXIS,
+    BALL,
     BODY,
     BOX,
     COLUMN,
@@ -156,6 +158,10 @@ def linearise(
     rhythms(
         _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
         _integers(integers, layout, LUMBAR), q, measure, squares,
+    )  # fmt: skip
+    balls(
+        _floats(floats, layout, BALL), _integers(integers, layout, BALL), q, measure, squares,
+        layout[ELEVATION, 1] + layout[LUMBAR, 1],
     )  # fmt: skip
     heights(
         _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column, measure

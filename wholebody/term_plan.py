@@ -22,6 +22,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
 from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
 from wholebody.term_entries import (
+    BALL,
     BODY,
     BOX,
     COLUMN,
@@ -90,7 +91,7 @@ class TermPlan(NamedTuple):
     @property
     def squares(self) -> int:
         """Number of squares that built-in measures are the sum of."""
-        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1])
+        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1] + 3 * self.layout[BALL, 1])
 
     def with_goals(self, goals: Sequence[Goal], model: pin.Model) -> TermPlan | None:
         """The plan with other goals, or None where they are not of the same classes for the same frames.
@@ -246,8 +247,12 @@ def _measures(
     curvature = np.zeros(model.nv)
     places = coordinates(model)
     for term in measures:
-        if isinstance(term, (tasks.Effort, tasks.Displacement)) and _distances(term, model, places, parts):
-            curvature += term.weight * term.distance.curvature
+        distance = _distance(term)
+        if distance is not None and _distances(distance, term.weight, model, places, parts):
+            curvature += term.weight * distance.curvature
+            for ball in term.balls if isinstance(term, tasks.RotationEffort) else ():
+                numbers = np.concatenate([ball.axes.ravel(), ball.start.ravel(), term.weight * ball.weights])
+                parts[BALL].append(((*ball.idx_q, *ball.idx_v), numbers))
         elif type(term) is tasks.Discomfort:
             curvature += term.weight * LEAST_CURVATURE
             joints = term.limited
@@ -274,23 +279,29 @@ def _measures(
     return tuple(others), curvature
 
 
+def _distance(term: Measure) -> SquaredDistance | None:
+    """The part of a measure that is a squared distance; None for other classes, and for a subclass."""
+    if type(term) is tasks.Effort or type(term) is tasks.Displacement:
+        return term.distance
+    return term.others if type(term) is tasks.RotationEffort else None
+
+
 def _distances(
-    term: tasks.Effort | tasks.Displacement, model: pin.Model, places: Integers, parts: dict[int, list[Row]]
+    distance: SquaredDistance, weight: float, model: pin.Model, places: Integers, parts: dict[int, list[Row]]
 ) -> bool:
-    """Write the tables of a distance; false for a subclass, and for a joint that is no free root and no coordinate."""
-    distance: SquaredDistance = term.distance
+    """Write the tables of a distance; false where a joint that counts is no free root and no coordinate."""
     weighed = np.flatnonzero(distance.weights).tolist()
     root = model.joints[1] if model.njoints > 1 and model.joints[1].nq == 7 else None
     own = range(0, 6) if root is not None else range(0)
-    if type(term) not in (tasks.Effort, tasks.Displacement) or any(places[v] < 0 for v in weighed if v not in own):
+    if any(places[v] < 0 for v in weighed if v not in own):
         return False
     if any(v in own for v in weighed):
         target = placement_floats(pin.XYZQUATToSE3(distance.reference[:7]))
-        parts[ROOT_DISTANCE].append(((0, 0), np.concatenate([target, term.weight * distance.weights[:6]])))
+        parts[ROOT_DISTANCE].append(((0, 0), np.concatenate([target, weight * distance.weights[:6]])))
     for v in weighed:
         if v not in own:
             q = int(places[v])
-            parts[DISTANCE].append(((q, v), np.array([term.weight * distance.weights[v], distance.reference[q]])))
+            parts[DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
     return True
 
 

@@ -56,7 +56,7 @@ def test_the_hand_keeps_its_mass_and_its_length(sex):
 
 @pytest.mark.parametrize("sex", ["male", "female"])
 @pytest.mark.parametrize("detail", ["capsules", "hulls"])
-@pytest.mark.parametrize("shape", ["relaxed", "flat", "fist", "pinch", "pointing"])
+@pytest.mark.parametrize("shape", ["relaxed", "flat", "fist", "hook", "pinch", "pointing"])
 def test_shapes_of_the_hand_are_free_of_self_contact(sex, detail, shape):
     figure = wb.load("human", sex=sex, detail=detail, hands="fingers")
     q = figure.with_joints(figure.posture("a_pose"), wb.finger_angles(shape))
@@ -120,14 +120,23 @@ def test_a_power_grip_closes_every_finger_around_a_bar(figure):
         assert abs(min(at_bar[part] for part in outer)) < 2e-5
 
 
-@pytest.mark.parametrize("radius", [0.0125, 0.02])
+@pytest.mark.parametrize("radius", [0.007, 0.008, 0.0125, 0.02])
 @pytest.mark.parametrize("shape", ["relaxed", "flat"])
-def test_a_power_grip_does_not_depend_on_how_the_hand_begins(figure, radius, shape):
-    scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="bar", at=(0.45, -0.25, 1.2))
-    bent = {"right_elbow_flexion": np.radians(80.0), **wb.finger_angles(shape, "right")}
+@pytest.mark.parametrize(("elbow", "at"), [(80.0, (0.45, -0.25, 1.2)), (10.0, (0.35, -0.35, 1.0))])
+def test_a_power_grip_does_not_depend_on_how_the_hand_begins(figure, radius, shape, elbow, at):
+    scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="bar", at=at)
+    bent = {"right_elbow_flexion": np.radians(elbow), **wb.finger_angles(shape, "right")}
     start = figure.with_joints(figure.posture("standing"), bent)
     grasp = wb.Grasp("right", "bar", "power")
     assert wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET)).status == "solved"
+
+
+def test_a_pencil_is_taken_by_a_pinch(figure):
+    """A bar of 8 mm in the palm is out of the fingers' reach; thumb and index finger take it."""
+    scene = wb.Scene(figure).add(wb.Capsule(0.004, 0.15), name="pencil", at=(0.45, -0.25, 1.2))
+    for kind, status in (("power", "unreachable"), ("pinch", "solved")):
+        grasp = wb.Grasp("right", "pencil", kind)
+        assert wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET)).status == status
 
 
 def test_a_hand_of_one_segment_cannot_take_by_all_fingertips():

@@ -84,7 +84,14 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
             wb.Stand("ground", feet=["left_foot"], balance=False),
             wb.Grasp("right", "rod", "power"),
         ],
-        measures=[wb.Effort(), wb.Discomfort(0.1), wb.Displacement(), wb.PotentialEnergy(0.01), wb.Rhythm(2.0)],
+        measures=[
+            wb.Effort(),
+            wb.Discomfort(0.1),
+            wb.Displacement(),
+            wb.PotentialEnergy(0.01),
+            wb.Rhythm(2.0),
+            wb.RotationEffort(3.0),
+        ],
     )
     q = pin.integrate(problem.scene.model, problem.start, np.linspace(-0.1, 0.1, 55))
     state = State(problem.scene.model).update(q)

@@ -90,6 +90,51 @@ def test_a_motion_about_one_axis_counts_the_same(scene: wb.Scene) -> None:
         assert wb.Effort().resolve(scene, start).value(state) == pytest.approx(counted)
 
 
+def test_rotation_effort_is_the_weighted_square_of_the_rotation_vectors(scene: wb.Scene, arms: Array) -> None:
+    """Of the nine ball joints; of the other joints and the root it is what `Effort` counts."""
+    figure, start, state = scene.figure, scene.figure.posture("sitting"), State(scene.model)
+    rng = np.random.default_rng(1)
+    term, angles = wb.RotationEffort().resolve(scene, start), wb.Effort().resolve(scene, start)
+    assert len(term.balls) == len(BALLS)
+    for arm in arms[:20]:
+        q = figure.clamp(pin.integrate(figure.model, arm, 0.2 * rng.normal(size=figure.model.nv)))
+        pairs = np.array([both(figure, q, start, ball) for ball in BALLS])
+        state.update(q)
+        expected = angles.value(state) - pairs[:, 0].sum() + pairs[:, 1].sum()
+        assert term.value(state) == pytest.approx(expected)
+        residuals, rows = term.squares(state)
+        assert residuals @ residuals == pytest.approx(expected)
+        assert 2.0 * residuals @ rows == pytest.approx(term.gradient(state), abs=1e-9)
+
+
+def test_figures_without_ball_joints_count_angles() -> None:
+    scene = wb.Scene(wb.load("hand"))
+    rng, figure = np.random.default_rng(0), scene.figure
+    terms = [kind().resolve(scene, figure.neutral) for kind in (wb.RotationEffort, wb.Effort)]
+    state = State(scene.model).update(pin.integrate(figure.model, figure.neutral, rng.normal(size=figure.model.nv)))
+    assert terms[0].balls == ()
+    assert terms[0].value(state) == pytest.approx(terms[1].value(state))
+    assert terms[0].curvature(state) == pytest.approx(terms[1].curvature(state))
+
+
+def test_an_arm_swings_forward_from_the_t_pose_with_little_twist(scene: wb.Scene) -> None:
+    """By 60 degrees about the vertical, and twisted because the third hinge ends at 70; angles twist it by 81."""
+    figure, start = scene.figure, scene.figure.posture("t_pose")
+    shoulder_at = figure.placement(start, "left_upper_arm").translation
+    reach = np.linalg.norm(figure.placement(start, "left_elbow").translation - shoulder_at)
+    goal = wb.Point("left_elbow", shoulder_at + reach * np.array([math.sqrt(0.75), 0.5, 0.0]))
+    free = [f"left_shoulder_{name}" for name in FIRST]
+    still = wb.Freeze(*[name for name in figure.joints if name not in free], "root")
+    twists = []
+    for measure in (wb.RotationEffort(), wb.Effort()):
+        made = [goal], [still], [measure]
+        problem = wb.Problem(scene, start, goals=made[0], constraints=made[1], measures=made[2], range_of_motion=False)
+        q = wb.solve(problem).q
+        vector = pin.log3(turn(figure, q, "left_shoulder") @ turn(figure, start, "left_shoulder").T)
+        twists.append(np.degrees(abs(vector[1])))  # about the arm as it was
+    assert twists == pytest.approx([18.1, 80.9], abs=1.0)
+
+
 def test_in_the_t_pose_angles_count_a_turn_from_nothing_to_twice(scene: wb.Scene) -> None:
     """Flexion and rotation by 30 degrees: against each other the arm stays, with each other it turns by 60."""
     figure, start = scene.figure, shoulder(scene.figure, 0.0, 90.0, 0.0)

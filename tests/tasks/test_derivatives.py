@@ -117,6 +117,7 @@ HUMAN_TERMS = {
     "range_of_motion": tasks.RangeOfMotion(),
     "posture": tasks.Posture("sitting"),
     "effort": tasks.Effort(),
+    "rotation_effort": tasks.RotationEffort(),
     "displacement": tasks.Displacement(),
     "discomfort": tasks.Discomfort(),
     "rhythm": tasks.Rhythm(),

@@ -30,7 +30,7 @@ def arms(scene: wb.Scene, flexion: float, abduction: float, rotation: float) -> 
 
 def terms(scene: wb.Scene) -> dict[str, object]:
     start = scene.figure.posture("t_pose")
-    made = (wb.RangeOfMotion(), wb.ReachCones(), wb.Rhythm(), wb.Effort(), wb.Discomfort())
+    made = (wb.RangeOfMotion(), wb.ReachCones(), wb.Rhythm(), wb.Effort(), wb.RotationEffort(), wb.Discomfort())
     return {type(term).__name__: term.resolve(scene, start) for term in made}
 
 
@@ -40,7 +40,7 @@ def both(term: object, state: State) -> tuple[np.ndarray, np.ndarray]:
     return np.atleast_1d(term.value(state)).copy(), np.array(slope)
 
 
-@pytest.mark.parametrize("name", ["RangeOfMotion", "ReachCones", "Rhythm", "Effort", "Discomfort"])
+@pytest.mark.parametrize("name", ["RangeOfMotion", "ReachCones", "Rhythm", "Effort", "RotationEffort", "Discomfort"])
 @pytest.mark.parametrize("flexion", [-20.0, 0.0, 30.0])
 def test_values_and_gradients_are_finite_and_continuous_there(scene: wb.Scene, name: str, flexion: float) -> None:
     term, state = terms(scene)[name], State(scene.figure.model)
@@ -57,7 +57,7 @@ def test_values_and_gradients_are_finite_and_continuous_there(scene: wb.Scene, n
         assert (ends[0] - ends[1]) / (2.0 * size) == pytest.approx(slope[:, place], abs=1e-4)
 
 
-@pytest.mark.parametrize("name", ["RangeOfMotion", "ReachCones", "Rhythm"])
+@pytest.mark.parametrize("name", ["RangeOfMotion", "ReachCones", "Rhythm", "RotationEffort"])
 @pytest.mark.parametrize("turn", [-40.0, 15.0, 60.0])
 def test_one_rotation_of_the_arm_has_one_value(scene: wb.Scene, name: str, turn: float) -> None:
     """Two triples of angles for one rotation: limits and rhythm see the same arm."""

@@ -17,7 +17,7 @@ CASES = ("F5", "F50", "F95", "M5", "M50", "M95")
 WITHIN, OVERHEAD = 0.015, 0.025
 """Metres: residuals to keep to, and that of the overhead reach."""
 
-THIN = ("thigh", "neck")
+THIN = ("thigh",)
 """Circumferences that the pieces do not keep to."""
 
 QUICK = 3

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.bench.human_tasks import draw
+from wholebody.bench.human_tasks import add_seat, draw
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -145,6 +145,10 @@ def contacts(figure: Figure, pictures: Path | None = None) -> list[ContactRow]:
         kept += [wb.Hold("left_foot")] if seated else []
         scene = wb.Scene(figure)
         still = [wb.Freeze(part) for part in STILL] if seated else []
+        if seated:
+            add_seat(scene, figure, chair)
+        if name == "hand on the other shoulder":
+            still = [wb.Freeze("left_arm")]
         solution = wb.solve(wb.Problem(scene, start=start, goals=goals, constraints=[*kept, *still]))
         gap = max(distance(figure, solution.q, [one], [other]) for one, other in parts)
         row = ContactRow(name, str(solution.status), 1e3 * max(gap, 0.0))

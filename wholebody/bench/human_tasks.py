@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -24,6 +24,9 @@ KEPT = -1e-3
 
 ON_SEAT = 0.01
 """Metres above a seat up to which a point of pelvis or thighs rests on it: flesh yields by as much."""
+
+LEG = 0.04
+"""Thickness of the legs of stool and desk, metres."""
 
 SIZE = (360, 400)
 """Pixels of a task's picture."""
@@ -99,11 +102,8 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
 
     def typing() -> Problem:
         scene, q = room(), figure.posture("sitting")
-        seat = _seat(scene, figure, q)
-        top = seat + 0.27 * scale
-        scene.add(
-            wb.Box((0.7 * scale, 1.2 * scale, 0.03)), name="desk", at=(0.62 * scale, 0.0, top - 0.015), color=WOOD
-        )
+        top = add_seat(scene, figure, q) + 0.27 * scale
+        _add_on_legs(scene, "desk", (0.7 * scale, 1.2 * scale, 0.03), (0.62 * scale, 0.0, top - 0.015))
         goals: list[Any] = [
             wb.Point(f"{side}_index_tip", (0.42 * scale, sign * 0.06 * scale, top + 0.02)) for side, sign in _SIDES
         ]
@@ -135,9 +135,7 @@ def tasks(figure: Figure) -> dict[str, Callable[[], Problem]]:
 
     def sit() -> Problem:
         scene, height = room(), 0.43 * scale
-        scene.add(
-            wb.Box(tuple(at(0.42, 0.5, 0.04))), name="seat", at=(-0.42 * scale, 0.0, height - 0.02 * scale), color=WOOD
-        )
+        _add_on_legs(scene, "seat", at(0.42, 0.5, 0.04), (-0.42 * scale, 0.0, height - 0.02 * scale))
         goals = [wb.Sit("seat"), wb.Axis("thorax", UP, direction=UP, weight=0.05)]
         return wb.Problem(scene, goals=goals, constraints=feet)
 
@@ -182,14 +180,32 @@ def _underside(figure: Figure) -> float:
     return float(vertex - sizes["sitting_height"])
 
 
-def _seat(scene: Any, figure: Figure, q: Array) -> float:
-    """Put a seat below who sits; return the height of its top."""
-    import wholebody as wb
-
+def add_seat(scene: Scene, figure: Figure, q: Array) -> float:
+    """Put a stool below who sits; return the height of its top."""
     pelvis = figure.placement(q, "pelvis").translation
     top = float(pelvis[2]) + _underside(figure) - 0.001
-    scene.add(wb.Box((0.42, 0.5, 0.04)), name="seat", at=(float(pelvis[0]) + 0.10, 0.0, top - 0.02), color=WOOD)
+    _add_on_legs(scene, "seat", (0.42, 0.5, 0.04), (float(pelvis[0]) + 0.10, 0.0, top - 0.02))
     return top
+
+
+def _add_on_legs(scene: Scene, name: str, size: Sequence[float] | Array, at: tuple[float, float, float]) -> None:
+    """Put a board with four legs on the floor at zero height, as a stool or a desk is.
+
+    Args:
+        scene: where it is put.
+        name: of the board.
+        size: (3,) full lengths of the board, metres.
+        at: its centre, metres.
+    """
+    import wholebody as wb
+
+    deep, wide, thick = map(float, size)
+    scene.add(wb.Box((deep, wide, thick)), name=name, at=at, color=WOOD)
+    high = at[2] - 0.5 * thick
+    for end, x in (("front", 1.0), ("back", -1.0)):
+        for side, y in _SIDES:
+            foot = at[0] + 0.5 * x * (deep - LEG), at[1] + 0.5 * y * (wide - LEG), 0.5 * high
+            scene.add(wb.Box((LEG, LEG, high)), name=f"{name}'s {side} {end} leg", at=foot, color=WOOD)
 
 
 def solve_task(name: str, problem: Problem, pictures: Path | None) -> tuple[TaskRow, Array]:

@@ -38,7 +38,7 @@ def _trunk(size: Dimensions) -> Iterator[Solid]:
         yield Solid(
             part.segment, part.segment, coal.Capsule(part.half_depth, 2.0 * half), place(part.x, 0.0, part.z, _ACROSS)
         )
-    neck = 0.9 * size.body.radius("neck")
+    neck = size.body.radius("neck")
     length = size.body.length("neck")
     yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
     skull, face = size.head_half_breadth, FACE * size.head_half_breadth

@@ -56,6 +56,7 @@ SHAPES: dict[str, dict[str, float]] = {
     "relaxed": {},
     "flat": _STRAIGHT,
     "fist": _CLOSED,
+    "hook": {"mcp_flexion": 30.0, "pip_flexion": 95.0, "dip_flexion": 50.0},
     "pinch": {
         "index_mcp_flexion": 50.0,
         "index_mcp_abduction": 10.0,
@@ -91,7 +92,7 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
     Use it with a person whose hands have fingers: ``figure.with_joints(q, wb.finger_angles("fist", "right"))``.
 
     Args:
-        shape: "relaxed", "flat", "fist", "pinch" or "pointing".
+        shape: "relaxed", "flat", "fist", "hook", "pinch" or "pointing".
         side: "left" or "right"; both hands if left out.
 
     Raises:

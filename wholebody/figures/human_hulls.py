@@ -25,7 +25,7 @@ def _trunk(size: Dimensions) -> Iterator[Solid]:
     for part in human_capsules.trunk_parts(size):
         radii = (part.half_depth, part.half_breadth, part.half_height)
         yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
-    neck, length = 0.9 * size.body.radius("neck"), size.body.length("neck")
+    neck, length = size.body.radius("neck"), size.body.length("neck")
     yield _solid("neck", hulls.tapered(neck, neck, 0.8 * length, "neck"), 0.0, 0.9 * length)
 
 

@@ -15,6 +15,7 @@ from wholebody.methods.contradictions import Contradiction, explanation, in_word
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status, TraceEntry
+from wholebody.tasks.balance import Balance
 
 SLACK = 1.05  # factor on the tolerance: an assessment computes with other rounding
 COAL_ACCURACY = 1e-6  # m
@@ -89,7 +90,7 @@ def concluded(
         assessment=judgement,
         trace=ending.trace,
         method=method,
-        message=said + judgement.in_the_way + ending.remark,
+        message=said + judgement.in_the_way + _way_out(problem, judgement) + ending.remark,
         programs=ending.programs,
     )
 
@@ -117,6 +118,16 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     why = "what must hold cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     caveat = f"; {ending.caveat}" if ending.caveat else ""
     return f"{why}: {name} is missed by {missed:.3g} m or rad{caveat}"
+
+
+def _way_out(problem: Problem, judgement: Assessment) -> str:
+    """What to state where the margin of a person's default balance stands in the way; empty elsewhere."""
+    for term, name in zip(problem.constraints, problem.constraint_names, strict=True):
+        margin = term.margin if isinstance(term, Balance) and term in problem.defaults else 0.0
+        if margin and any(blocker.names == (name,) for blocker in judgement.blockers):
+            least = f"{1e3 * margin:.0f} mm"
+            return f"; state Balance() to let the centre of mass come nearer to the feet's edges than {least}"
+    return ""
 
 
 def _worst(problem: Problem, judgement: Assessment, q: Array) -> tuple[str, float]:

@@ -80,11 +80,11 @@ def named_postures(problem: Problem, state: State, start: Array) -> Iterator[Arr
         yield _moved(problem, state, start, pin.difference(figure.model, start, q))
 
 
-def closed_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The start with closed fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
+def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
+    """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
 
-    An open hand comes to a thin bar with the roots of its fingers, and closing leads away from it. First the thumb
-    is as at the start, then that of a fist, which lies over the fingers.
+    Fingers that bend at their roots first lay their first parts on the bar before it meets the palm. Of a hook the
+    roots are nearly straight. First the thumb is as at the start, then that of a fist, which lies over the fingers.
 
     Args:
         problem: its bounds are kept.
@@ -94,9 +94,14 @@ def closed_hands(problem: Problem, state: State, start: Array) -> Iterator[Array
     figure = problem.scene.figure
     terms = (*problem.goals, *problem.constraints)
     sides = sorted({term.hand.split("_")[0] for term in terms if isinstance(term, Grasp) and term.kind == "power"})
-    fist = {joint: angle for side in sides for joint, angle in finger_angles("fist", side).items()}
-    if fist and fist.keys() <= set(figure.joints):
-        for angles in ({joint: angle for joint, angle in fist.items() if "thumb" not in joint}, fist):
+    hook, fist = (
+        {joint: angle for side in sides for joint, angle in finger_angles(shape, side).items()}
+        for shape in ("hook", "fist")
+    )
+    if hook and hook.keys() <= set(figure.joints):
+        fingers = {joint: angle for joint, angle in hook.items() if "thumb" not in joint}
+        thumbs = {joint: angle for joint, angle in fist.items() if "thumb" in joint}
+        for angles in (fingers, fingers | thumbs):
             q = figure.with_joints(start, angles)
             yield _moved(problem, state, start, pin.difference(figure.model, start, q))
 

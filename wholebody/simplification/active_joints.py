@@ -3,8 +3,8 @@
 The joints that move a goal are active. So is every joint of an equality (a held foot, a closed loop) that an active
 joint moves: without it the equality would lock the others. A joint beyond its limits is active, and one between two
 pieces that are too near at the start, because they need repair. A joint that a measure combines with others is active,
-because the measure would have no bound; a square of `Rhythm` does so only where one of its joints is active, because it
-is never less than zero. All other joints stay where they start.
+because the measure would have no bound; a square of `Rhythm` or of a ball joint does so only where one of its joints is
+active, because it is never less than zero. All other joints stay where they start.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.distance import Displacement, Effort
 from wholebody.tasks.rhythm import Rhythm
+from wholebody.tasks.rotation_effort import RotationEffort
 
 SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints; `Rhythm` is one over its squares
 SAMPLES = 6  # postures at which the dependence of rows that are no wrenches on joints is tested
@@ -58,7 +59,7 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
     for goal in problem.goals:
         moving |= _columns(goal, walk).any(axis=0)
     for measure in problem.measures:
-        if not isinstance(measure, (*SEPARABLE, Rhythm)):
+        if not isinstance(measure, (*SEPARABLE, Rhythm, RotationEffort)):
             moving |= _slopes(measure, walk)
     moving |= _out_of_limits(problem) | _too_near(problem)
     rows = [(term, _columns(term, walk), *_kinds(term, walk.start())) for term in problem.constraints]
@@ -76,13 +77,17 @@ def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:
 
 
 def _squares(problem: Problem) -> list[tuple[list[int], float]]:
-    """Places in the tangent and value at the start of each square of `Rhythm`."""
-    terms = [measure for measure in problem.measures if isinstance(measure, Rhythm)]
-    return [
-        (places, term.weight * weight * excess * excess)
-        for term in terms
-        for weight, excess, places, _ in term.parts(problem.start)
-    ]
+    """Places in the tangent and value at the start of each square of `Rhythm`, and of ball joints in an effort."""
+    found: list[tuple[list[int], float]] = []
+    for term in problem.measures:
+        if isinstance(term, Rhythm):
+            found += [
+                (places, term.weight * weight * excess * excess)
+                for weight, excess, places, _ in term.parts(problem.start)
+            ]
+        elif isinstance(term, RotationEffort):
+            found += [(list(ball.idx_v), 0.0) for ball in term.balls]  # efforts count from the start
+    return found
 
 
 def _closed(

@@ -213,6 +213,11 @@ CONSTRAINTS = {
 
 MEASURES = {
     "effort": Form("Displacement from the start, weighted by joint.", (_weight("1/rad^2"),), tasks.Effort),
+    "rotation_effort": Form(
+        "Displacement from the start, a ball joint's by its rotation vector.",
+        (_weight("1/rad^2"),),
+        tasks.RotationEffort,
+    ),
     "discomfort": Form(
         "Distance of joints from neutral, and nearness to their limits.", (_weight("no unit"),), tasks.Discomfort
     ),

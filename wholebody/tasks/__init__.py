@@ -18,6 +18,7 @@ from wholebody.tasks.range_of_motion import RangeOfMotion
 from wholebody.tasks.reach_cones import ReachCones
 from wholebody.tasks.relative import Relative
 from wholebody.tasks.rhythm import Rhythm
+from wholebody.tasks.rotation_effort import RotationEffort
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
 from wholebody.tasks.touch import Lean, Touch
@@ -47,6 +48,7 @@ __all__ = [
     "ReachCones",
     "Relative",
     "Rhythm",
+    "RotationEffort",
     "Sit",
     "Stand",
     "StepLimit",

@@ -54,6 +54,18 @@ class SquaredDistance(NamedTuple):
             return np.asarray(force)
         return np.asarray(force @ pin.dDifference(state.model, self.reference, state.q, pin.ARG1))
 
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residuals (k,) whose squares the distance is the sum of, and their derivatives (k, nv)."""
+        counts = np.flatnonzero(self.weights)
+        roots = np.sqrt(self.weights[counts])
+        difference = pin.difference(state.model, self.reference, state.q)
+        rows = (
+            np.eye(len(self.weights))
+            if self.straight
+            else pin.dDifference(state.model, self.reference, state.q, pin.ARG1)
+        )
+        return roots * difference[counts], roots[:, None] * rows[counts]
+
 
 class DistanceMeasure(Measure):
     """A measure that is a weighted squared distance from a posture.
@@ -85,8 +97,8 @@ class Effort(DistanceMeasure):
     the figure's `effort_weights` for gamma: moving the spine costs more than moving an arm.
 
     The angles of a ball joint that is made of three hinges count one by one, which is not the square of its rotation
-    vector: near an arm stretched to the side two of them turn it alike. docs/theory/person.md says how far the two are
-    apart.
+    vector: near an arm stretched to the side two of them turn it alike. `RotationEffort` counts the rotation vector;
+    docs/theory/person.md says how far the two are apart.
 
     Attributes:
         weight: factor on the measure [1/rad^2].

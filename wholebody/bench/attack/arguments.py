@@ -63,7 +63,7 @@ print(verdict)
 '''
 TERMS = {"wb.Point", "wb.Frame", "wb.Orientation", "wb.Axis", "wb.CenterOfMass", "wb.Relative", "wb.Posture"}
 CONSTRAINTS = {"wb.Hold", "wb.Plane", "wb.Balance", "wb.Freeze", "wb.StepLimit", "wb.ReachCones"}
-MEASURES = {"wb.Effort", "wb.Discomfort", "wb.Displacement", "wb.PotentialEnergy"}
+MEASURES = {"wb.Effort", "wb.RotationEffort", "wb.Discomfort", "wb.Displacement", "wb.PotentialEnergy"}
 SHAPES = {"wb.Box", "wb.Sphere", "wb.Capsule", "wb.Ellipsoid", "wb.HalfSpace", "wb.Hull", "wb.Mesh"}
 
 

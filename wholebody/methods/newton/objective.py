@@ -3,9 +3,9 @@
 A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
 angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
 measure of the revolute joints, and of a free root that one of these measures counts. A measure that says of which
-squares it is the sum, `Rhythm`, has a row for each of them: beside a diagonal that bounds their second derivative the
-steps are many times as many. A measure that depends on other joints is only reported, and the solution's message names
-it.
+squares it is the sum, `Rhythm` or `RotationEffort`, has a row for each of them: beside a diagonal that bounds their
+second derivative the steps are many times as many. A measure that depends on other joints is only reported, and the
+solution's message names it.
 """
 
 from __future__ import annotations
@@ -21,10 +21,16 @@ from wholebody.methods.newton.root_motion import RootMotion
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.tangent_rows import TangentRows, square_rows
 from wholebody.problem import Problem
-from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm
+from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
 
-CAN = (Effort, Displacement, Discomfort, Rhythm)  # minimised over the revolute joints, and a root that they count
+CAN = (
+    Effort,
+    RotationEffort,
+    Displacement,
+    Discomfort,
+    Rhythm,
+)  # minimised over the revolute joints, and a root that they count
 SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
 STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
 LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint

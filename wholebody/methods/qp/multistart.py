@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, repeat
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +18,7 @@ from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, closed_hands, named_postures, restarts, throughout
+from wholebody.methods.starts import Minima, hooked_hands, named_postures, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
@@ -110,7 +110,9 @@ class Search:
         least = least_left(self.contradictions)
         if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
-        for local, how in self._relaxed_probes(closed_hands(self.problem, self.lineariser.state, start)):
+        hooked = list(hooked_hands(self.problem, self.lineariser.state, start))
+        ends = (self._feasibility_first(q) for q in hooked)
+        for local, how in chain(self._relaxed_probes(iter(hooked)), zip(ends, repeat("from hooked hands"))):
             if self._accept(local, how):
                 return
         if self._known_out_of_reach(self.best.q):
@@ -124,8 +126,7 @@ class Search:
         few = self._moving() < FEW
         if few:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
-        given = (self.problem, self.lineariser.state, start, rng, count)
-        others = throughout(*given) if few else restarts(*given)
+        others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
         for local, how in self._relaxed_probes(chain([start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -143,8 +144,7 @@ class Search:
         """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
         if _held(self.best, self.settings.tolerance):
             return
-        q = parted(self.problem, self.lineariser.workspace, self.best.q)
-        if q is not None:
+        if (q := parted(self.problem, self.lineariser.workspace, self.best.q)) is not None:
             self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
