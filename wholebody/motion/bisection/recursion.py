@@ -108,7 +108,7 @@ class Recursion:
         """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
-        planes = path_planes(self._scene.figure, self.q, frame, self.joints, self._state)
+        planes = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state)
         found = [self._predicted(frame, self.q[frame], planes)]
         if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
             starts = [*([self.q[frame]] if planes else []), *self._beside(frame)]
@@ -121,6 +121,13 @@ class Recursion:
         self.bad[frame] = False
         self.keys.add(frame)
         return True
+
+    def _swinging(self, frame: int) -> list[str]:
+        """Frames with plane constraints on which no foot stands: what stands is held, and need not be in the plane."""
+        figure, model = self._scene.figure, self._scene.model
+        feet = [model.frames[figure.frame_id(foot)].parentJoint for foot in self._predictor.terms.stands[frame]]
+        stood_on = {joint for foot in feet for joint in model.supports[foot]}
+        return [name for name in self.joints if model.frames[figure.frame_id(name)].parentJoint not in stood_on]
 
     def _predicted(self, frame: int, start: Array, planes: Sequence[Plane]) -> Prediction:
         found = self._predictor.predict(frame, self._stays.applied(frame, start), planes)
