@@ -9,7 +9,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.workspace import Workspace
 
 DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
@@ -34,7 +33,7 @@ def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, li
         q: (n, nq) postures.
         gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
     """
-    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
+    swept = workspace.depths(DIP)
     found, last = dict[int, list[int]](), -1
     for gap in sorted(gaps):
         if gap != last:
@@ -49,7 +48,7 @@ def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, li
 
 def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
-    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
+    swept = workspace.depths(DIP)
     swept.start(before)
     return float(swept.advance(after)[1].depth.max(initial=0.0))
 

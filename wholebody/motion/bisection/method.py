@@ -54,8 +54,8 @@ class Bisection:
         interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
         planes: frames of the figure, such as "left_elbow" and "left_wrist", that leave their path only sideways where a
             posture is predicted; None for elbows and ankles, where the figure has them.
-        frozen: joints and groups that stay as they are; None for a free root. ("root", "lower_body") moves the upper
-            body alone.
+        frozen: joints and groups that stay as they are; None for a free root, unless a frame cannot be freed so.
+            ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`.
     """
@@ -118,19 +118,24 @@ class Bisection:
             whole(frame, f"Bisection: evaluation, {clip.name}", 0, len(clip) - 1)
         original = np.array([figure.clamp(q) for q in clip.q])
         terms = frame_terms(scene, original, clip.dt, constraints)
-        frozen = self.frozen if self.frozen is not None else ("root",) if figure.root == "free" else ()
         usual = tuple(name for name in (*ELBOWS, *ANKLES) if name in figure.frames)
         joints = usual if self.planes is None else self.planes
         for joint in joints:
             figure.frame_id(joint)
-        stays = Stays(scene, original, terms, frozen)
         method = method_for_motions(self.method)
+        ways = self._frozen(figure)
+        predictions = programs = 0  # of a way that was given up
         with scene.borrow() as workspace:
-            predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
-            recursion = Recursion(
-                scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
-            )
-            recursion.run(self._points(figure, original, frozen))
+            for frozen in ways:
+                stays = Stays(scene, original, terms, frozen)
+                predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
+                recursion = Recursion(
+                    scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
+                )
+                recursion.run(self._points(figure, original, frozen), whole=frozen == ways[-1])
+                if frozen == ways[-1] or watch.ended or not recursion.stuck:
+                    break
+                predictions, programs = recursion.predictions, recursion.programs
             missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
             repairer = Repairer(_with_frozen(terms, frozen), workspace)
             q = repairer.repair(recursion.q, watch)
@@ -140,7 +145,14 @@ class Bisection:
             bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
             missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
         said = _message(recursion, stuck, bad, missed, watch)
-        return MethodResult(q, recursion.predictions, recursion.programs + repairer.programs, said)
+        predictions, programs = predictions + recursion.predictions, programs + recursion.programs
+        return MethodResult(q, predictions, programs + repairer.programs, said)
+
+    def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
+        """What is frozen; where no such setting is given, a second choice for clips in which a frame cannot be freed."""
+        if self.frozen is not None:
+            return (self.frozen,)
+        return (("root",), ()) if figure.root == "free" else ((),)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""

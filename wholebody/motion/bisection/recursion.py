@@ -57,7 +57,7 @@ class Recursion:
         """Take the settings; `joints` are the frames with plane constraints."""
         self._scene, self._predictor, self._stays, self.joints = scene, predictor, stays, tuple(joints)
         self._share, self._least, self._kind, self._watch = share, least, kind, watch
-        self._state = State(scene.model)
+        self._state, self._whole = State(scene.model), True
         self.q = np.array(predictor.original)
         self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
         self.at_first = int(self.bad.sum())
@@ -65,19 +65,30 @@ class Recursion:
         self.stuck: dict[int, str] = {}
         self.predictions = self.programs = 0
 
-    def run(self, evaluation: Iterable[int]) -> None:
-        """Free the evaluation points and both ends, then everything between them."""
+    def run(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
+        """Free the evaluation points and both ends, then everything between them.
+
+        Args:
+            evaluation: frames.
+            whole: go on where a frame cannot be freed; else that ends it.
+        """
+        self._whole = whole
         last = len(self.q) - 1
         points = sorted({0, last, *evaluation})
         corrected = [frame for frame in points if self.bad[frame]]
         for frame in corrected:
             self._key(frame)
+            if self._ended():
+                return
         self.keys.update(points)
         for frame in corrected:
             if frame not in self.stuck:
                 self._fill_around(frame)
         for low, high in pairwise(points):
             self._between(low, high)
+
+    def _ended(self) -> bool:
+        return self._watch.ended or bool(self.stuck and not self._whole)
 
     def _fill_around(self, frame: int) -> None:
         """Interpolate frames that overlap beside a corrected point, up to the first free one or another key."""
@@ -91,10 +102,10 @@ class Recursion:
     def _between(self, low: int, high: int) -> None:
         """Free the frames between two that stay."""
         waiting = [(low, high)]
-        while waiting and not self._watch.ended:
+        while waiting and not self._ended():
             low, high = waiting.pop()
             for group in collision_groups(self.bad, low, high, self._share, self._least):
-                if self._bisect(group):
+                if not self._ended() and self._bisect(group):
                     waiting += [(group.first - 1, group.middle), (group.middle, group.last + 1)]
 
     def _bisect(self, group: Group) -> bool:
