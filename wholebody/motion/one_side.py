@@ -7,13 +7,13 @@ the way, until the motion to the next frame passes nothing.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.motion.dips import dip_depth, dipping
+from wholebody.motion.dips import depths_between, dip_depth
 from wholebody.motion.faults import depth
 from wholebody.motion.following import SHALLOW, Follower
 from wholebody.motion.frame_terms import FrameTerms
@@ -28,7 +28,7 @@ def one_sided(terms: FrameTerms, follower: Callable[[], Follower], workspace: Wo
     """Postures (n, nq) of a clip of which fewer motions pass something; the given ones where that is not found.
 
     Motions that pass are gone through from the first to the last one, each side being that of the frame before, and
-    from the last to the first one. The better way is taken.
+    from the last to the first one where that leaves as many.
 
     Args:
         terms: original postures, and what is held.
@@ -36,26 +36,27 @@ def one_sided(terms: FrameTerms, follower: Callable[[], Follower], workspace: Wo
         workspace: of this run alone.
         q: (n, nq) postures; they stay as they are.
     """
-    best, passing = q, _passing(workspace, q, range(len(q) - 1))
-    for side in (1, -1):
-        if not passing:
-            break
-        found = _kept(terms, follower(), workspace, q, side)
-        left = _passing(workspace, found, range(len(q) - 1))
-        if len(left) < len(passing):
-            best, passing = found, left
-    return best
+    depths = depths_between(workspace, q, range(len(q) - 1))
+    passing = [gap for gap, deep in depths.items() if deep > PASSED]
+    for side in (1, -1) if passing else ():
+        found = _kept(terms, follower(), workspace, q, passing, side)
+        changed = (found != q).any(axis=1)
+        looked = [gap for gap in depths if changed[gap] or changed[gap + 1]]
+        now = depths | depths_between(workspace, found, looked)
+        if sum(deep > PASSED for deep in now.values()) < len(passing):
+            return found
+    return q
 
 
-def _passing(workspace: Workspace, q: Array, gaps: range) -> list[int]:
-    """Frames whose motion to the next one passes something."""
-    return [gap for gap in dipping(workspace, q, gaps) if dip_depth(workspace, q[gap], q[gap + 1]) > PASSED]
+def _kept(
+    terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array, passing: Sequence[int], side: int
+) -> Array:
+    """Postures (n, nq) of which those after motions that pass are kept on the side of the frame before.
 
-
-def _kept(terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array, side: int) -> Array:
-    """Postures (n, nq) that are kept on the side of the frame before, or after for `side` -1."""
+    For `side` -1, those before such motions are kept on the side of the frame after.
+    """
     model, figure, q = workspace.model, terms.scene.figure, np.array(q)
-    waiting = _passing(workspace, q, range(len(q) - 1))[::-side]
+    waiting = list(passing[::-side])
     while waiting:
         gap = waiting.pop()
         here, frame = (gap, gap + 1) if side > 0 else (gap + 1, gap)
@@ -70,5 +71,5 @@ def _kept(terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array,
             if not 0 <= frame < len(q) or dip_depth(workspace, kept[here], q[frame]) <= PASSED:
                 q = kept
                 break
-        waiting = [gap for gap in waiting if (gap - frame) * side >= 0]
+        waiting = [gap for gap in waiting if (gap - min(here, frame)) * side >= 0]
     return q

@@ -11,6 +11,7 @@ from wholebody.arrays import Array
 from wholebody.checks import choice, listed, number, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
+from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.interpolation import Kind, key_frames
@@ -19,6 +20,7 @@ from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold_between
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.repair import Repairer
 from wholebody.scene import Scene
@@ -30,6 +32,10 @@ OVERLAP = 5e-5
 CHARACTER = 0.2
 """Radians and metres: what interpolation between evaluation points may miss of the original. Less follows the original
 more closely and predicts more postures."""
+
+MOST = 50
+"""Programs of one prediction: nine in ten take at most 20. More = a little less effort, and much more time where planes
+and what is held contradict each other."""
 
 MOST_FRAMES = 1_000_000
 MOST_BUFFER = 1000.0  # percent
@@ -122,7 +128,7 @@ class Bisection:
         joints = usual if self.planes is None else self.planes
         for joint in joints:
             figure.frame_id(joint)
-        method = method_for_motions(self.method)
+        method = QP(restarts=0, iterations=MOST) if self.method == "qp" else method_for_motions(self.method)
         ways = self._frozen(figure)
         predictions = programs = 0  # of a way that was given up
         with scene.borrow() as workspace:
@@ -136,8 +142,10 @@ class Bisection:
                 if frozen == ways[-1] or watch.ended or not recursion.stuck:
                     break
                 predictions, programs = recursion.predictions, recursion.programs
-            missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
-            repairer = Repairer(_with_frozen(terms, frozen), workspace)
+            frozen_too = _with_frozen(terms, frozen)
+            follower = Follower(frozen_too, self.clearance)
+            missed = hold_between(recursion, predictor, follower, changed_frames(original, recursion.q), watch)
+            repairer = Repairer(frozen_too, workspace)
             q = repairer.repair(recursion.q, watch)
             for frame in changed_frames(recursion.q, q):
                 q[frame] = stays.applied(frame, q[frame])
@@ -146,10 +154,10 @@ class Bisection:
             missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
         said = _message(recursion, stuck, bad, missed, watch)
         predictions, programs = predictions + recursion.predictions, programs + recursion.programs
-        return MethodResult(q, predictions, programs + repairer.programs, said)
+        return MethodResult(q, predictions, programs + follower.programs + repairer.programs, said)
 
     def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
-        """What is frozen; where no such setting is given, a second choice for clips in which a frame cannot be freed."""
+        """What is frozen, and what else where a frame cannot be freed so."""
         if self.frozen is not None:
             return (self.frozen,)
         return (("root",), ()) if figure.root == "free" else ((),)

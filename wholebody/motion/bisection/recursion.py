@@ -16,6 +16,7 @@ from wholebody.motion.bisection.interpolation import Kind, fill
 from wholebody.motion.bisection.path_planes import path_planes
 from wholebody.motion.bisection.prediction import Prediction, Predictor
 from wholebody.motion.bisection.stays import Stays
+from wholebody.motion.following import Follower
 from wholebody.scene import Scene
 from wholebody.tasks import Plane
 
@@ -183,8 +184,13 @@ def changed_frames(original: Array, q: Array) -> list[int]:
     return [int(frame) for frame in np.flatnonzero((original != q).any(axis=1))]
 
 
-def hold_between(recursion: Recursion, predictor: Predictor, changed: list[int], watch: Watch) -> list[int]:
-    """Move interpolated frames to the nearest posture in which everything holds; returns those that have none."""
+def hold_between(
+    recursion: Recursion, predictor: Predictor, follower: Follower, changed: list[int], watch: Watch
+) -> list[int]:
+    """Move interpolated frames to the nearest posture in which everything holds; returns those that have none.
+
+    Steps of the tracker find most; what they do not find is predicted.
+    """
     failed = []
     for number, frame in enumerate(changed):
         q = recursion.q[frame]
@@ -192,6 +198,10 @@ def hold_between(recursion: Recursion, predictor: Predictor, changed: list[int],
             continue
         if watch.tell(number / len(changed), f"holds of frame {frame}"):
             break
+        nearest = follower.frame(frame, q, goal=q)
+        if predictor.good(frame, nearest):
+            recursion.q[frame] = nearest
+            continue
         found = predictor.predict(frame, q, effort_from=q)
         recursion.predictions += 1
         recursion.programs += found.programs
