@@ -20,6 +20,7 @@ from wholebody.scene_geometry import SceneGeometry
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import Sweep
+    from wholebody.geometry.continuous.swept_depth import SweptDepth
     from wholebody.moving_things import Collision, FrameMotion, MovingThings
 
 
@@ -67,6 +68,7 @@ class Workspace(OfOneRun):
         self._stuck: tuple[str, ...] = ()
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
+        self._depths: dict[float, SweptDepth] = {}
         self._moving: MovingThings | None = None
         self._seen = built.bring(self.proximity, -1)
 
@@ -128,6 +130,14 @@ class Workspace(OfOneRun):
 
             self._sweep = Sweep(self.model, self.geometry)
         return self._sweep
+
+    def depths(self, tolerance: float) -> SweptDepth:
+        """Depths along postures, to a tolerance in metres; `start` forgets what was asked before."""
+        if tolerance not in self._depths:
+            from wholebody.geometry.continuous.swept_depth import SweptDepth
+
+            self._depths[tolerance] = SweptDepth(self.table, self.geometry, tolerance)
+        return self._depths[tolerance]
 
     def near(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""

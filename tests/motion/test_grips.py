@@ -81,3 +81,19 @@ def test_shifts_are_smooth_and_end_before_the_clip_does(human: Figure) -> None:
     length = np.linalg.norm(shifts, axis=1)
     assert not length[[0, -1]].any()
     assert np.abs(np.diff(shifts, n=2, axis=0)).max() < 0.25 * length.max()
+
+
+def test_hands_that_pass_each_other_between_two_frames_part_there_too(human: Figure) -> None:
+    """One hand goes past the other; no frame is where they are nearest."""
+    raised = human.model.joints[human.joint_id("left_shoulder_flexion")].idx_q
+    base = human.with_joints(
+        human.posture("arms_forward"), {f"{side}_shoulder_abduction": -0.22 for side in ("left", "right")}
+    )
+    q = np.tile(base, (6, 1))
+    q[:, raised] += 0.12 * (np.arange(6) - 2.5)
+    clip = wb.Clip(human, q, DT)
+    before = wb.check(clip)
+    assert (before.colliding, before.dips) == (0, 1)
+    found = wb.avoid(clip, method="bisection", constraints=[GRIP])
+    assert found.report.solved, found.report.message
+    assert before.deepest_between < found.report.beside < 5e-3

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.geometry.continuous.swept_depth import SweptDepth
+from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.workspace import Workspace
 
 DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
@@ -34,22 +34,32 @@ def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, li
         q: (n, nq) postures.
         gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
     """
-    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
-    found, last = dict[int, list[int]](), -1
-    for gap in sorted(gaps):
-        if gap != last:
-            swept.start(q[gap])
-        last = gap + 1
-        passing = swept.advance(q[last])[1]
+    found = dict[int, list[int]]()
+    for gap, passing in _swept(workspace, q, gaps):
         if passing.depth.max(initial=0.0) > DIP:
             deepest_first = np.argsort(-passing.depth, kind="stable")
             found[gap] = [int(passing.number[place]) for place in deepest_first if passing.depth[place] > DIP]
     return found
 
 
+def depths_between(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
+    """How deep motions between frames dip, metres; see `dipping`."""
+    return {gap: float(passing.depth.max(initial=0.0)) for gap, passing in _swept(workspace, q, gaps)}
+
+
+def _swept(workspace: Workspace, q: Array, gaps: Iterable[int]) -> Iterator[tuple[int, Depths]]:
+    """Pairs that overlap in each gap, and how deep."""
+    swept, last = workspace.depths(DIP), -1
+    for gap in sorted(gaps):
+        if gap != last:
+            swept.start(q[gap])
+        last = gap + 1
+        yield gap, swept.advance(q[last])[1]
+
+
 def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
-    swept = SweptDepth(workspace.table, workspace.geometry, DIP)
+    swept = workspace.depths(DIP)
     swept.start(before)
     return float(swept.advance(after)[1].depth.max(initial=0.0))
 

@@ -50,13 +50,14 @@ class Follower:
         low, high, _, _ = self._terms.bounds(number, self._state)
         return low, high
 
-    def frame(self, number: int, q: Array, more: float = 0.0) -> Array:
+    def frame(self, number: int, q: Array, more: float = 0.0, *, goal: Array | None = None) -> Array:
         """The posture of a frame, begun at a posture (nq,): steps until they are short.
 
         Args:
             number: of the frame.
             q: (nq,) where the steps begin.
             more: metres that are asked of every pair beyond the clearance.
+            goal: (nq,) posture that is followed in place of the original one.
         """
         terms, problem = self._terms, self._problem
         problem.clearances = np.full_like(problem.clearances, self._clearance + more)
@@ -65,9 +66,9 @@ class Follower:
             model = terms.scene.model
             away = np.asarray(pin.difference(model, terms.q[number], q))
             q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
-        goal = Posture(terms.q[number]).resolve(terms.scene, problem.start)
+        near = Posture(terms.q[number] if goal is None else goal).resolve(terms.scene, problem.start)
         held = terms.held(number)
-        problem.goals = (goal, *(term for term in held if isinstance(term, Goal)))
+        problem.goals = (near, *(term for term in held if isinstance(term, Goal)))
         problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
         for _ in range(MOST):
             step = self._tracker.step(q)

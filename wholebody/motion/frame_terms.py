@@ -65,6 +65,7 @@ class FrameTerms:
     shifts: tuple[tuple[Array, ...], ...]
     grips: Mapping[int, Array] = field(default_factory=dict)
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
+    _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
         """Constraints and goals of a frame, resolved at its original posture."""
@@ -91,12 +92,14 @@ class FrameTerms:
 
     def feet(self, frame: int) -> tuple[Hold, ...]:
         """What holds the feet that stand in a frame, where each of them is held."""
-        found = []
-        for foot in held_feet(self.scene.figure, self.stands[frame]):
-            at = foot.resolve(self.scene, self.q[frame]).kept_at
-            shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
-            found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
-        return tuple(found)
+        if frame not in self._feet:
+            found = []
+            for foot in held_feet(self.scene.figure, self.stands[frame]):
+                at = foot.resolve(self.scene, self.q[frame]).kept_at
+                shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
+                found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
+            self._feet[frame] = tuple(found)
+        return self._feet[frame]
 
     def shift(self, frame: int, joint: int) -> Array:
         """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""

@@ -7,13 +7,15 @@ brought onto larger hands do. There the grip is shifted, by the shift s_t (3,) o
     1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2 + c |s_t - (u_t . s_t) u_t|^2)    is least, and
     n . s_t >= depth + room
 
-for every near pair of pieces with its normal n, where the room includes the clearance. u_t is the direction from one
+for every near pair of pieces with its normal n, in each frame and, where hands turn past each other, at places between
+two frames, where the room includes the clearance. u_t is the direction from one
 held frame to the other: two hands on one shaft may slide along it, and leave it only where that parts nothing. Normals
 turn with the shift, so the program is solved a few times.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import coal
@@ -28,29 +30,38 @@ from wholebody.scene import Scene
 from wholebody.tasks import Hold
 
 OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
-ROOM = 3e-4  # m: of shifted things beyond what is asked; between frames, on an arc, they come nearer by less
+ROOM = 3e-4  # m: of shifted things beyond what is asked; they come nearer by less between places that are looked at
 NEAR = 0.02  # m: pairs nearer than this have rows
 SPREAD = 0.1  # s: how far a shift at one frame spreads to its neighbours
 MARGIN = 0.5  # s, before and after an overlap: in which grips are shifted
 FARTHEST = 0.05  # m: of a shift along any axis; what needs more is no grip, and stays as it is
 ROUNDS = 8  # of normals
+CLOSE = 0.01  # m: where frames are nearer, places between them are looked at
+SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
 ACROSS = 100.0  # weight c of what a shift has across the line between both frames
 
 
 class _Row(NamedTuple):
-    """A near pair in one frame: its distance (m), and the normal (3,) along which a shift parts it."""
+    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,).
 
-    frame: int
+    A shift along the normal parts it.
+    """
+
+    place: float
     distance: float
     normal: Array
 
 
 class _Grip:
-    """Pieces that are rigid with a frame, and those with the frame that it is held at."""
+    """Pieces that are rigid with a frame, and those with the frame that it is held at.
+
+    Attributes:
+        model: Pinocchio's model of the figure.
+    """
 
     def __init__(self, scene: Scene, term: Hold) -> None:
         model, table = scene.model, scene.pair_table
-        self._model, self._data = model, model.createData()
+        self.model, self._data = model, model.createData()
         self._own, self._other = (model.frames[scene.frame_id(name)] for name in (term.frame, str(term.relative_to)))
         joints = self._own.parentJoint, self._other.parentJoint
         pieces = scene.geometry.geometryObjects
@@ -63,34 +74,34 @@ class _Grip:
 
     def line(self, q: Array) -> Array:
         """(3,) direction from the other frame to the held one at a posture (nq,), in the other one's axes; or zero."""
-        pin.forwardKinematics(self._model, self._data, q)
+        pin.forwardKinematics(self.model, self._data, q)
         base, held = (self._data.oMi[each.parentJoint] * each.placement for each in (self._other, self._own))
         way: Array = np.asarray(base.actInv(held).translation)
         length = float(np.linalg.norm(way))
         return way / length if length > 0.0 else way
 
-    def rows(self, frame: int, q: Array, shift: Array, clearance: float) -> list[_Row]:
+    def rows(self, place: float, q: Array, shift: Array, clearance: float) -> list[_Row]:
         """Near pairs at a posture (nq,) with a shift (3,) in the axes of the other frame.
 
         Their distances are less the clearance, metres.
         """
         if not self._pairs:
             return []
-        pin.forwardKinematics(self._model, self._data, q)
+        pin.forwardKinematics(self.model, self._data, q)
         base = self._data.oMi[self._other.parentJoint] * self._other.placement
         at = base.actInv(self._data.oMi[self._own.parentJoint])
         at.translation += shift
         back, found = self._other.placement.inverse(), []
         for own, other in self._pairs:
-            place, fixed = at * own.placement, back * other.placement
+            moved, fixed = at * own.placement, back * other.placement
             self._result.clear()
             distance = -clearance + coal.distance(
                 other.geometry, coal.Transform3s(fixed.rotation, fixed.translation),
-                own.geometry, coal.Transform3s(place.rotation, place.translation), self._request, self._result,
+                own.geometry, coal.Transform3s(moved.rotation, moved.translation), self._request, self._result,
             )  # fmt: skip
             normal = np.array(self._result.normal)
             if distance < NEAR and np.isfinite(normal).all() and normal.any():
-                found.append(_Row(frame, float(distance), normal))
+                found.append(_Row(place, float(distance), normal))
         return found
 
 
@@ -105,21 +116,48 @@ def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float 
         clearance: least distance of every pair, metres.
     """
     grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
-    depths = [_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)]
-    wrong = np.array(depths) > OVERLAP
+    depths = np.array([_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)])
+    wrong, passing = depths > OVERLAP, list[int]()
+    for gap in np.flatnonzero((depths[:-1] > -CLOSE) | (depths[1:] > -CLOSE)).tolist():
+        if max(_deepest(_rows_at(grip, gap + share, q, shifts, clearance)) for share in SHARES) > OVERLAP:
+            passing.append(gap)
+            wrong[gap : gap + 2] = True
     for window in windows(wrong, max(3, round(MARGIN / dt))):
-        found = _window(grip, window, q, dt, clearance)
+        found = _window(grip, window, [gap for gap in passing if window.first <= gap < window.end], q, dt, clearance)
         if found is not None:
             shifts[window.first : window.end] = found
     return shifts
 
 
+def _rows_at(grip: _Grip, place: float, q: Array, shifts: Array, clearance: float, first: int = 0) -> list[_Row]:
+    """Near pairs at a place of a clip, with the shifts (n, 3) of the frames from `first` on."""
+    frame, share = divmod(place, 1.0)
+    here = int(frame) - first
+    if share == 0.0:
+        return grip.rows(here, q[int(frame)], shifts[here], clearance)
+    posture = np.asarray(pin.interpolate(grip.model, q[int(frame)], q[int(frame) + 1], share))
+    return grip.rows(here + share, posture, (1.0 - share) * shifts[here] + share * shifts[here + 1], clearance)
+
+
 def _deepest(rows: list[_Row]) -> float:
-    return max((-row.distance for row in rows), default=0.0)
+    """Depth of the deepest of the rows, metres; negative where all are apart."""
+    return max((-row.distance for row in rows), default=-NEAR)
 
 
-def _window(grip: _Grip, window: Window, q: Array, dt: float, clearance: float) -> Array | None:
-    """(frames, 3) shifts of a window; None where none is found that parts everything."""
+def _over_frames(row: _Row, count: int) -> Array:
+    """(3 count,) what the shifts of the frames move along the normal of a row."""
+    values, (frame, share) = np.zeros((count, 3)), divmod(row.place, 1.0)
+    values[int(frame)] = (1.0 - share) * row.normal
+    if share:
+        values[int(frame) + 1] = share * row.normal
+    return values.ravel()
+
+
+def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: float, clearance: float) -> Array | None:
+    """(frames, 3) shifts of a window; None where none is found that parts everything.
+
+    `passing` are the frames of it whose grips pass each other on the way to the next frame.
+    """
     import scipy.sparse as sp
 
     count = len(window)
@@ -129,13 +167,13 @@ def _window(grip: _Grip, window: Window, q: Array, dt: float, clearance: float) 
     across = sp.block_diag([np.eye(3) * (line @ line) - np.outer(line, line) for line in lines])
     P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + ACROSS * across)
     shifts = np.zeros((count, 3))
+    places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]
     _, solve = banded_solver(None)
     for _ in range(ROUNDS):
-        rows = [row for k in range(count) for row in grip.rows(k, q[window.first + k], shifts[k], clearance)]
+        rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
         if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
             return shifts
-        at = np.repeat(np.arange(len(rows)), 3), np.concatenate([3 * row.frame + np.arange(3) for row in rows])
-        G = sp.csc_matrix((np.concatenate([row.normal for row in rows]), at), shape=(len(rows), 3 * count))
+        G = sp.csc_matrix(np.array([_over_frames(row, count) for row in rows]))
         lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
         most = np.full(3 * count, FARTHEST)
         answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))

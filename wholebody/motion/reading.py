@@ -64,12 +64,13 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
     frames = read_frames(path, figure) if motion is None else bvh_writing.own(motion, figure)
     if motion is not None and frames is None:
         _say(motion, path)
-        return retarget(motion, figure)
-    assert frames is not None
     try:
+        if frames is None:
+            assert motion is not None
+            return retarget(motion, figure)
         return Clip(figure, frames.q, frames.dt, frames.name)
     except InputError as error:
-        raise FileFormatError(f"{path.name}: {error}") from None
+        raise FileFormatError(f"{one_line(path.name)}: {error}") from None
 
 
 def _say(motion: SkeletonMotion, path: Path) -> None:

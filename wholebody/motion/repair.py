@@ -20,6 +20,7 @@ from wholebody.motion.dips import dip_depth, dips
 from wholebody.motion.faults import faults
 from wholebody.motion.following import SHALLOW, Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.one_side import one_sided
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.nodes import Looking, Node, Rows, Terms
@@ -100,6 +101,7 @@ class Repairer:
         """Postures (n, nq) with less that is wrong; those in which nothing is wrong nearby are the given ones."""
         q = np.array(q)
         margin = max(2, round(MARGIN / self._terms.dt))
+        q = one_sided(self._terms, self._following, self._workspace, q)
         for number in range(ROUNDS):
             wrong, gaps = self._faults(q)
             changed = [self._kept_back(q, gap) for gap in gaps] if number else []  # what rows did not free
@@ -122,9 +124,12 @@ class Repairer:
         """Keep frames beside a gap on one side of what it passes, in place; whether that succeeded."""
         if dip_depth(self._workspace, q[gap], q[gap + 1]) <= SHALLOW:
             return False
+        return keep_back(self._following(), self._workspace, q, gap, len(q))
+
+    def _following(self) -> Follower:
         if self._follower is None:
             self._follower = Follower(self._terms, self._clearance)
-        return keep_back(self._follower, self._workspace, q, gap, len(q))
+        return self._follower
 
     def _window(self, window: Window, q: Array) -> bool:
         """Repair one window of q (n, nq) in place; whether it is better than before."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -16,6 +16,7 @@ from wholebody.figures.state import State
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
+from wholebody.motion.bisection.path_planes import path_planes
 from wholebody.motion.clip import Clip
 from wholebody.motion.ready_equipment import equipment
 
@@ -156,6 +157,35 @@ def test_frozen_joints_are_the_original_ones_in_every_frame(swing: Clip) -> None
     assert result.message == ""
     assert np.array_equal(result.q[:, columns], swing.q[:, columns])
     assert depths(scene, result.q).max() <= DEEP
+
+
+def test_the_root_moves_where_a_frame_cannot_be_freed_with_it_frozen(swing: Clip) -> None:
+    """A block is 5 cm in the pelvis, which moves with the root alone."""
+    still, scene = Clip(swing.figure, np.tile(swing.q[0], (5, 1)), swing.dt), wb.Scene(swing.figure)
+    scene.add(wb.Box((0.5, 0.5, 0.06)), name="block", at=(-0.35, 0.0, 0.95))
+    frozen = Bisection(frozen=("root",)).avoid(still, scene, (), None)
+    assert "frame 0 and 2 others could not be freed (pelvis and block" in frozen.message
+    result = Bisection().avoid(still, scene, (), None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    assert 0.04 < np.linalg.norm(result.q[:, :3] - still.q[:, :3], axis=1).min() < 0.07
+
+
+def test_a_foot_that_stands_has_no_plane_of_its_path(swing: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The held foot says where it is; the ankle of the other one, and both elbows, keep theirs."""
+    figure, q = swing.figure, swing.q[:20].copy()
+    knee = figure.model.joints[figure.joint_id("left_knee_flexion")].idx_q
+    q[:, knee] += np.linspace(0.2, 1.2, len(q))  # the left foot is lifted
+    clip, scene, asked = Clip(figure, q, swing.dt), dressed(figure, "side_sphere"), set[tuple[str, ...]]()
+
+    def noted(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[wb.Plane]:
+        asked.add(tuple(joints))
+        return path_planes(figure, q, frame, joints, state)
+
+    monkeypatch.setattr("wholebody.motion.bisection.recursion.path_planes", noted)
+    result = Bisection().avoid(clip, scene, [wb.StanceFeet()], None)
+    assert result.message == ""
+    assert asked == {("left_elbow", "right_elbow", "left_ankle")}
 
 
 def test_a_constraint_freezes_as_the_setting_does(swing: Clip) -> None:

@@ -345,6 +345,13 @@ def test_a_wrong_bvh_names_its_line(old: str, new: str, sentence: str, human: Fi
         wb.read_clip(tmp_path / "a.bvh", human)
 
 
+def test_a_skeleton_of_unknown_bones_names_its_file(human: Figure, tmp_path: Path) -> None:
+    text = BVH.replace("hips", "one").replace("Bip01 L Thigh", "two").replace("shank", "three").replace("spine", "four")
+    (tmp_path / "a.bvh").write_text(text)
+    with pytest.raises(wb.FileFormatError, match=r"^a\.bvh: no bones of the skeleton are known to belong to human"):
+        wb.read_clip(tmp_path / "a.bvh", human)
+
+
 # ---- AMASS
 
 

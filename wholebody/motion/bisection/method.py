@@ -11,6 +11,7 @@ from wholebody.arrays import Array
 from wholebody.checks import choice, listed, number, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
+from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.interpolation import Kind, key_frames
@@ -19,6 +20,7 @@ from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold_between
 from wholebody.motion.bisection.stays import Stays
 from wholebody.motion.clip import Clip
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.repair import Repairer
 from wholebody.scene import Scene
@@ -30,6 +32,10 @@ OVERLAP = 5e-5
 CHARACTER = 0.2
 """Radians and metres: what interpolation between evaluation points may miss of the original. Less follows the original
 more closely and predicts more postures."""
+
+MOST = 50
+"""Programs of one prediction: nine in ten take at most 20. More = a little less effort, and much more time where planes
+and what is held contradict each other."""
 
 MOST_FRAMES = 1_000_000
 MOST_BUFFER = 1000.0  # percent
@@ -54,8 +60,8 @@ class Bisection:
         interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
         planes: frames of the figure, such as "left_elbow" and "left_wrist", that leave their path only sideways where a
             posture is predicted; None for elbows and ankles, where the figure has them.
-        frozen: joints and groups that stay as they are; None for a free root. ("root", "lower_body") moves the upper
-            body alone.
+        frozen: joints and groups that stay as they are; None for a free root, unless a frame cannot be freed so.
+            ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`.
     """
@@ -118,21 +124,28 @@ class Bisection:
             whole(frame, f"Bisection: evaluation, {clip.name}", 0, len(clip) - 1)
         original = np.array([figure.clamp(q) for q in clip.q])
         terms = frame_terms(scene, original, clip.dt, constraints)
-        frozen = self.frozen if self.frozen is not None else ("root",) if figure.root == "free" else ()
         usual = tuple(name for name in (*ELBOWS, *ANKLES) if name in figure.frames)
         joints = usual if self.planes is None else self.planes
         for joint in joints:
             figure.frame_id(joint)
-        stays = Stays(scene, original, terms, frozen)
-        method = method_for_motions(self.method)
+        method = QP(restarts=0, iterations=MOST) if self.method == "qp" else method_for_motions(self.method)
+        ways = self._frozen(figure)
+        predictions = programs = 0  # of a way that was given up
         with scene.borrow() as workspace:
-            predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
-            recursion = Recursion(
-                scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
-            )
-            recursion.run(self._points(figure, original, frozen))
-            missed = hold_between(recursion, predictor, changed_frames(original, recursion.q), watch)
-            repairer = Repairer(_with_frozen(terms, frozen), workspace)
+            for frozen in ways:
+                stays = Stays(scene, original, terms, frozen)
+                predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
+                recursion = Recursion(
+                    scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
+                )
+                recursion.run(self._points(figure, original, frozen), whole=frozen == ways[-1])
+                if frozen == ways[-1] or watch.ended or not recursion.stuck:
+                    break
+                predictions, programs = recursion.predictions, recursion.programs
+            frozen_too = _with_frozen(terms, frozen)
+            follower = Follower(frozen_too, self.clearance)
+            missed = hold_between(recursion, predictor, follower, changed_frames(original, recursion.q), watch)
+            repairer = Repairer(frozen_too, workspace)
             q = repairer.repair(recursion.q, watch)
             for frame in changed_frames(recursion.q, q):
                 q[frame] = stays.applied(frame, q[frame])
@@ -140,7 +153,14 @@ class Bisection:
             bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
             missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
         said = _message(recursion, stuck, bad, missed, watch)
-        return MethodResult(q, recursion.predictions, recursion.programs + repairer.programs, said)
+        predictions, programs = predictions + recursion.predictions, programs + recursion.programs
+        return MethodResult(q, predictions, programs + follower.programs + repairer.programs, said)
+
+    def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
+        """What is frozen, and what else where a frame cannot be freed so."""
+        if self.frozen is not None:
+            return (self.frozen,)
+        return (("root",), ()) if figure.root == "free" else ((),)
 
     def _points(self, figure: Figure, original: Array, frozen: tuple[str, ...]) -> tuple[int, ...]:
         """The evaluation points of a clip."""

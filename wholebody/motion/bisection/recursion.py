@@ -16,6 +16,7 @@ from wholebody.motion.bisection.interpolation import Kind, fill
 from wholebody.motion.bisection.path_planes import path_planes
 from wholebody.motion.bisection.prediction import Prediction, Predictor
 from wholebody.motion.bisection.stays import Stays
+from wholebody.motion.following import Follower
 from wholebody.scene import Scene
 from wholebody.tasks import Plane
 
@@ -57,7 +58,7 @@ class Recursion:
         """Take the settings; `joints` are the frames with plane constraints."""
         self._scene, self._predictor, self._stays, self.joints = scene, predictor, stays, tuple(joints)
         self._share, self._least, self._kind, self._watch = share, least, kind, watch
-        self._state = State(scene.model)
+        self._state, self._whole = State(scene.model), True
         self.q = np.array(predictor.original)
         self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
         self.at_first = int(self.bad.sum())
@@ -65,19 +66,30 @@ class Recursion:
         self.stuck: dict[int, str] = {}
         self.predictions = self.programs = 0
 
-    def run(self, evaluation: Iterable[int]) -> None:
-        """Free the evaluation points and both ends, then everything between them."""
+    def run(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
+        """Free the evaluation points and both ends, then everything between them.
+
+        Args:
+            evaluation: frames.
+            whole: go on where a frame cannot be freed; else that ends it.
+        """
+        self._whole = whole
         last = len(self.q) - 1
         points = sorted({0, last, *evaluation})
         corrected = [frame for frame in points if self.bad[frame]]
         for frame in corrected:
             self._key(frame)
+            if self._ended():
+                return
         self.keys.update(points)
         for frame in corrected:
             if frame not in self.stuck:
                 self._fill_around(frame)
         for low, high in pairwise(points):
             self._between(low, high)
+
+    def _ended(self) -> bool:
+        return self._watch.ended or bool(self.stuck and not self._whole)
 
     def _fill_around(self, frame: int) -> None:
         """Interpolate frames that overlap beside a corrected point, up to the first free one or another key."""
@@ -91,10 +103,10 @@ class Recursion:
     def _between(self, low: int, high: int) -> None:
         """Free the frames between two that stay."""
         waiting = [(low, high)]
-        while waiting and not self._watch.ended:
+        while waiting and not self._ended():
             low, high = waiting.pop()
             for group in collision_groups(self.bad, low, high, self._share, self._least):
-                if self._bisect(group):
+                if not self._ended() and self._bisect(group):
                     waiting += [(group.first - 1, group.middle), (group.middle, group.last + 1)]
 
     def _bisect(self, group: Group) -> bool:
@@ -108,7 +120,7 @@ class Recursion:
         """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
-        planes = path_planes(self._scene.figure, self.q, frame, self.joints, self._state)
+        planes = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state)
         found = [self._predicted(frame, self.q[frame], planes)]
         if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
             starts = [*([self.q[frame]] if planes else []), *self._beside(frame)]
@@ -121,6 +133,13 @@ class Recursion:
         self.bad[frame] = False
         self.keys.add(frame)
         return True
+
+    def _swinging(self, frame: int) -> list[str]:
+        """Frames with plane constraints on which no foot stands: what stands is held, and need not be in the plane."""
+        figure, model = self._scene.figure, self._scene.model
+        feet = [model.frames[figure.frame_id(foot)].parentJoint for foot in self._predictor.terms.stands[frame]]
+        stood_on = {joint for foot in feet for joint in model.supports[foot]}
+        return [name for name in self.joints if model.frames[figure.frame_id(name)].parentJoint not in stood_on]
 
     def _predicted(self, frame: int, start: Array, planes: Sequence[Plane]) -> Prediction:
         found = self._predictor.predict(frame, self._stays.applied(frame, start), planes)
@@ -165,8 +184,13 @@ def changed_frames(original: Array, q: Array) -> list[int]:
     return [int(frame) for frame in np.flatnonzero((original != q).any(axis=1))]
 
 
-def hold_between(recursion: Recursion, predictor: Predictor, changed: list[int], watch: Watch) -> list[int]:
-    """Move interpolated frames to the nearest posture in which everything holds; returns those that have none."""
+def hold_between(
+    recursion: Recursion, predictor: Predictor, follower: Follower, changed: list[int], watch: Watch
+) -> list[int]:
+    """Move interpolated frames to the nearest posture in which everything holds; returns those that have none.
+
+    Steps of the tracker find most; what they do not find is predicted.
+    """
     failed = []
     for number, frame in enumerate(changed):
         q = recursion.q[frame]
@@ -174,6 +198,10 @@ def hold_between(recursion: Recursion, predictor: Predictor, changed: list[int],
             continue
         if watch.tell(number / len(changed), f"holds of frame {frame}"):
             break
+        nearest = follower.frame(frame, q, goal=q)
+        if predictor.good(frame, nearest):
+            recursion.q[frame] = nearest
+            continue
         found = predictor.predict(frame, q, effort_from=q)
         recursion.predictions += 1
         recursion.programs += found.programs
