@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.motion.dips import dip_depth
@@ -20,6 +21,7 @@ from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.windows import Window, outwards
 from wholebody.workspace import Workspace
 
+FARTHER = 3.0  # of the least sum of squared deviations: farther starts are left out; more = longer until the last one
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
 
 
@@ -59,8 +61,27 @@ class Carried:
                 keep_back(self._follower, workspace, q, gap, len(q) - 1, window.first)
         return q
 
-    def outwards(self, window: Window, middle: int) -> Array:
-        """(n, nq) postures of a window, followed from the freed posture of a frame in the middle."""
+    def outwards(self, window: Window, middles: Iterable[int]) -> list[Array]:
+        """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
+
+        Followed from one frame a limb may stay on the farther side of a thing for the whole window. Iterations keep the
+        side, so which start ends nearest is seen before them. What gets farther than another is left out.
+
+        Args:
+            window: which frames.
+            middles: frames of it to begin at.
+        """
+        found, apart = list[Array](), list[float]()
+        for middle in dict.fromkeys(middles):
+            most = FARTHER * min(apart, default=np.inf)
+            q, far = self._outwards(window, middle, most)
+            if far <= most:
+                found.append(q)
+                apart.append(far)
+        return [found[number] for number in np.argsort(apart, kind="stable")]
+
+    def _outwards(self, window: Window, middle: int, most: float) -> tuple[Array, float]:
+        """Postures (n, nq), and the sum of their squared deviations; ended where it is more than `most`."""
         terms = self._terms
         if self._follower is None:
             self._follower = Follower(terms, self._clearance)
@@ -68,6 +89,7 @@ class Carried:
         freed, _ = freed_posture(terms, middle, terms.q[middle], self._clearance)
         self.posture_solves += 1
         q[middle - window.first] = freed
+        model, far = terms.scene.model, 0.0
         patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
         for frame, neighbour in outwards(window, middle):
             if frame - neighbour != side:
@@ -78,4 +100,7 @@ class Carried:
             q[frame - window.first] = here
             near = np.abs(here - terms.q[frame]).max() <= BACK
             calm = calm + 1 if near else 0
-        return q
+            far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
+            if far > most:
+                break
+        return q, far
