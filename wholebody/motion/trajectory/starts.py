@@ -8,7 +8,8 @@ side. The iterations begin with what that gives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,8 +22,15 @@ from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.windows import Window, outwards
 from wholebody.workspace import Workspace
 
-FARTHER = 3.0  # of the least sum of squared deviations: farther starts are left out; more = longer until the last one
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
+
+
+class _Followed(NamedTuple):
+    """Postures (n, nq), the sum of their squared deviations, and the frame that they were followed from."""
+
+    q: Array
+    apart: float
+    middle: int
 
 
 class Carried:
@@ -61,27 +69,30 @@ class Carried:
                 keep_back(self._follower, workspace, q, gap, len(q) - 1, window.first)
         return q
 
-    def outwards(self, window: Window, middles: Iterable[int]) -> list[Array]:
+    def outwards(self, window: Window, middles: Iterable[int]) -> Iterator[Array]:
         """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
 
         Followed from one frame a limb may stay on the farther side of a thing for the whole window. Iterations keep the
-        side, so which start ends nearest is seen before them. What gets farther than another is left out.
+        side, so which start ends nearest is seen before them. Following ends where another start is nearer already;
+        it is gone on with only if that one leads to nothing.
 
         Args:
             window: which frames.
             middles: frames of it to begin at.
         """
-        found, apart = list[Array](), list[float]()
+        best, others = _Followed(np.zeros(0), np.inf, -1), list[int]()
         for middle in dict.fromkeys(middles):
-            most = FARTHER * min(apart, default=np.inf)
-            q, far = self._outwards(window, middle, most)
-            if far <= most:
-                found.append(q)
-                apart.append(far)
-        return [found[number] for number in np.argsort(apart, kind="stable")]
+            found = self._outwards(window, middle, best.apart)
+            if found.apart < best.apart:
+                best, found = found, best
+            if found.middle >= 0:
+                others.append(found.middle)
+        yield best.q
+        for middle in others:
+            yield self._outwards(window, middle, np.inf).q
 
-    def _outwards(self, window: Window, middle: int, most: float) -> tuple[Array, float]:
-        """Postures (n, nq), and the sum of their squared deviations; ended where it is more than `most`."""
+    def _outwards(self, window: Window, middle: int, most: float) -> _Followed:
+        """What following from a frame gives; ended where the sum of squared deviations is more than `most`."""
         terms = self._terms
         if self._follower is None:
             self._follower = Follower(terms, self._clearance)
@@ -103,4 +114,4 @@ class Carried:
             far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
             if far > most:
                 break
-        return q, far
+        return _Followed(q, far, middle)
