@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from enum import Enum
 from itertools import chain
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -33,20 +33,18 @@ GROWN = 2.0  # of the objective: what grows by more in a later round is on the w
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
-class Settings(Protocol):
-    """What is read of the method's settings."""
+class WindowSettings(NamedTuple):
+    """What windows need of the method's settings.
 
-    @property
-    def clearance(self) -> float:
-        """Least distance of every pair, metres."""
+    Attributes:
+        clearance: least distance of every pair, metres.
+        time: seconds that a push spreads over.
+        iterations: most steps of one run.
+    """
 
-    @property
-    def time(self) -> float:
-        """Seconds that a push spreads over."""
-
-    @property
-    def iterations(self) -> int:
-        """Most programs of one attempt."""
+    clearance: float
+    time: float
+    iterations: int
 
 
 class Freed(NamedTuple):
@@ -98,7 +96,7 @@ class ClipRun:
     """
 
     def __init__(
-        self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
+        self, settings: WindowSettings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
         reference: Array, rate: float = 1.0, loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
@@ -236,8 +234,8 @@ class ClipRun:
             dear = GROWN * found.objective if found is not None and found.programs else np.inf
             # from the third round on it is nearly free: what is missed then is seldom on the wrong side
             ends = dear if way is _Way.EARLY_EXIT and number < 2 else None
-            # What passes a thing between two frames is on the wrong side: that is seen where little is missed in frames,
-            # long before the optimum.
+            # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
+            # before the optimum
             rough = way is _Way.EARLY_EXIT and not number
             found = program.run(x, told, radius, largest, ends, rough)
             self._programs += found.programs
