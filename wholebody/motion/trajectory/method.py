@@ -27,7 +27,7 @@ from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
-BRIEFEST, LONGEST = 0.05, 0.15  # s, of what a push spreads over by default; shorter = nearer, and pushes that are felt
+BRIEFEST, LONGEST = 0.05, 0.1  # s, of what a push spreads over by default; shorter = nearer, and pushes that are felt
 STEADY = 1e-6  # rad/s^2, m/s^2: a motion with less acceleration has none, but for rounding
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
@@ -35,7 +35,7 @@ LOOKED = 0.1  # share of the progress that looking for collisions counts for
 def usual_time(clip: Clip) -> float:
     """Seconds that a push spreads over in a clip: root mean square speed of its joints by that of their acceleration.
 
-    Recordings have a ratio of 0.06 to 0.11 s at 30 Hz, motions of least jerk between postures one of up to 0.25 s.
+    Recordings have a ratio of 0.06 to 0.11 s at 30 Hz, motions of least jerk between postures one of 0.1 to 0.25 s.
     """
     joints = slice(6 if clip.figure.root == "free" else 0, None)
     speed, change = (float(np.sqrt((v[:, joints] ** 2).mean())) for v in (clip.velocities(), clip.accelerations()))
