@@ -30,6 +30,7 @@ NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few r
 SHORTER = 0.3  # of the largest step: after the second round, each round takes shorter ones
 SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger = more that dips elsewhere
 GROWN = 2.0  # of the objective: what grows by more in a later round is on the wrong side of what it passes
+BRIEF = 40  # frames: shorter windows are looked at between frames at their optimum only; fewer = more wrong sides
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
@@ -202,8 +203,8 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends, the least first. Attempts that end early are gone on with after all others; then none again, to its
-        optimum before motions between frames are looked at.
+        and both ends, the least first. Attempts that end early are gone on with after all others; then none
+        again, to its optimum before motions between frames are looked at.
         """
         none = np.zeros((len(window), self._workspace.model.nv))
         yield none
@@ -238,7 +239,7 @@ class ClipRun:
             ends = dear if way is _Way.EARLY_EXIT and number < 2 else None
             # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
             # before the optimum
-            rough = way is _Way.EARLY_EXIT and not number
+            rough = way is _Way.EARLY_EXIT and not number and len(x) > BRIEF
             found = program.run(x, told, radius, largest, ends, rough)
             self._programs += found.programs
             if found.roughly and not self._dipping(chart, found.x, always):
