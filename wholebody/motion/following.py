@@ -13,7 +13,7 @@ from wholebody.motion.faults import depth
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
 from wholebody.tasks import Posture
-from wholebody.tasks.base import Bound, Constraint, Goal
+from wholebody.tasks.base import Bound, Constraint, Goal, filled
 from wholebody.workspace import Workspace
 
 BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
@@ -42,6 +42,7 @@ class Follower:
         bounds = [term.resolve(terms.scene, q) for term in terms.given if isinstance(term, Bound)]
         still = [bound for bound in bounds if np.isfinite(bound.bounds(State(terms.scene.model), None)).any()]
         self._problem.bounds = tuple(still)
+        self._goal = Posture(terms.q[0]).resolve(terms.scene, q)
         self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
         self._state = State(terms.scene.model)
 
@@ -66,7 +67,8 @@ class Follower:
             model = terms.scene.model
             away = np.asarray(pin.difference(model, terms.q[number], q))
             q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
-        near = Posture(terms.q[number] if goal is None else goal).resolve(terms.scene, problem.start)
+        target = terms.q[number] if goal is None else goal
+        near = filled(self._goal, target=target, resolved_target=target)
         held = terms.held(number)
         problem.goals = (near, *(term for term in held if isinstance(term, Goal)))
         problem.constraints = tuple(term for term in held if isinstance(term, Constraint))

@@ -11,11 +11,15 @@ import pytest
 import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.dips import dips
+from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.trajectory.banded_qp import banded_solver
+from wholebody.motion.trajectory.method import usual_time
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import EARLY, MET, STEPS, Found, WindowProgram
+from wholebody.motion.trajectory.starts import Carried
+from wholebody.motion.windows import Window
 
 
 def among_needles(planar_arm: Callable[..., Figure], shares: list[tuple[float, float]]) -> dict[int, list[float]]:
@@ -52,13 +56,13 @@ class Asked:
         return Rows(node, gap, (np.ones((1, 1)),), np.zeros(1, dtype=np.intp), np.zeros(0), np.zeros((0, 1)))
 
 
-def asked(least: float, early_exit: float | None, share: float = 1.0) -> Found:
+def asked(least: float, early_exit: float | None, share: float = 1.0, rough: bool = False) -> Found:
     """What a run of three frames ends with that begins with no deviation."""
     wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
     limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
     looking: Any = Asked(least, share)
     program = WindowProgram(looking, objective, limits, banded_solver(None)[1], 60)
-    return program.run(np.zeros((3, 1)), lambda number, worst: False, early_exit=early_exit)
+    return program.run(np.zeros((3, 1)), lambda number, worst: False, early_exit=early_exit, rough=rough)
 
 
 def test_a_run_whose_steps_gain_little_ends_early_where_there_are_others() -> None:
@@ -85,6 +89,25 @@ def test_a_run_that_grows_dear_ends_early() -> None:
     assert 0.2 < found.x.max() < 0.3
 
 
+def test_a_rough_run_ends_once_little_is_missed() -> None:
+    rough, whole = asked(0.25, np.inf, rough=True), asked(0.25, np.inf)
+    assert rough.roughly
+    assert not whole.roughly
+    assert rough.worst <= 2e-3
+    assert rough.programs <= whole.programs
+
+
+def test_the_nearest_start_comes_first(planar_arm: Callable[..., Figure]) -> None:
+    figure = planar_arm((0.5, 0.5), radius=0.02)
+    q = np.stack([np.linspace(-0.3, 0.3, 9), np.zeros(9)], axis=1)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(0.1), name="ball", at=(0.8, 0.12, 0.0))  # the last frame is past its middle: the farther side
+    found = list(Carried(frame_terms(scene, q, 1 / 30, []), 0.0).outwards(Window(0, 9), (8, 0)))
+    apart = [((one - q) ** 2).sum() for one in found]
+    assert len(found) == 2
+    assert apart[0] < apart[1]
+
+
 def test_attempts_that_end_early_are_gone_on_with(
     planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -96,8 +119,8 @@ def test_attempts_that_end_early_are_gone_on_with(
 
     def once(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
         found = run(self, x, *given)
-        runs.append((x, self.between, given[-1], found.x))
-        return found if given[-1] is None else found._replace(early=True)
+        runs.append((x, self.between, given[3], found.x))
+        return found if given[3] is None else found._replace(early=True)
 
     monkeypatch.setattr(WindowProgram, "run", once)
     wb.avoid(clip, scene, method="trajectory")
@@ -118,7 +141,7 @@ def test_attempts_that_end_early_are_begun_again(
     run, ended = WindowProgram.run, []
 
     def hurried(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
-        if given[-1] is None:
+        if given[3] is None:
             return run(self, x, *given)
         ended.append(x)
         return Found(x, 0.0, 1.0, met=False, programs=0, cancelled=False, early=True)
@@ -128,3 +151,12 @@ def test_attempts_that_end_early_are_begun_again(
     assert len(ended) >= 2
     assert freed.report.message.startswith("nothing collides")
     assert wb.check(freed.clip, scene).free
+
+
+def test_a_push_spreads_as_long_as_the_clips_own_speed_takes_to_change(planar_arm: Callable[..., Figure]) -> None:
+    figure, t = planar_arm((0.5, 0.5)), np.arange(600) / 60
+    for rate in (2.0, 12.0, 16.0, 40.0):  # of a sine of rate w the ratio of speed to acceleration is 1 / w
+        clip = wb.Clip(figure, 0.3 * np.stack([np.sin(rate * t), np.sin(rate * t)], axis=1), 1 / 60)
+        assert usual_time(clip) == pytest.approx(np.clip(1.0 / rate, 0.05, 0.1), rel=0.05)
+    still = wb.Clip(figure, np.tile([0.1, 0.2], (9, 1)), 1 / 60)
+    assert usual_time(still) == pytest.approx(0.1)

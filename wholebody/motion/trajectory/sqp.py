@@ -37,6 +37,7 @@ RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear wa
 LARGEST, SMALLEST = 0.5, 1e-4
 WITHIN = 0.1  # m: pairs nearer than this have rows; it is what a radius moves the end of a limb by
 MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
+HELD = 0.2  # of a missed equality counts: a check allows 1 mm of it, and 0.1 mm of an overlap
 STILL = 2e-3  # rad, m: a step no larger ends the iterations where everything is met; larger = rougher optima, faster
 GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
 PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
@@ -65,6 +66,7 @@ class Found(NamedTuple):
         programs: how many programs were solved.
         cancelled: whether the caller ended it.
         early: whether it ended early, with much missed still.
+        roughly: whether it ended as little was missed, before the objective was least.
     """
 
     x: Array
@@ -74,6 +76,7 @@ class Found(NamedTuple):
     programs: int
     cancelled: bool
     early: bool = False
+    roughly: bool = False
 
 
 class _At(NamedTuple):
@@ -131,6 +134,7 @@ class WindowProgram:
         radius: float = RADIUS,
         largest: float = LARGEST,
         early_exit: float | None = None,
+        rough: bool = False,
     ) -> Found:
         """Iterate from deviations x (n, nv).
 
@@ -141,6 +145,7 @@ class WindowProgram:
             largest: largest trust region.
             early_exit: end early where much is missed still and no longer less, or the objective is larger than this,
                 for there are other deviations to begin with; None to go on.
+            rough: end as soon as little is missed, however much less the objective could be.
         """
         here = self._at(x)
         penalty = PENALTY
@@ -160,6 +165,8 @@ class WindowProgram:
                 return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
             if not counts.any():
                 break
+            if rough and number and here.worst <= FAR:
+                return Found(here.x, here.objective, here.worst, False, programs, False, roughly=True)
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
             there_x, solved = self._step(here, dofs, radius, penalty, multipliers)
             programs += solved
@@ -179,6 +186,8 @@ class WindowProgram:
                 counts = counts | more | self._counts(here)
                 if here.worst <= MET and small and not (more & ~counts).any():
                     break
+            elif here.worst <= MET and small and not (more & ~counts).any():
+                break  # what a shorter step could bring is less still
             else:
                 radius = 0.5 * min(radius, longest)
                 if radius < SMALLEST:
@@ -220,7 +229,9 @@ class WindowProgram:
         beyond = SOFT * float(sum(one.shortfalls.sum() for one in rows if one.node.soft))
         past = self._limits.passed(x)
         total = float(sum(one.sum() for one in shortfalls) + past.sum())
-        worst = max(max((float(one.max(initial=0.0)) for one in shortfalls), default=0.0), float(past.max(initial=0.0)))
+        missed = [one.shortfalls for one in rows if not one.node.soft]
+        missed += [HELD * np.abs(one.equal) for one in rows]
+        worst = max(max((float(one.max(initial=0.0)) for one in missed), default=0.0), float(past.max(initial=0.0)))
         return _At(x, rows, self._objective.value(x) + beyond, total, worst)
 
     def _accepted(self, there: _At, here: _At, entries: Sequence[tuple[float, float]], gained: float) -> bool:

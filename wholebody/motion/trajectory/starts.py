@@ -8,9 +8,11 @@ side. The iterations begin with what that gives.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.motion.dips import dip_depth
@@ -21,6 +23,14 @@ from wholebody.motion.windows import Window, outwards
 from wholebody.workspace import Workspace
 
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
+
+
+class _Followed(NamedTuple):
+    """Postures (n, nq), the sum of their squared deviations, and the frame that they were followed from."""
+
+    q: Array
+    apart: float
+    middle: int
 
 
 class Carried:
@@ -59,8 +69,30 @@ class Carried:
                 keep_back(self._follower, workspace, q, gap, len(q) - 1, window.first)
         return q
 
-    def outwards(self, window: Window, middle: int) -> Array:
-        """(n, nq) postures of a window, followed from the freed posture of a frame in the middle."""
+    def outwards(self, window: Window, middles: Iterable[int]) -> Iterator[Array]:
+        """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
+
+        Followed from one frame a limb may stay on the farther side of a thing for the whole window. Iterations keep the
+        side, so which start ends nearest is seen before them. Following ends where another start is nearer already;
+        it is gone on with only if that one leads to nothing.
+
+        Args:
+            window: which frames.
+            middles: frames of it to begin at.
+        """
+        best, others = _Followed(np.zeros(0), np.inf, -1), list[int]()
+        for middle in dict.fromkeys(middles):
+            found = self._outwards(window, middle, best.apart)
+            if found.apart < best.apart:
+                best, found = found, best
+            if found.middle >= 0:
+                others.append(found.middle)
+        yield best.q
+        for middle in others:
+            yield self._outwards(window, middle, np.inf).q
+
+    def _outwards(self, window: Window, middle: int, most: float) -> _Followed:
+        """What following from a frame gives; ended where the sum of squared deviations is more than `most`."""
         terms = self._terms
         if self._follower is None:
             self._follower = Follower(terms, self._clearance)
@@ -68,7 +100,8 @@ class Carried:
         freed, _ = freed_posture(terms, middle, terms.q[middle], self._clearance)
         self.posture_solves += 1
         q[middle - window.first] = freed
-        patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
+        model, far = terms.scene.model, 0.0
+        patience, calm, side, away = max(2, round(PATIENCE / terms.dt)), 0, 1, False
         for frame, neighbour in outwards(window, middle):
             if frame - neighbour != side:
                 calm, side = 0, frame - neighbour
@@ -77,5 +110,9 @@ class Carried:
             here = self._follower.frame(frame, q[neighbour - window.first])
             q[frame - window.first] = here
             near = np.abs(here - terms.q[frame]).max() <= BACK
-            calm = calm + 1 if near else 0
-        return q
+            away |= not near  # an end of a window is free, and what is in the way comes later
+            calm = calm + 1 if near and away else 0
+            far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
+            if far > most:
+                break
+        return _Followed(q, far, middle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from enum import Enum
 from itertools import chain
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,23 +30,22 @@ NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few r
 SHORTER = 0.3  # of the largest step: after the second round, each round takes shorter ones
 SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger = more that dips elsewhere
 GROWN = 2.0  # of the objective: what grows by more in a later round is on the wrong side of what it passes
+BRIEF = 40  # frames: shorter windows are looked at between frames at their optimum only; fewer = more wrong sides
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
 
 
-class Settings(Protocol):
-    """What is read of the method's settings."""
+class WindowSettings(NamedTuple):
+    """What windows need of the method's settings.
 
-    @property
-    def clearance(self) -> float:
-        """Least distance of every pair, metres."""
+    Attributes:
+        clearance: least distance of every pair, metres.
+        time: seconds that a push spreads over.
+        iterations: most steps of one run.
+    """
 
-    @property
-    def time(self) -> float:
-        """Seconds that a push spreads over."""
-
-    @property
-    def iterations(self) -> int:
-        """Most programs of one attempt."""
+    clearance: float
+    time: float
+    iterations: int
 
 
 class Freed(NamedTuple):
@@ -98,7 +97,7 @@ class ClipRun:
     """
 
     def __init__(
-        self, settings: Settings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
+        self, settings: WindowSettings, terms: FrameTerms, workspace: Workspace, solve: Callable[[BandedQP], Answer],
         reference: Array, rate: float = 1.0, loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
@@ -179,7 +178,8 @@ class ClipRun:
             starts = ((_begun(x), _Way.EARLY_EXIT) for x in self._starts(window, chart, limits, depths, always))
         else:
             starts = ((_begun(x), _Way.CAREFUL) for x in [_deviations(chart, begun, limits)])
-        for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
+        whole = [] if begun is not None else [(_begun(np.zeros_like(limits.lower)), _Way.USUAL)]
+        for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early), whole):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
             if attempt is None:
                 return Freed(chart.original, "")
@@ -203,7 +203,8 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends. Attempts that end early are gone on with after all others.
+        and both ends, the least first. Attempts that end early are gone on with after all others; then none
+        again, to its optimum before motions between frames are looked at.
         """
         none = np.zeros((len(window), self._workspace.model.nv))
         yield none
@@ -215,8 +216,8 @@ class ClipRun:
             if x.any():
                 yield x
         deepest = window.first + int(np.argmax(depths[window.first : window.end]))
-        for middle in dict.fromkeys((deepest, window.first, window.end - 1)):
-            yield _deviations(chart, self._carried.outwards(window, middle), limits)
+        for q in self._carried.outwards(window, (deepest, window.first, window.end - 1)):
+            yield _deviations(chart, q, limits)
 
     def _attempt(
         self, begun: _Attempt, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
@@ -228,30 +229,40 @@ class ClipRun:
         careful = way is _Way.CAREFUL
         found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
         most, dipped = self._settings.iterations, set[int]()
+
+        def told(count: int, worst: float) -> bool:
+            return cancel(count / most)
+
         for number in range(ROUNDS):
             dear = GROWN * found.objective if found is not None and found.programs else np.inf
             # from the third round on it is nearly free: what is missed then is seldom on the wrong side
             ends = dear if way is _Way.EARLY_EXIT and number < 2 else None
-            found = program.run(x, lambda count, worst: cancel(count / most), radius, largest, ends)
+            # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
+            # before the optimum
+            rough = way is _Way.EARLY_EXIT and not number and len(x) > BRIEF
+            found = program.run(x, told, radius, largest, ends, rough)
+            self._programs += found.programs
+            if found.roughly and not self._dipping(chart, found.x, always):
+                found = program.run(found.x, told, radius, largest, ends)
+                self._programs += found.programs
             radius = NEARLY
             if number:  # what is free already is to stay where it is, or it dips elsewhere
                 largest = max(SHORTER * min(largest, NEARLY), SHORTEST)
                 radius = largest
-            self._programs += found.programs
             if found.cancelled:
                 return None
             x = found.x
             if found.early:
                 return _Attempt(x, found.worst, 0, found.objective, True, program.between)
-            q = chart.postures(x)
-            gaps = [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
+            q, gaps = chart.postures(x), _moved(x, always)
             swept = dips(self._workspace, q, gaps)
             near = [(gap, share + side) for gap, shares in swept.items() for share in shares for side in SIDES]
             near += [(gap, share) for gap in swept if gap in dipped for share in FEW]  # what dips again, everywhere
             dipped |= swept.keys()
-            if near and found.met:
+            met = found.met or found.roughly
+            if near and met:
                 near += sampled_dips(self._workspace, q, gaps)
-            if not near or not found.met:
+            if not near or not met:
                 return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
             before = len(program.nodes)
             program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in near])
@@ -259,6 +270,10 @@ class ClipRun:
                 break
         assert found is not None
         return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
+
+    def _dipping(self, chart: Chart, x: Array, always: set[int]) -> bool:
+        """Whether motions between frames with deviations (n, nv) dip."""
+        return bool(dipping(self._workspace, chart.postures(x), _moved(x, always)))
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
@@ -279,6 +294,11 @@ class ClipRun:
                 lower[frame], upper[frame] = 0.0, 0.0
         # where the original is faster than a limit, it may stay as fast
         return Limits(lower, upper, np.minimum(slowest, steps) - steps, np.maximum(fastest, steps) - steps)
+
+
+def _moved(x: Array, always: set[int]) -> list[int]:
+    """Gaps beside frames with a deviation (n, nv), and those that are looked at always."""
+    return [gap for gap in range(len(x) - 1) if gap in always or x[gap : gap + 2].any()]
 
 
 def _deviations(chart: Chart, q: Array, limits: Limits) -> Array:
