@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from importlib import import_module
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -224,6 +225,8 @@ def _report(
     timed = terms if result.times is None else terms.at(times)
     state = scene.state(after.q[0])
     misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
+    for frame, (q, following) in enumerate(pairwise(after.q)):
+        misses[frame] = max(misses[frame], timed.worst_step(frame, q, following, state), key=lambda each: each.by)
     at = max(range(len(misses)), key=lambda frame: misses[frame].by)
     missed = misses[at].by
     beyond = limit_violation(scene.figure, after.q)

@@ -22,7 +22,7 @@ from wholebody.motion.grips import grip_shifts
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
-from wholebody.tasks import Hold
+from wholebody.tasks import Hold, StepLimit
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
 
@@ -172,6 +172,16 @@ class FrameTerms:
                 found.append(Miss(float(past.max(initial=0.0)), _label(term)))
             state.update(q)
         return max(found, key=lambda each: each.by, default=Miss(0.0, ""))
+
+    def worst_step(self, frame: int, q: Array, following: Array, state: State) -> Miss:
+        """By how much the motion from a posture (nq,) of a frame to the following one is beyond what was given.
+
+        Radians or metres in a time step; the figure's own speed limits do not count.
+        """
+        _, _, slow, fast = self.bounds(frame, state)
+        step = np.asarray(pin.difference(self.scene.model, q, following))
+        past = float(np.maximum(slow - step, step - fast).max(initial=0.0))
+        return Miss(past, StepLimit.__name__)
 
     @property
     def holds(self) -> bool:

@@ -20,7 +20,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.files import joint_profile
 
-CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-5}
+CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
 """Radians and metres by which a file may change a value; near a gimbal lock three angles lose digits of a rotation."""
 
 

@@ -13,7 +13,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.dips import dips
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.trajectory.banded_qp import banded_solver
-from wholebody.motion.trajectory.method import usual_time
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
@@ -151,12 +150,3 @@ def test_attempts_that_end_early_are_begun_again(
     assert len(ended) >= 2
     assert freed.report.message.startswith("nothing collides")
     assert wb.check(freed.clip, scene).free
-
-
-def test_a_push_spreads_as_long_as_the_clips_own_speed_takes_to_change(planar_arm: Callable[..., Figure]) -> None:
-    figure, t = planar_arm((0.5, 0.5)), np.arange(600) / 60
-    for rate in (2.0, 12.0, 16.0, 40.0):  # of a sine of rate w the ratio of speed to acceleration is 1 / w
-        clip = wb.Clip(figure, 0.3 * np.stack([np.sin(rate * t), np.sin(rate * t)], axis=1), 1 / 60)
-        assert usual_time(clip) == pytest.approx(np.clip(1.0 / rate, 0.05, 0.1), rel=0.05)
-    still = wb.Clip(figure, np.tile([0.1, 0.2], (9, 1)), 1 / 60)
-    assert usual_time(still) == pytest.approx(0.1)

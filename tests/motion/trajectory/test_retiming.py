@@ -96,6 +96,8 @@ def test_the_bound_on_slowing_holds_where_it_is_not_enough(planar_arm: Callable[
     clip = swung(planar_arm)
     found = wb.avoid(clip, method=wb.Trajectory(stretch=1.2), constraints=[wb.StepLimit(0.5)])
     assert found.report.stretch <= 1.2
+    assert not found.report.solved
+    assert "StepLimit is missed by" in found.report.message
     assert (DT / np.diff(found.report.times)).max() <= 1.2
     assert found.clip.duration <= 1.2 * clip.duration + 1e-9
     same = wb.avoid(clip, constraints=[wb.StepLimit(0.5)])

@@ -27,19 +27,7 @@ from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
-BRIEFEST, LONGEST = 0.05, 0.1  # s, of what a push spreads over by default; shorter = nearer, and pushes that are felt
-STEADY = 1e-6  # rad/s^2, m/s^2: a motion with less acceleration has none, but for rounding
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
-
-
-def usual_time(clip: Clip) -> float:
-    """Seconds that a push spreads over in a clip: root mean square speed of its joints by that of their acceleration.
-
-    Recordings have a ratio of 0.06 to 0.11 s at 30 Hz, motions of least jerk between postures one of 0.1 to 0.25 s.
-    """
-    joints = slice(6 if clip.figure.root == "free" else 0, None)
-    speed, change = (float(np.sqrt((v[:, joints] ** 2).mean())) for v in (clip.velocities(), clip.accelerations()))
-    return LONGEST if change < STEADY else min(max(speed / change, BRIEFEST), LONGEST)
 
 
 @dataclass(frozen=True)
@@ -50,8 +38,7 @@ class Trajectory:
 
     Attributes:
         clearance: least distance of every pair, metres.
-        time: seconds: how far a push at one frame spreads to its neighbours; larger = smoother, farther off. None for
-            the ratio of the clip's own speed to its acceleration: what is added is about as smooth as what is there.
+        time: seconds: how far a push at one frame spreads to its neighbours; larger = smoother, farther off.
         margin: seconds before and after a collision in which frames may be changed.
         solver: "piqp", "osqp", or None for piqp where it is installed, else osqp.
         iterations: most steps of one run of a window; a step takes one to three quadratic programs.
@@ -68,7 +55,7 @@ class Trajectory:
     """
 
     clearance: float = 0.0
-    time: float | None = None
+    time: float = 0.1
     margin: float = 0.5
     solver: str | None = None
     iterations: int = 40
@@ -78,8 +65,7 @@ class Trajectory:
     def __post_init__(self) -> None:
         """Check the settings."""
         checks.number(self.clearance, "Trajectory: clearance", 0.0, 0.5, "m")
-        if self.time is not None:
-            checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s")
+        checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s")
         checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s")
         checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000)
         checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0)
@@ -98,7 +84,7 @@ class Trajectory:
         constraints = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
         terms, watch = frame_terms(scene, clip.q, clip.dt, constraints, self.clearance), Watch(progress)
         _, solve = banded_solver(self.solver)
-        settings = WindowSettings(self.clearance, usual_time(clip) if self.time is None else self.time, self.iterations)
+        settings = WindowSettings(self.clearance, self.time, self.iterations)
         with scene.borrow() as workspace:
             loads = None
             if self.dynamics is not None:

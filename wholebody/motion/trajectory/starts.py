@@ -101,7 +101,7 @@ class Carried:
         self.posture_solves += 1
         q[middle - window.first] = freed
         model, far = terms.scene.model, 0.0
-        patience, calm, side, away = max(2, round(PATIENCE / terms.dt)), 0, 1, False
+        patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
         for frame, neighbour in outwards(window, middle):
             if frame - neighbour != side:
                 calm, side = 0, frame - neighbour
@@ -110,8 +110,7 @@ class Carried:
             here = self._follower.frame(frame, q[neighbour - window.first])
             q[frame - window.first] = here
             near = np.abs(here - terms.q[frame]).max() <= BACK
-            away |= not near  # an end of a window is free, and what is in the way comes later
-            calm = calm + 1 if near and away else 0
+            calm = calm + 1 if near else 0
             far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
             if far > most:
                 break

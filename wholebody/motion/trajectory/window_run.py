@@ -178,8 +178,7 @@ class ClipRun:
             starts = ((_begun(x), _Way.EARLY_EXIT) for x in self._starts(window, chart, limits, depths, always))
         else:
             starts = ((_begun(x), _Way.CAREFUL) for x in [_deviations(chart, begun, limits)])
-        whole = [] if begun is not None else [(_begun(np.zeros_like(limits.lower)), _Way.USUAL)]
-        for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early), whole):
+        for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
             attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
             if attempt is None:
                 return Freed(chart.original, "")
@@ -203,8 +202,7 @@ class ClipRun:
         """Deviations (n, nv) to begin with.
 
         None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends, the least first. Attempts that end early are gone on with after all others; then none
-        again, to its optimum before motions between frames are looked at.
+        and both ends, the least first. Attempts that end early are gone on with after all others.
         """
         none = np.zeros((len(window), self._workspace.model.nv))
         yield none
