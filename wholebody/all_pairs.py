@@ -17,6 +17,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.pool import Pool
 from wholebody.scene_geometry import SceneGeometry
 
 PATCH = 1e-4  # m: beyond the nearest points up to which corners of a contact patch count
@@ -77,6 +78,11 @@ class AllPairs:
             both = [results.oMg[k] for k in pair.ravel().tolist()]
             placement = np.array([[*at.rotation.T, at.translation] for at in both], dtype=float)
         return NearPairs(self._built, number, pair, np.reshape(found, (-1, 10)), placement.reshape(-1, 2, 4, 3))
+
+
+def all_pairs(built: SceneGeometry) -> Pool[AllPairs]:
+    """What judgements of a scene borrow. A problem makes the first, so its first answer is judged as fast as others."""
+    return built.pool(AllPairs, lambda: AllPairs(built))
 
 
 class NearPairs(NamedTuple):

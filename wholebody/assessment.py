@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.all_pairs import AllPairs
+from wholebody.all_pairs import AllPairs, all_pairs
 from wholebody.arrays import Array
 from wholebody.checks import a, number, posture
 from wholebody.errors import InputError
@@ -119,7 +119,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     q = posture(q, problem.scene.model.nq)
     built = problem.scene.built
     problem.check_fresh()
-    with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
+    with all_pairs(built).borrow() as pairs:
         return _judged(problem, pairs, q, began)
 
 

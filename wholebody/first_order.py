@@ -16,7 +16,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.all_pairs import AllPairs, Label, NearPairs
+from wholebody.all_pairs import AllPairs, Label, NearPairs, all_pairs
 from wholebody.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, Wrench
@@ -117,7 +117,7 @@ class FirstOrder:
     @contextmanager
     def _lent(self) -> Iterator[State]:
         """A state at the posture."""
-        with self._built.pool(AllPairs, lambda: AllPairs(self._built)).borrow() as pairs:
+        with all_pairs(self._built).borrow() as pairs:
             yield pairs.state.update(self._q)
 
 

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.all_pairs import AllPairs
+from wholebody.all_pairs import AllPairs, all_pairs
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
@@ -79,7 +79,7 @@ def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] |
     """
     scene = copy.copy(scene) if moves else scene
     built = scene.built
-    with built.pool(AllPairs, lambda: AllPairs(built)).borrow() as pairs:
+    with all_pairs(built).borrow() as pairs:
         for frame, posture in enumerate(q):
             for name, places in (moves or {}).items():
                 scene.move(name, at=places[frame])

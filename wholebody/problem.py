@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
+from wholebody.all_pairs import all_pairs
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
@@ -124,7 +125,7 @@ class Problem(checks.Settled):
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         self.clearances = np.zeros(len(scene.built.table.pairs))
-        with self.borrow() as workspace:
+        with self.borrow() as workspace, all_pairs(scene.built).borrow():
             state = workspace.state.update(self.start)
             self._check_frozen(state)
             _check_goals(self.goals, state)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.all_pairs import AllPairs
+from wholebody.all_pairs import all_pairs
 from wholebody.arrays import Array
 from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.feasibility import reach
@@ -107,7 +107,7 @@ def solved(
         message = f"{why.get(status, 'ran out of iterations')}: {left}"
     least = np.inf
     if scene is not None:
-        with scene.built.pool(AllPairs, lambda: AllPairs(scene.built)).borrow() as pairs:
+        with all_pairs(scene.built).borrow() as pairs:
             pairs.move(to_scene(x))
             least = pairs.least
     path = active_system.path
