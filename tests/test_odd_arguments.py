@@ -674,6 +674,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "ReachMap.counts", Call(mapped.counts, {})
     kept = wb.Records([wb.SolveRecord("a")])
     yield "Records.counts", Call(kept.counts, {})
+    yield "Records.first_refused", Call(kept.first_refused, {})
     yield "Records.rows", Call(kept.rows, {})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})

@@ -120,7 +120,7 @@ def test_a_power_grip_closes_every_finger_around_a_bar(figure):
         assert abs(min(at_bar[part] for part in outer)) < 2e-5
 
 
-@pytest.mark.parametrize("radius", [0.007, 0.008, 0.0125, 0.02])
+@pytest.mark.parametrize("radius", [0.007, 0.009, 0.0125, 0.02])
 @pytest.mark.parametrize("shape", ["relaxed", "flat"])
 @pytest.mark.parametrize(("elbow", "at"), [(80.0, (0.45, -0.25, 1.2)), (10.0, (0.35, -0.35, 1.0))])
 def test_a_power_grip_does_not_depend_on_how_the_hand_begins(figure, radius, shape, elbow, at):

@@ -19,6 +19,7 @@ from wholebody.tasks.balance import Balance
 
 SLACK = 1.05  # factor on the tolerance: an assessment computes with other rounding
 COAL_ACCURACY = 1e-6  # m
+WORTH = 3.0  # margins: a goal this far off may be met without the margin, which costs one to two of them of reach
 
 
 @dataclass(frozen=True)
@@ -121,10 +122,11 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
 
 
 def _way_out(problem: Problem, judgement: Assessment) -> str:
-    """What to state where the margin of a person's default balance stands in the way; empty elsewhere."""
+    """What to state where the margin of a person's default balance stands in the way of what it can be; else empty."""
     for term, name in zip(problem.constraints, problem.constraint_names, strict=True):
         margin = term.margin if isinstance(term, Balance) and term in problem.defaults else 0.0
-        if margin and any(blocker.names == (name,) for blocker in judgement.blockers):
+        near = judgement.goal_error <= WORTH * margin
+        if near and margin and any(blocker.names == (name,) for blocker in judgement.blockers):
             least = f"{1e3 * margin:.0f} mm"
             return f"; state Balance() to let the centre of mass come nearer to the feet's edges than {least}"
     return ""

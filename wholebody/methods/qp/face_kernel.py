@@ -9,7 +9,7 @@ from wholebody.compiled import compiled
 from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(error_model="numpy")
 def minimise_on_face(
     diagonal: Array,
     linear: Array,
