@@ -8,6 +8,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
+from wholebody.motion.avoider import Watch
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.one_side import one_sided
@@ -38,7 +39,7 @@ def kept(clip: wb.Clip, scene: wb.Scene, q: np.ndarray) -> tuple[np.ndarray, int
             made.append(Follower(terms, 0.0))
             return made[-1]
 
-        return one_sided(terms, follower, workspace, q), len(made)
+        return one_sided(terms, follower, workspace, q, Watch(None)), len(made)
 
 
 def test_frames_on_alternate_sides_of_a_post_come_to_one_side(planar_arm: Callable[..., Figure]) -> None:

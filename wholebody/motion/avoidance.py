@@ -26,6 +26,7 @@ from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
+FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
 HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
 ROUNDING = 1e-6  # rad, m: by which limits may be missed
 SAME = 1e-9  # rad, m: a posture that is no farther from another one is the same
@@ -225,8 +226,8 @@ def _report(
     timed = terms if result.times is None else terms.at(times)
     state = scene.state(after.q[0])
     misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
-    for frame, (q, following) in enumerate(pairwise(after.q)):
-        misses[frame] = max(misses[frame], timed.worst_step(frame, q, following, state), key=lambda each: each.by)
+    past = [timed.past_speed(frame, q, following, state) for frame, (q, following) in enumerate(pairwise(after.q))]
+    faster = max(past, default=0.0)
     at = max(range(len(misses)), key=lambda frame: misses[frame].by)
     missed = misses[at].by
     beyond = limit_violation(scene.figure, after.q)
@@ -244,7 +245,11 @@ def _report(
         left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
     if missed > HELD:
         left.append(f"{misses[at].name} is missed by {missed:.3g} m or rad, at {at * after.dt:.2f} s")
-    solved = now.free and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    if faster > FASTER:
+        left.append(
+            f"a speed that was given is exceeded by {faster:.1%} of it, at {past.index(faster) * after.dt:.2f} s"
+        )
+    solved = now.free and faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")
     if not (solved or left):

@@ -22,10 +22,11 @@ from wholebody.motion.grips import grip_shifts
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
-from wholebody.tasks import Hold, StepLimit
+from wholebody.tasks import Hold
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
 
+STILL = 1e-6  # rad, m in a time step: a smaller motion is rounding
 HeldTerm = Constraint | Goal
 Given = Constraint | Goal | Bound | StanceFeet
 
@@ -173,15 +174,16 @@ class FrameTerms:
             state.update(q)
         return max(found, key=lambda each: each.by, default=Miss(0.0, ""))
 
-    def worst_step(self, frame: int, q: Array, following: Array, state: State) -> Miss:
-        """By how much the motion from a posture (nq,) of a frame to the following one is beyond what was given.
+    def past_speed(self, frame: int, q: Array, following: Array, state: State) -> float:
+        """By what share the motion from a posture (nq,) of a frame to the following one is faster than was given.
 
-        Radians or metres in a time step; the figure's own speed limits do not count.
+        The figure's own speed limits do not count.
         """
         _, _, slow, fast = self.bounds(frame, state)
         step = np.asarray(pin.difference(self.scene.model, q, following))
-        past = float(np.maximum(slow - step, step - fast).max(initial=0.0))
-        return Miss(past, StepLimit.__name__)
+        past, most = np.maximum(slow - step, step - fast), np.where(step < 0.0, -slow, fast)
+        over = past > STILL
+        return float((past[over] / np.maximum(most[over], STILL)).max(initial=0.0))
 
     @property
     def holds(self) -> bool:

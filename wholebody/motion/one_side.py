@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.motion.avoider import Watch
 from wholebody.motion.dips import depths_between, dip_depth
 from wholebody.motion.faults import depth
 from wholebody.motion.following import SHALLOW, Follower
@@ -24,7 +25,9 @@ PASSED = 1e-2
 which rows free; less changes more frames, more leaves more to the rows."""
 
 
-def one_sided(terms: FrameTerms, follower: Callable[[], Follower], workspace: Workspace, q: Array) -> Array:
+def one_sided(
+    terms: FrameTerms, follower: Callable[[], Follower], workspace: Workspace, q: Array, watch: Watch
+) -> Array:
     """Postures (n, nq) of a clip of which fewer motions pass something; the given ones where that is not found.
 
     Motions that pass are gone through from the first to the last one, each side being that of the frame before, and
@@ -35,22 +38,28 @@ def one_sided(terms: FrameTerms, follower: Callable[[], Follower], workspace: Wo
         follower: makes or gives that of the clip; called where something is passed.
         workspace: of this run alone.
         q: (n, nq) postures; they stay as they are.
+        watch: is told of every frame.
     """
     depths = depths_between(workspace, q, range(len(q) - 1))
-    passing = [gap for gap, deep in depths.items() if deep > PASSED]
+    passed = [gap for gap, deep in depths.items() if deep > PASSED]
+    ends = {frame: depth(workspace, q[frame]) for gap in passed for frame in (gap, gap + 1)}
+    passing = [gap for gap in passed if max(ends[gap], ends[gap + 1]) <= SHALLOW]
     for side in (1, -1) if passing else ():
-        found = _kept(terms, follower(), workspace, q, passing, side)
+        found = _kept(terms, follower(), workspace, q, passing, side, watch)
+        if watch.ended:
+            return q
         changed = (found != q).any(axis=1)
         looked = [gap for gap in depths if changed[gap] or changed[gap + 1]]
         now = depths | depths_between(workspace, found, looked)
-        if sum(deep > PASSED for deep in now.values()) < len(passing):
+        if sum(deep > PASSED for deep in now.values()) < len(passed):
             return found
     return q
 
 
 def _kept(
-    terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array, passing: Sequence[int], side: int
-) -> Array:
+    terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array, passing: Sequence[int], side: int,
+    watch: Watch,
+) -> Array:  # fmt: skip
     """Postures (n, nq) of which those after motions that pass are kept on the side of the frame before.
 
     For `side` -1, those before such motions are kept on the side of the frame after.
@@ -62,6 +71,8 @@ def _kept(
         here, frame = (gap, gap + 1) if side > 0 else (gap + 1, gap)
         kept = q.copy()
         while 0 <= frame < len(q):
+            if watch.tell(1.0, f"frame {frame} is kept on one side"):
+                return q
             away = pin.difference(model, terms.q[here], kept[here])
             start = figure.clamp(np.asarray(pin.integrate(model, terms.q[frame], away)))
             kept[frame] = follower.frame(frame, start)

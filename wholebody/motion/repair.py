@@ -98,10 +98,10 @@ class Repairer:
         return self._programs + (0 if self._follower is None else self._follower.programs)
 
     def repair(self, q: Array, watch: Watch) -> Array:
-        """Postures (n, nq) with less that is wrong; those in which nothing is wrong nearby are the given ones."""
+        """Postures (n, nq) with less that is wrong; others are the given ones but for those beside something passed."""
         q = np.array(q)
         margin = max(2, round(MARGIN / self._terms.dt))
-        q = one_sided(self._terms, self._following, self._workspace, q)
+        q = one_sided(self._terms, self._following, self._workspace, q, watch)
         for number in range(ROUNDS):
             wrong, gaps = self._faults(q)
             changed = [self._kept_back(q, gap) for gap in gaps] if number else []  # what rows did not free

@@ -97,7 +97,7 @@ def test_the_bound_on_slowing_holds_where_it_is_not_enough(planar_arm: Callable[
     found = wb.avoid(clip, method=wb.Trajectory(stretch=1.2), constraints=[wb.StepLimit(0.5)])
     assert found.report.stretch <= 1.2
     assert not found.report.solved
-    assert "StepLimit is missed by" in found.report.message
+    assert "a speed that was given is exceeded by" in found.report.message
     assert (DT / np.diff(found.report.times)).max() <= 1.2
     assert found.clip.duration <= 1.2 * clip.duration + 1e-9
     same = wb.avoid(clip, constraints=[wb.StepLimit(0.5)])
@@ -117,6 +117,15 @@ def test_what_is_freed_and_slowed_is_free_and_slow(planar_arm: Callable[..., Fig
     assert found.report.solved, found.report.message
     assert found.report.stretch > 1.1
     assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
+
+
+def test_a_small_step_can_be_twice_as_fast_as_was_asked(planar_arm: Callable[..., Figure]) -> None:
+    """0.2 rad/s at 120 Hz is 1.7 mrad a frame."""
+    clip = wb.Clip(planar_arm((0.5, 0.5)), 0.2 * np.outer(np.arange(20) / 120.0, (1.0, 0.0)), 1 / 120)
+    found = wb.avoid(clip, method="trajectory", constraints=[wb.StepLimit(0.1)])
+    assert not found.report.solved
+    assert "a speed that was given is exceeded by 100.0% of it" in found.report.message
+    assert wb.avoid(clip, method="trajectory", constraints=[wb.StepLimit(0.2)]).report.solved
 
 
 @pytest.mark.parametrize("stretch", [0.5, float("nan"), "2", 1e9])

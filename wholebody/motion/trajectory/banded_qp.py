@@ -77,9 +77,7 @@ def solve_by_piqp(program: BandedQP) -> Answer:
     settings = solver.settings
     settings.kkt_solver = piqp.KKTSolver.sparse_multistage
     settings.eps_abs, settings.eps_rel, settings.verbose = PIQP_ACCURACY, PIQP_ACCURACY, False
-    # prices of slacks are a thousand times the weights of deviations: scaled, three iterations of four do
     settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = PIQP_GAP, PIQP_GAP
-    settings.preconditioner_scale_cost = True
     n = len(program.c)
     none = sp.csc_matrix((0, n))
     solver.setup(

@@ -100,7 +100,8 @@ class Carried:
         freed, _ = freed_posture(terms, middle, terms.q[middle], self._clearance)
         self.posture_solves += 1
         q[middle - window.first] = freed
-        model, far = terms.scene.model, 0.0
+        model = terms.scene.model
+        far = float((pin.difference(model, terms.q[middle], freed) ** 2).sum())
         patience, calm, side = max(2, round(PATIENCE / terms.dt)), 0, 1
         for frame, neighbour in outwards(window, middle):
             if frame - neighbour != side:

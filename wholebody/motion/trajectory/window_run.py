@@ -10,8 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Mask
-from wholebody.motion.dips import FEW, dipping, dips, sampled_dips
+from wholebody.motion.dips import FEW, depths_between, dipping, dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.one_side import PASSED
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
@@ -240,7 +241,7 @@ class ClipRun:
             rough = way is _Way.EARLY_EXIT and not number and len(x) > BRIEF
             found = program.run(x, told, radius, largest, ends, rough)
             self._programs += found.programs
-            if found.roughly and not self._dipping(chart, found.x, always):
+            if found.roughly and not self._passing(chart, found.x, always):
                 found = program.run(found.x, told, radius, largest, ends)
                 self._programs += found.programs
             radius = NEARLY
@@ -269,9 +270,9 @@ class ClipRun:
         assert found is not None
         return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
 
-    def _dipping(self, chart: Chart, x: Array, always: set[int]) -> bool:
-        """Whether motions between frames with deviations (n, nv) dip."""
-        return bool(dipping(self._workspace, chart.postures(x), _moved(x, always)))
+    def _passing(self, chart: Chart, x: Array, always: set[int]) -> bool:
+        """Whether motions between frames with deviations (n, nv) pass through something."""
+        return max(depths_between(self._workspace, chart.postures(x), _moved(x, always)).values(), default=0.0) > PASSED
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
