@@ -168,3 +168,24 @@ def test_a_value_may_begin_with_a_negative_number(tmp_path: Path, capsys: pytest
     task = str(tmp_path / "task.toml")
     assert main(["reach", task, "--frame", "left_palm", "--low", "-0.3,-0.4,1.0", "--high", "0.6,0.1,1.3"]) == 2
     assert "task.toml" in capsys.readouterr().err  # the corners were understood, the task does not exist
+
+
+def test_warnings_are_of_the_line_that_called(person: wb.Figure) -> None:
+    scene, q = wb.Scene(person), person.posture("standing")
+    calls = (
+        lambda: scene.add(wb.Sphere(300.0), name="huge", at=(900.0, 0.0, 0.0)),
+        lambda: scene.move("huge", at=(0.0, 9e5, 0.0)),
+        lambda: person.with_joints(q, {"left_elbow_flexion": 90.0}),
+        lambda: wb.Clip(person, np.tile(q, (3, 1)), 30.0),
+        lambda: wb.QP().tracker(problem(person), 30.0),
+    )
+    for call in calls:
+        with pytest.warns(UserWarning, match="metres|degrees|frames a second") as told:
+            call()
+        assert {(one.filename, one.lineno) for one in told} == {(__file__, call.__code__.co_firstlineno)}
+
+
+def test_a_long_time_that_is_no_frame_is_not_warned_of() -> None:
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert wb.Spring(1.0, 1.0, 1.0).transition(20.0).shape == (2, 2)

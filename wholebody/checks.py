@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 import warnings
@@ -38,6 +39,7 @@ LONGEST = 200
 SHOWN_NAMES = 6
 """Names that a list in a sentence has at most."""
 
+_INSIDE = (str(Path(__file__).parent) + os.sep, "<string>")  # the package's files, and code that dataclasses make
 _SHORT = Repr()
 _SHORT.maxstring = _SHORT.maxother = 60
 
@@ -101,6 +103,14 @@ def number(value: object, what: str, low: float, high: float, unit: str = "") ->
     return found
 
 
+def warn(told: str) -> None:
+    """Warn, at the place that called the package."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_code.co_filename.startswith(_INSIDE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(told, stacklevel=level)
+
+
 def slipped(value: float, low: float, high: float) -> str:
     """A hint that a length out of a range [m] may be in millimetres or centimetres; empty if it is in neither."""
     fits = [
@@ -120,7 +130,7 @@ def time_step(value: object, what: str) -> float:
     found = number(value, what, *TIME_STEP, "s, such as 0.02")
     if found > LONGEST_LIKELY:
         told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
-        warnings.warn(told, stacklevel=3)
+        warn(told)
     return found
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from threading import RLock
@@ -313,7 +312,7 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     """Warn of a place and a size that are hardly metres."""
     if (far := float(max(abs(place.translation)))) > FARTHEST_LIKELY:
         told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
-        warnings.warn(told, stacklevel=4)
+        checks.warn(told)
     extent = _extent(shape)
     if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
         size = " x ".join(f"{length:.4g}" for length in extent)
@@ -323,7 +322,7 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
             else "divide millimetres by 1000, centimetres by 100"
         )
         told = f"{name!r} measures {size} m; lengths are in metres: {mend}"
-        warnings.warn(told, stacklevel=4)
+        checks.warn(told)
 
 
 def _extent(shape: Shape | None) -> tuple[float, ...]:

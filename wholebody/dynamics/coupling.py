@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import number, posture, time_step
+from wholebody.checks import TIME_STEP, number, posture, time_step
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
@@ -56,7 +56,7 @@ class Spring:
         Raises:
             InputError: the time is not positive and finite.
         """
-        time = time_step(time, "time")
+        time = number(time, "time", *TIME_STEP, "s")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
         square = rate * rate - stiff
         if abs(square) <= NEAR_CRITICAL * rate * rate:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any
@@ -300,7 +299,7 @@ class Figure(checks.Settled):
                 low, high = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
                 if not low - FAR_OUT <= value <= high + FAR_OUT and low <= np.radians(value) <= high:
                     told = f"joint {name!r} is {value:g} rad, far out of its limits; {value:g} degrees are"
-                    warnings.warn(f"{told} {np.radians(value):.4g}", stacklevel=2)
+                    checks.warn(f"{told} {np.radians(value):.4g}")
             if name in self.followers:
                 q[joint.idx_q] = self.followers[name].leading(value)
             elif joint.nq == 1:

@@ -27,7 +27,7 @@ class Anderson:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: after a rejected step, or when other constraints are at work."""
+        """Begin anew: after a rejected step, or far from the goals."""
         self._step: Array | None = None  # of which the way is not known yet
         self._steps: list[Array] = []
         self._ways: list[Array] = []

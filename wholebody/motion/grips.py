@@ -173,7 +173,7 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
         rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
         if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
             return shifts
-        G = sp.csc_matrix(np.array([_over_frames(row, count) for row in rows]))
+        G = sp.vstack([sp.csr_matrix(_over_frames(row, count)) for row in rows], format="csc")
         lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
         most = np.full(3 * count, FARTHEST)
         answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))

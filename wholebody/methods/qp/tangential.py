@@ -78,5 +78,5 @@ class Extrapolation:
         self._longest = max(SHORTER * self._longest, 1.0)
 
     def reset(self) -> None:
-        """Begin anew: other constraints are at work."""
+        """Begin anew: a step was rejected, or the goals are far."""
         self._memory.reset()

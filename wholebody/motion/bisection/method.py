@@ -63,7 +63,8 @@ class Bisection:
         frozen: joints and groups that stay as they are; None for a free root, unless a frame cannot be freed so.
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
-        method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`.
+        method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`. "qp" is
+            `wb.QP(restarts=0, iterations=50)`: what a frame needs more for is freed with its neighbours.
     """
 
     evaluation: tuple[int, ...] | None = None
