@@ -41,9 +41,7 @@ def one_sided(
         watch: is told of every frame.
     """
     depths = depths_between(workspace, q, range(len(q) - 1))
-    passed = [gap for gap, deep in depths.items() if deep > PASSED]
-    ends = {frame: depth(workspace, q[frame]) for gap in passed for frame in (gap, gap + 1)}
-    passing = [gap for gap in passed if max(ends[gap], ends[gap + 1]) <= SHALLOW]
+    passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
     for side in (1, -1) if passing else ():
         found = _kept(terms, follower(), workspace, q, passing, side, watch)
         if watch.ended:
@@ -51,7 +49,7 @@ def one_sided(
         changed = (found != q).any(axis=1)
         looked = [gap for gap in depths if changed[gap] or changed[gap + 1]]
         now = depths | depths_between(workspace, found, looked)
-        if sum(deep > PASSED for deep in now.values()) < len(passed):
+        if sum(deep > PASSED for deep in now.values()) < len(passing):
             return found
     return q
 
