@@ -171,7 +171,7 @@ def _watch() -> None:
             _compiling["depth"] += 1
             if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
                 self.told = True
-                logging.getLogger(__name__).info("compiling the inner loops: half a minute to a minute, once on a machine")
+                logging.getLogger(__name__).info("compiling the inner loops: up to a minute, once on a machine")
 
         def on_end(self, event: Any) -> None:
             _compiling["depth"] -= 1
