@@ -59,8 +59,10 @@ def test_the_nearest_do_not_depend_on_the_order() -> None:
     ],
 )  # fmt: skip
 def test_a_thing_in_millimetres_is_warned_of(person: wb.Figure, shape: wb.Box, told: str) -> None:
-    with pytest.warns(UserWarning, match=told):
-        wb.Scene(person).add(shape, name="thing")
+    with pytest.warns(UserWarning, match=told) as warned:
+        scene = wb.Scene(person).add(shape, name="thing")
+    assert len(warned) == 1
+    assert list(scene.objects) == ["thing"]  # warned of, and taken
 
 
 @pytest.mark.parametrize(
@@ -69,27 +71,34 @@ def test_a_thing_in_millimetres_is_warned_of(person: wb.Figure, shape: wb.Box, t
 def test_floors_and_rooms_are_not(person: wb.Figure, shape: wb.Box) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        wb.Scene(person).add(shape, name="thing").move("thing", at=(20.0, 0.0, 0.0))
+        scene = wb.Scene(person).add(shape, name="thing").move("thing", at=(20.0, 0.0, 0.0))
+    np.testing.assert_array_equal(scene.objects["thing"].placement.translation, (20.0, 0.0, 0.0))
 
 
 def test_a_thing_that_is_moved_by_millimetres_is_warned_of(person: wb.Figure) -> None:
     scene = wb.Scene(person).add(wb.Sphere(0.1), name="ball")
-    with pytest.warns(UserWarning, match="divide millimetres by 1000"):
+    with pytest.warns(UserWarning, match="divide millimetres by 1000") as warned:
         scene.move("ball", at=(600.0, 0.0, 0.0))
+    assert len(warned) == 1
+    assert scene.objects["ball"].placement.translation[0] == 600.0
 
 
 def test_angles_in_degrees_are_warned_of(person: wb.Figure) -> None:
     start = person.posture("standing")
-    with pytest.warns(UserWarning, match=r"90 degrees are 1\.571"):
+    with pytest.warns(UserWarning, match=r"90 degrees are 1\.571") as warned:
         person.with_joints(start, {"left_elbow_flexion": 90})
+    assert len(warned) == 1
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        person.with_joints(start, {"left_elbow_flexion": 3.0})  # a little out of the limits
+        q = person.with_joints(start, {"left_elbow_flexion": 3.0})  # a little out of the limits
+    assert 3.0 in q
 
 
 def test_frames_a_second_for_a_time_step_are_warned_of(person: wb.Figure) -> None:
-    with pytest.warns(UserWarning, match="give 1 / 60"):
-        wb.Clip(person, np.tile(person.posture("standing"), (3, 1)), dt=60, name="clip")
+    with pytest.warns(UserWarning, match="give 1 / 60") as warned:
+        clip = wb.Clip(person, np.tile(person.posture("standing"), (3, 1)), dt=60, name="clip")
+    assert len(warned) == 1
+    assert clip.duration == 120.0
 
 
 @pytest.mark.parametrize(
