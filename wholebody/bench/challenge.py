@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
 from wholebody.bench.report import render
@@ -84,10 +83,6 @@ def _apart(problem: Problem, dragged: Dragged, segment: str, thing: str) -> floa
 
 def _drift(problem: Problem, dragged: Dragged) -> float:
     """Farthest that a sole is from where it began, metres."""
-    model = problem.scene.model
-    data, frames = model.createData(), [problem.scene.frame_id(f"{side}_sole") for side in ("left", "right")]
-    places = []
-    for q in dragged.q:
-        pin.framesForwardKinematics(model, data, q)
-        places.append([np.array(data.oMf[frame].translation) for frame in frames])
-    return float(np.linalg.norm(np.array(places) - np.array(places[0]), axis=2).max())
+    figure, soles = problem.scene.figure, ("left_sole", "right_sole")
+    places = np.array([[figure.placement(q, sole).translation for sole in soles] for q in dragged.q])
+    return float(np.linalg.norm(places - places[0], axis=2).max())
