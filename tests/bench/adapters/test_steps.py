@@ -12,9 +12,9 @@ import pytest
 
 import wholebody as wb
 from tests.bench.following import followed
-from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
+from wholebody.bench.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
 from wholebody.bench.track import CLEARANCE, Track, judge, track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -85,7 +85,7 @@ def test_our_steps_jolt_joints_no_more_than_the_best_peers(name: str, most: floa
 def test_unknown_and_missing_tools_are_named() -> None:
     with pytest.raises(UnknownNameError, match="placo"):
         chosen_tools(["plako"])
-    assert all(differences(name) is not None for name in installed_tools())
+    assert all(tool_class(name).differences is not None for name in installed_tools())
     for name, extra in (("mink", "compare"), ("placo", "placo")):
         if find_spec(name) is None:
             with pytest.raises(MissingPackageError, match=extra):
