@@ -15,6 +15,7 @@ from tests.bench.following import followed
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
 from wholebody.bench.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
+from wholebody.bench.adapters.urdf import own_frame
 from wholebody.bench.track import CLEARANCE, Track, judge, track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -97,7 +98,7 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
     mujoco = pytest.importorskip("mujoco")
     scene, figure = short_free.scene, short_free.scene.figure
     frames = ("right_index_tip", "left_foot", "head_top")
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, frames))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, {name: own_frame(figure, name) for name in frames}))
     data = mujoco.MjData(model)
     for name in figure.joints:
         index = figure.model.joints[figure.joint_id(name)].idx_q
@@ -136,7 +137,7 @@ def test_mujoco_has_the_same_arm_and_floor(root: Path) -> None:
     lean = pin.SE3(pin.utils.rotate("x", 0.4), np.array([0.0, 0.0, -0.6]))
     scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor", at=lean)
     tip = figure.model.names[-1]
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, [tip]))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, {tip: own_frame(figure, tip)}))
     data = mujoco.MjData(model)
     rng = np.random.default_rng(2)
     for _ in range(4):

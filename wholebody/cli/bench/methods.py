@@ -175,7 +175,7 @@ def qp(arguments: argparse.Namespace) -> None:
         programs = [one for one in files.load(arguments.programs) if one.set in sets]
     facts = machine() | {"seed": str(arguments.seed)}
     rows = measure(programs, solvers, print)
-    totals = summaries(rows, solvers, arguments.seed)
+    totals = summaries(rows, solvers)
     report = qp_report(rows, totals, facts)
     publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
 
