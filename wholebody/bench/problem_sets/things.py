@@ -98,7 +98,7 @@ def add_things(
         for _ in range(TRIES):
             kind, shape = (make or household_thing)(number, rng)
             turn = rng.normal(size=4)
-            at = (*rng.uniform(*space), *(turn / np.linalg.norm(turn)))
+            at = (*rng.uniform(space[0], space[1]), *(turn / np.linalg.norm(turn)))
             if taken.clear_of(shape, at, room):
                 break
         else:
