@@ -10,7 +10,6 @@ import numpy as np
 
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
 from wholebody.bench.report import render
-from wholebody.bench.tables import filled
 from wholebody.problem import Problem
 from wholebody.taskfile import read_task
 from wholebody.tracking.dragging import Dragged, drag_along, judge_drag, present_place
@@ -61,9 +60,8 @@ def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
 
 
 def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:
-    return filled(
-        ChallengeRow,
-        row,
+    return ChallengeRow(
+        **vars(row),
         seat_mm=1e3 * _apart(problem, dragged, "pelvis", "seat"),
         back_mm=1e3 * _apart(problem, dragged, "thorax", "backrest"),
         feet_mm=1e3 * _drift(problem, dragged),

@@ -15,7 +15,7 @@ from tests.bench.following import followed
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
 from wholebody.bench.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
-from wholebody.bench.adapters.urdf import own_frame
+from wholebody.bench.adapters.urdf import Frames, own_frame
 from wholebody.bench.track import CLEARANCE, Track, judge, track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -122,6 +122,18 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
                 model, data, model.geom(names[first]).id, model.geom(names[second]).id, 0.1, None
             )
             assert theirs == pytest.approx(distance, abs=2e-5)
+
+
+def test_a_point_that_a_tool_is_given_by_name_is_where_it_is_in_our_model(short_free: Track) -> None:
+    scene, figure, start = short_free.scene, short_free.scene.figure, short_free.start
+    frames, offset = Frames(), np.array((0.01, -0.02, 0.03))
+    goal = wb.Point("right_index_tip", (0.3, 0.1, 0.9)).resolve(scene, start)
+    joint, place = frames[frames.named(scene.model, goal.place, offset)]
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, start)
+    there = figure.placement(start, "right_index_tip").act(offset)
+    assert np.allclose(data.oMi[joint].act(place.translation), there, atol=1e-12)
+    assert len({*frames, frames.named(scene.model, goal.place)}) == 2, "another point has another name"
 
 
 def test_mjcf_refuses_what_it_does_not_know() -> None:
