@@ -160,16 +160,16 @@ class WorstFrames:
     """
 
     row: InteractionRow
-    deepest: int
-    slowest: int
-    farthest: int
-    sudden: int
-    milliseconds: float
+    deepest: int = field(metadata=of(lambda run, judged: judged.depth.argmax()))
+    slowest: int = field(metadata=of(lambda run, judged: run.cpu_seconds.argmax()))
+    farthest: int = field(metadata=of(lambda run, judged: judged.distance.argmax()))
+    sudden: int = field(metadata=of(lambda run, judged: judged.jerk.argmax() + 2 if len(judged.jerk) else 0))
+    milliseconds: float = field(metadata=of(lambda run, judged: 1e3 * run.cpu_seconds.max()))
     query_percent: float
-    iterations: int
-    pairs: int
-    distance_rad: float
-    tracked_mm: float
+    iterations: int = field(metadata=of(lambda run, judged: run.iterations[run.cpu_seconds.argmax()]))
+    pairs: int = field(metadata=of(lambda run, judged: judged.tracked_pairs[run.cpu_seconds.argmax()]))
+    distance_rad: float = field(metadata=of(lambda run, judged: judged.distance.max()))
+    tracked_mm: float = field(metadata=of(lambda run, judged: 1e3 * judged.tracked_depth[judged.distance.argmax()]))
     picture: int
 
     @property
@@ -198,28 +198,13 @@ class WorstFrames:
 
 def worst_frames(row: InteractionRow, recording: Recording, judged: Judgement) -> WorstFrames:
     """Find them in one run."""
-    slowest, deepest = int(np.argmax(recording.cpu_seconds)), int(np.argmax(judged.depth))
-    farthest = int(np.argmax(judged.distance))
-    sudden = int(np.argmax(judged.jerk)) + 2 if len(judged.jerk) else 0
-    seconds = float(recording.seconds[slowest])
+    slowest, deepest = int(recording.cpu_seconds.argmax()), int(judged.depth.argmax())
     late = [frame for frame, after in judged.returns if after < 0 or after > IN_TIME]
     picture = -1
     if row.misses:
         picture = next(iter([*judged.passed, *late]), slowest if "ms" in " ".join(row.misses) else deepest)
-    return WorstFrames(
-        row=row,
-        deepest=deepest,
-        slowest=slowest,
-        farthest=farthest,
-        sudden=sudden,
-        milliseconds=1e3 * float(recording.cpu_seconds[slowest]),
-        query_percent=100.0 * float(recording.contact_seconds[slowest]) / max(seconds, 1e-9),
-        iterations=int(recording.iterations[slowest]),
-        pairs=int(judged.tracked_pairs[slowest]),
-        distance_rad=float(judged.distance[farthest]),
-        tracked_mm=1e3 * float(judged.tracked_depth[farthest]),
-        picture=picture,
-    )
+    queries = recording.contact_seconds[slowest] / max(recording.seconds[slowest], 1e-9)
+    return filled(WorstFrames, recording, judged, row=row, query_percent=100.0 * float(queries), picture=picture)
 
 
 def failures(worst: Sequence[WorstFrames], pictures: Sequence[tuple[WorstFrames, str]]) -> str:

@@ -25,7 +25,7 @@ class Occupied:
     """The space that a figure takes up in some postures.
 
     Attributes:
-        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on.
+        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on; then of balls.
         centres: (n, 3) of these places.
         count: pieces of the figure.
     """
