@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
+from wholebody.bench.adapters.registry import make_tool
 from wholebody.bench.track import Track, Verdict, judge
 
 

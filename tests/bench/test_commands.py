@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wholebody.bench import plot_style
-from wholebody.bench.adapters import STEPPING
+from wholebody.bench.adapters.registry import STEPPING
 from wholebody.bench.person_cost import PersonCostRow
 from wholebody.bench.reaches import ReachRow
 from wholebody.bench.solve import MemoryRow, SolveRow

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tests.bench.following import followed
-from wholebody.bench.adapters import installed_tools, make_tool
+from wholebody.bench.adapters.registry import installed_tools, make_tool
 from wholebody.bench.figure_track import figure_tracks
 from wholebody.bench.step import StepRow, taking
 from wholebody.bench.tables import read_rows

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -13,7 +14,7 @@ from hypothesis import strategies as st
 from wholebody.bench.machine import machine, sentence
 from wholebody.bench.step import StepRow
 from wholebody.bench.step_goals import goal_lines, verdict
-from wholebody.bench.tables import read_rows, replace_section, write_rows
+from wholebody.bench.tables import filled, of, read_rows, replace_section, write_rows
 from wholebody.errors import FileFormatError
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
@@ -38,6 +39,20 @@ def test_rows_come_back_exactly(tmp_path_factory: pytest.TempPathFactory, rows: 
     assert facts == {"processor": "a: b", "cores": "2"}
     assert back == rows
     assert list(path.parent.iterdir()) == [path], "nothing else is left beside it"
+
+
+@dataclass(frozen=True)
+class Computed:
+    name: str
+    count: int = field(metadata=of(lambda values, run: len(values)))
+    mean: float = field(metadata=of(lambda values, run: np.mean(values)))
+    value: float
+
+
+def test_a_row_is_filled_by_name_by_what_computes_a_field_and_by_what_a_source_has() -> None:
+    row = filled(Computed, [1.0, 4.0], Row("source", 7, 0.5, True), name="given")
+    assert row == Computed("given", 2, 2.5, 0.5)
+    assert type(row.mean) is float, "numpy's numbers are written otherwise"
 
 
 def test_nan_comes_back(tmp_path: Path) -> None:

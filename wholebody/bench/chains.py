@@ -5,7 +5,6 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
@@ -91,9 +90,7 @@ def task(figure: wb.Figure, things: int, seed: int) -> tuple[wb.Scene, Array]:
             if occupied.clear_of(shape, (x, y, z), ROOM):
                 scene.add(shape, name=f"thing {number}", at=(x, y, z))
                 break
-    data = figure.model.createData()
-    pin.framesForwardKinematics(figure.model, data, witness)
-    return scene, np.array(data.oMf[figure.frame_id(TIP)].translation)
+    return scene, figure.placement(witness, TIP).translation
 
 
 def _free_posture(figure: wb.Figure, rng: np.random.Generator) -> Array:

@@ -7,11 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summary
 from wholebody.bench.report import render
-from wholebody.bench.tables import filled
 from wholebody.problem import Problem
 from wholebody.taskfile import read_task
 from wholebody.tracking.dragging import Dragged, drag_along, judge_drag, present_place
@@ -62,9 +60,8 @@ def report(rows: Sequence[ChallengeRow], facts: Mapping[str, str]) -> str:
 
 
 def _row(problem: Problem, dragged: Dragged, row: DragRow) -> ChallengeRow:
-    return filled(
-        ChallengeRow,
-        row,
+    return ChallengeRow(
+        **vars(row),
         seat_mm=1e3 * _apart(problem, dragged, "pelvis", "seat"),
         back_mm=1e3 * _apart(problem, dragged, "thorax", "backrest"),
         feet_mm=1e3 * _drift(problem, dragged),
@@ -84,10 +81,6 @@ def _apart(problem: Problem, dragged: Dragged, segment: str, thing: str) -> floa
 
 def _drift(problem: Problem, dragged: Dragged) -> float:
     """Farthest that a sole is from where it began, metres."""
-    model = problem.scene.model
-    data, frames = model.createData(), [problem.scene.frame_id(f"{side}_sole") for side in ("left", "right")]
-    places = []
-    for q in dragged.q:
-        pin.framesForwardKinematics(model, data, q)
-        places.append([np.array(data.oMf[frame].translation) for frame in frames])
-    return float(np.linalg.norm(np.array(places) - np.array(places[0]), axis=2).max())
+    figure, soles = problem.scene.figure, ("left_sole", "right_sole")
+    places = np.array([[figure.placement(q, sole).translation for sole in soles] for q in dragged.q])
+    return float(np.linalg.norm(places - places[0], axis=2).max())

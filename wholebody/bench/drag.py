@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled, of
 from wholebody.tracking.dragging import Dragged, DragJudgement
 
 ALLOWED = 1e-3  # m: of overlap, in a frame and on the way to the next
@@ -21,13 +22,13 @@ class DragFrameRow:
 
     task: str
     method: str
-    frame: int
-    milliseconds: float
-    cpu_ms: float
-    iterations: int
-    error_mm: float
-    depth_mm: float
-    between_mm: float
+    frame: int = field(metadata=of(lambda drag, judged, k: k))
+    milliseconds: float = field(metadata=of(lambda drag, judged, k: 1e3 * drag.seconds[k]))
+    cpu_ms: float = field(metadata=of(lambda drag, judged, k: 1e3 * drag.cpu_seconds[k]))
+    iterations: int = field(metadata=of(lambda drag, judged, k: drag.iterations[k]))
+    error_mm: float = field(metadata=of(lambda drag, judged, k: 1e3 * judged.error[k]))
+    depth_mm: float = field(metadata=of(lambda drag, judged, k: 1e3 * judged.depth[k + 1]))
+    between_mm: float = field(metadata=of(lambda drag, judged, k: 1e3 * judged.between[k]))
 
 
 @dataclass(frozen=True)
@@ -43,21 +44,21 @@ class DragRow:
 
     task: str
     method: str
-    frames: int
-    mean_ms: float
-    p95_ms: float
-    max_ms: float
-    cpu_mean_ms: float
-    iterations: float
-    error_mean_mm: float
-    error_max_mm: float
+    frames: int = field(metadata=of(lambda drag, judged: len(drag)))
+    mean_ms: float = field(metadata=of(lambda drag, judged: 1e3 * drag.seconds.mean()))
+    p95_ms: float = field(metadata=of(lambda drag, judged: 1e3 * np.quantile(drag.seconds, 0.95)))
+    max_ms: float = field(metadata=of(lambda drag, judged: 1e3 * drag.seconds.max()))
+    cpu_mean_ms: float = field(metadata=of(lambda drag, judged: 1e3 * drag.cpu_seconds.mean()))
+    iterations: float = field(metadata=of(lambda drag, judged: drag.iterations.mean()))
+    error_mean_mm: float = field(metadata=of(lambda drag, judged: 1e3 * judged.error.mean()))
+    error_max_mm: float = field(metadata=of(lambda drag, judged: 1e3 * judged.error.max()))
     end_error_mm: float
-    depth_mm: float
-    between_mm: float
-    limit_rad: float
-    hold_mm: float
-    jerk: float
-    status: str
+    depth_mm: float = field(metadata=of(lambda drag, judged: 1e3 * judged.depth.max()))
+    between_mm: float = field(metadata=of(lambda drag, judged: 1e3 * judged.between.max()))
+    limit_rad: float = field(metadata=of(lambda drag, judged: max(0.0, judged.limit_violation)))
+    hold_mm: float = field(metadata=of(lambda drag, judged: 1e3 * judged.constraint_violation.max()))
+    jerk: float = field(metadata=of(lambda drag, judged: np.median(judged.jerk) if len(judged.jerk) else 0.0))
+    status: str = field(metadata=of(lambda drag, judged: drag.end.status))
 
     @property
     def clean(self) -> bool:
@@ -78,44 +79,13 @@ class DragRow:
 
 def drag_summary(task: str, dragged: Dragged, judged: DragJudgement) -> DragRow:
     """The row of one drag."""
-    ms = 1e3 * dragged.seconds
-    return DragRow(
-        task=task,
-        method=dragged.method,
-        frames=len(dragged),
-        mean_ms=float(ms.mean()),
-        p95_ms=float(np.quantile(ms, 0.95)),
-        max_ms=float(ms.max()),
-        cpu_mean_ms=1e3 * float(dragged.cpu_seconds.mean()),
-        iterations=float(dragged.iterations.mean()),
-        error_mean_mm=1e3 * float(judged.error.mean()),
-        error_max_mm=1e3 * float(judged.error.max()),
-        end_error_mm=1e3 * max(dragged.end.assessment.goal_error, dragged.end.assessment.goal_angle),
-        depth_mm=1e3 * float(judged.depth.max()),
-        between_mm=1e3 * float(judged.between.max()),
-        limit_rad=max(0.0, judged.limit_violation),
-        hold_mm=1e3 * float(judged.constraint_violation.max()),
-        jerk=float(np.median(judged.jerk)) if len(judged.jerk) else 0.0,
-        status=dragged.end.status,
-    )
+    end = dragged.end.assessment
+    return filled(DragRow, dragged, judged, task=task, end_error_mm=1e3 * max(end.goal_error, end.goal_angle))
 
 
 def drag_frames(task: str, dragged: Dragged, judged: DragJudgement) -> list[DragFrameRow]:
     """The rows of all frames."""
-    return [
-        DragFrameRow(
-            task,
-            dragged.method,
-            k,
-            1e3 * float(dragged.seconds[k]),
-            1e3 * float(dragged.cpu_seconds[k]),
-            int(dragged.iterations[k]),
-            1e3 * float(judged.error[k]),
-            1e3 * float(judged.depth[k + 1]),
-            1e3 * float(judged.between[k]),
-        )
-        for k in range(len(dragged))
-    ]
+    return [filled(DragFrameRow, dragged, judged, k, task=task) for k in range(len(dragged))]
 
 
 def drag_report(rows: Sequence[DragRow], facts: Mapping[str, str]) -> str:

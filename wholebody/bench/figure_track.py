@@ -55,7 +55,7 @@ def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
     ways, distance = _ways(figure, spec, dofs, steps)
     clearance = min(CLEARANCE, 0.5 * distance)
     held = (str(figure.segments[0]),) if figure.root == "free" else ()
-    places = (_tips(figure, ways[0], chain.tip), _tips(figure, ways[1], chain.tip))
+    places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in ways)
     tracks = []
     for name in VARIANTS:
         scene = wb.Scene(figure)
@@ -97,17 +97,7 @@ def _least(scene: wb.Scene, q: Array) -> float:
     return least
 
 
-def _tips(figure: wb.Figure, q: Array, tip: str) -> Array:
-    """Places (n, 3) of a frame at postures (n, nq) [m]."""
-    data, frame = figure.model.createData(), figure.frame_id(tip)
-    places = []
-    for posture in q:
-        pin.framesForwardKinematics(figure.model, data, posture)
-        places.append(np.array(data.oMf[frame].translation))
-    return np.array(places)
-
-
-def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: tuple[Array, Array], block: bool) -> None:
+def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
     """Put the objects clear of both ways, and a block about where the second one takes the tip farthest."""
     taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // SAMPLES)] for way in ways]))
     tips = np.vstack(places)
@@ -116,7 +106,7 @@ def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: tuple[Array, Ar
     size = float((high - low).max()) / PERSON
     if block:
         _add_block(scene, places[1], size)
-    space = np.array([low - size * ROOM_SPACE, high + size * ROOM_SPACE])
+    space = (low - size * ROOM_SPACE).tolist(), (high + size * ROOM_SPACE).tolist()
     put_objects(scene, taken, tips, np.random.default_rng(SEED), space, size, BOXES - block)
 
 

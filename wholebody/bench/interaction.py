@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
 
+from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled, of
 from wholebody.tracking.judging import IN_TIME, Judgement
 from wholebody.tracking.recording import Recording
 
@@ -33,20 +35,24 @@ class FrameRow:
 
     scene: str
     overlap: str
-    frame: int
-    milliseconds: float
-    cpu_ms: float
-    contact_ms: float
-    solve_ms: float
-    iterations: int
-    joints: int
-    pairs: int
-    tracked_pairs: int
-    depth_mm: float
-    tracked_depth_mm: float
-    distance_rad: float
-    root_distance_mm: float
-    note: str
+    frame: int = field(metadata=of(lambda run, judged, k: k))
+    milliseconds: float = field(metadata=of(lambda run, judged, k: 1e3 * run.seconds[k]))
+    cpu_ms: float = field(metadata=of(lambda run, judged, k: 1e3 * run.cpu_seconds[k]))
+    contact_ms: float = field(metadata=of(lambda run, judged, k: 1e3 * run.contact_seconds[k]))
+    solve_ms: float = field(metadata=of(lambda run, judged, k: 1e3 * run.solve_seconds[k]))
+    iterations: int = field(metadata=of(lambda run, judged, k: run.iterations[k]))
+    joints: int = field(metadata=of(lambda run, judged, k: run.joints[k]))
+    pairs: int = field(metadata=of(lambda run, judged, k: run.pairs[k]))
+    tracked_pairs: int = field(metadata=of(lambda run, judged, k: judged.tracked_pairs[k]))
+    depth_mm: float = field(metadata=of(lambda run, judged, k: 1e3 * judged.depth[k]))
+    tracked_depth_mm: float = field(metadata=of(lambda run, judged, k: 1e3 * judged.tracked_depth[k]))
+    distance_rad: float = field(metadata=of(lambda run, judged, k: judged.distance[k]))
+    root_distance_mm: float = field(metadata=of(lambda run, judged, k: 1e3 * judged.root_distance[k]))
+    note: str = field(metadata=of(lambda run, judged, k: run.notes[k]))
+
+
+def _median(values: Array) -> float:
+    return float(np.median(values)) if len(values) else 0.0
 
 
 @dataclass(frozen=True)
@@ -55,31 +61,31 @@ class InteractionRow:
 
     scene: str
     overlap: str
-    frames: int
-    mean_ms: float
-    p95_ms: float
-    p99_ms: float
-    max_ms: float
-    cpu_mean_ms: float
-    cpu_p99_ms: float
-    joints: float
-    iterations: float
-    ik_percent: float
-    tracked_pairs: float
-    query_percent: float
-    depth_mm: float
-    tracked_depth_mm: float
-    passed: int
-    limit_rad: float
-    cone_rad: float
-    distance_rad: float
-    root_distance_mm: float
-    jerk: float
-    tracked_jerk: float
-    worst_jerk: float
-    returns: int
+    frames: int = field(metadata=of(lambda run, judged: len(run)))
+    mean_ms: float = field(metadata=of(lambda run, judged: 1e3 * run.seconds.mean()))
+    p95_ms: float = field(metadata=of(lambda run, judged: 1e3 * np.quantile(run.seconds, 0.95)))
+    p99_ms: float = field(metadata=of(lambda run, judged: 1e3 * np.quantile(run.seconds, 0.99)))
+    max_ms: float = field(metadata=of(lambda run, judged: 1e3 * run.seconds.max()))
+    cpu_mean_ms: float = field(metadata=of(lambda run, judged: 1e3 * run.cpu_seconds.mean()))
+    cpu_p99_ms: float = field(metadata=of(lambda run, judged: 1e3 * np.quantile(run.cpu_seconds, 0.99)))
+    joints: float = field(metadata=of(lambda run, judged: run.joints.mean()))
+    iterations: float = field(metadata=of(lambda run, judged: np.where(run.pairs > 0, run.iterations, 0).mean()))
+    ik_percent: float = field(metadata=of(lambda run, judged: 100.0 * run.solve_seconds.sum() / run.seconds.sum()))
+    tracked_pairs: float = field(metadata=of(lambda run, judged: judged.tracked_pairs.mean()))
+    query_percent: float = field(metadata=of(lambda run, judged: 100.0 * run.contact_seconds.sum() / run.seconds.sum()))
+    depth_mm: float = field(metadata=of(lambda run, judged: 1e3 * judged.depth.max()))
+    tracked_depth_mm: float = field(metadata=of(lambda run, judged: 1e3 * judged.tracked_depth.max()))
+    passed: int = field(metadata=of(lambda run, judged: len(judged.passed)))
+    limit_rad: float = field(metadata=of(lambda run, judged: judged.limit_violation))
+    cone_rad: float = field(metadata=of(lambda run, judged: judged.cone_violation))
+    distance_rad: float = field(metadata=of(lambda run, judged: judged.distance.mean()))
+    root_distance_mm: float = field(metadata=of(lambda run, judged: 1e3 * judged.root_distance.mean()))
+    jerk: float = field(metadata=of(lambda run, judged: _median(judged.jerk)))
+    tracked_jerk: float = field(metadata=of(lambda run, judged: _median(judged.tracked_jerk)))
+    worst_jerk: float = field(metadata=of(lambda run, judged: judged.jerk.max(initial=0.0)))
+    returns: int = field(metadata=of(lambda run, judged: len(judged.returns)))
     latest: int
-    noted: int
+    noted: int = field(metadata=of(lambda run, judged: sum(map(bool, run.notes))))
 
     @property
     def misses(self) -> list[str]:
@@ -98,63 +104,14 @@ class InteractionRow:
 
 def summary(scene: str, recording: Recording, judged: Judgement) -> InteractionRow:
     """The row of one run."""
-    ms = 1e3 * recording.seconds
-    spent = float(recording.seconds.sum())
     late = [frames for _, frames in judged.returns]
-    return InteractionRow(
-        scene=scene,
-        overlap=recording.overlap,
-        frames=len(recording),
-        mean_ms=float(ms.mean()),
-        p95_ms=float(np.quantile(ms, 0.95)),
-        p99_ms=float(np.quantile(ms, 0.99)),
-        max_ms=float(ms.max()),
-        cpu_mean_ms=1e3 * float(recording.cpu_seconds.mean()),
-        cpu_p99_ms=1e3 * float(np.quantile(recording.cpu_seconds, 0.99)),
-        joints=float(recording.joints.mean()),
-        iterations=float(np.where(recording.pairs > 0, recording.iterations, 0).mean()),
-        ik_percent=100.0 * float(recording.solve_seconds.sum()) / spent,
-        tracked_pairs=float(judged.tracked_pairs.mean()),
-        query_percent=100.0 * float(recording.contact_seconds.sum()) / spent,
-        depth_mm=1e3 * float(judged.depth.max()),
-        tracked_depth_mm=1e3 * float(judged.tracked_depth.max()),
-        passed=len(judged.passed),
-        limit_rad=judged.limit_violation,
-        cone_rad=judged.cone_violation,
-        distance_rad=float(judged.distance.mean()),
-        root_distance_mm=1e3 * float(judged.root_distance.mean()),
-        jerk=float(np.median(judged.jerk)) if len(judged.jerk) else 0.0,
-        tracked_jerk=float(np.median(judged.tracked_jerk)) if len(judged.tracked_jerk) else 0.0,
-        worst_jerk=float(judged.jerk.max(initial=0.0)),
-        returns=len(late),
-        latest=-1 if -1 in late else max(late, default=0),
-        noted=sum(bool(note) for note in recording.notes),
-    )
+    latest = -1 if -1 in late else max(late, default=0)
+    return filled(InteractionRow, recording, judged, scene=scene, latest=latest)
 
 
 def frame_rows(scene: str, recording: Recording, judged: Judgement) -> list[FrameRow]:
     """The rows of all frames."""
-    return [
-        FrameRow(
-            scene,
-            recording.overlap,
-            k,
-            1e3 * float(recording.seconds[k]),
-            1e3 * float(recording.cpu_seconds[k]),
-            1e3 * float(recording.contact_seconds[k]),
-            1e3 * float(recording.solve_seconds[k]),
-            int(recording.iterations[k]),
-            int(recording.joints[k]),
-            int(recording.pairs[k]),
-            int(judged.tracked_pairs[k]),
-            1e3 * float(judged.depth[k]),
-            1e3 * float(judged.tracked_depth[k]),
-            float(judged.distance[k]),
-            1e3 * float(judged.root_distance[k]),
-            recording.notes[k],
-        )
-        for k in range(len(recording))
-    ]
+    return [filled(FrameRow, recording, judged, k, scene=scene) for k in range(len(recording))]
 
 
 def frame_chart(rows: Sequence[FrameRow], path: Path) -> tuple[Path, Path]:
@@ -203,16 +160,16 @@ class WorstFrames:
     """
 
     row: InteractionRow
-    deepest: int
-    slowest: int
-    farthest: int
-    sudden: int
-    milliseconds: float
+    deepest: int = field(metadata=of(lambda run, judged: judged.depth.argmax()))
+    slowest: int = field(metadata=of(lambda run, judged: run.cpu_seconds.argmax()))
+    farthest: int = field(metadata=of(lambda run, judged: judged.distance.argmax()))
+    sudden: int = field(metadata=of(lambda run, judged: judged.jerk.argmax() + 2 if len(judged.jerk) else 0))
+    milliseconds: float = field(metadata=of(lambda run, judged: 1e3 * run.cpu_seconds.max()))
     query_percent: float
-    iterations: int
-    pairs: int
-    distance_rad: float
-    tracked_mm: float
+    iterations: int = field(metadata=of(lambda run, judged: run.iterations[run.cpu_seconds.argmax()]))
+    pairs: int = field(metadata=of(lambda run, judged: judged.tracked_pairs[run.cpu_seconds.argmax()]))
+    distance_rad: float = field(metadata=of(lambda run, judged: judged.distance.max()))
+    tracked_mm: float = field(metadata=of(lambda run, judged: 1e3 * judged.tracked_depth[judged.distance.argmax()]))
     picture: int
 
     @property
@@ -241,28 +198,13 @@ class WorstFrames:
 
 def worst_frames(row: InteractionRow, recording: Recording, judged: Judgement) -> WorstFrames:
     """Find them in one run."""
-    slowest, deepest = int(np.argmax(recording.cpu_seconds)), int(np.argmax(judged.depth))
-    farthest = int(np.argmax(judged.distance))
-    sudden = int(np.argmax(judged.jerk)) + 2 if len(judged.jerk) else 0
-    seconds = float(recording.seconds[slowest])
+    slowest, deepest = int(recording.cpu_seconds.argmax()), int(judged.depth.argmax())
     late = [frame for frame, after in judged.returns if after < 0 or after > IN_TIME]
     picture = -1
     if row.misses:
         picture = next(iter([*judged.passed, *late]), slowest if "ms" in " ".join(row.misses) else deepest)
-    return WorstFrames(
-        row=row,
-        deepest=deepest,
-        slowest=slowest,
-        farthest=farthest,
-        sudden=sudden,
-        milliseconds=1e3 * float(recording.cpu_seconds[slowest]),
-        query_percent=100.0 * float(recording.contact_seconds[slowest]) / max(seconds, 1e-9),
-        iterations=int(recording.iterations[slowest]),
-        pairs=int(judged.tracked_pairs[slowest]),
-        distance_rad=float(judged.distance[farthest]),
-        tracked_mm=1e3 * float(judged.tracked_depth[farthest]),
-        picture=picture,
-    )
+    queries = recording.contact_seconds[slowest] / max(recording.seconds[slowest], 1e-9)
+    return filled(WorstFrames, recording, judged, row=row, query_percent=100.0 * float(queries), picture=picture)
 
 
 def failures(worst: Sequence[WorstFrames], pictures: Sequence[tuple[WorstFrames, str]]) -> str:

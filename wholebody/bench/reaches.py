@@ -16,7 +16,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare import statistics
 from wholebody.bench.compare.statistics import Interval
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS

@@ -119,13 +119,9 @@ def examine(path: str, reaches: int) -> Loaded:
 def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Array]]:
     """Tips, the longest chain's first, and where each is in a random posture that is free of contact."""
     chains = sorted(figure.chains.values(), key=lambda chain: -len(chain.joints))
-    data = figure.model.createData()
-    found = []
-    for number in range(count):
-        tip = chains[number % len(chains)].tip
-        pin.framesForwardKinematics(figure.model, data, _free_posture(figure, scene, count, number))
-        found.append((tip, np.array(data.oMf[figure.frame_id(tip)].translation)))
-    return found
+    tips = [chains[number % len(chains)].tip for number in range(count)]
+    postures = (_free_posture(figure, scene, count, number) for number in range(count))
+    return [(tip, figure.placement(q, tip).translation) for tip, q in zip(tips, postures, strict=True)]
 
 
 def _free_posture(figure: Figure, scene: Scene, count: int, number: int) -> Array:

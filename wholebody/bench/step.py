@@ -16,9 +16,9 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench import track as setting
-from wholebody.bench.adapters import make_tool
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
+from wholebody.bench.adapters.registry import make_tool
 from wholebody.bench.compare.statistics import BLOCK, NOTHING, quantile_ratio
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled, programs_text

@@ -6,7 +6,8 @@ import csv
 import dataclasses
 import io
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
@@ -65,12 +66,26 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     return facts, rows
 
 
-def filled(kind: type[_R], *sources: object, **values: Any) -> _R:
-    """A row of a kind: fields by name, and all others from the first source that has an attribute of that name."""
-    names = [field.name for field in dataclasses.fields(kind) if field.name not in values]  # type: ignore[arg-type]
-    for name in names:
-        values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
+def of(compute: Callable[..., Any]) -> dict[str, Callable[..., Any]]:
+    """What computes a field of a row from the sources of the row, as `metadata` of the field; see `filled`."""
+    return {"of": compute}
+
+
+def filled(kind: type[_R], *sources: Any, **values: Any) -> _R:
+    """A row of a kind: fields by name, or as `of` computes them, or from the first source with such an attribute."""
+    for name, as_type, compute in _columns(kind):  # type: ignore[arg-type]
+        if name not in values and compute is not None:
+            values[name] = as_type(compute(*sources))
+        elif name not in values:
+            values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
     return kind(**values)
+
+
+@cache
+def _columns(kind: Any) -> list[tuple[str, Any, Callable[..., Any] | None]]:
+    """Name and type of each field of a kind of rows, and what computes it."""
+    types = get_type_hints(kind)
+    return [(field.name, types[field.name], field.metadata.get("of")) for field in dataclasses.fields(kind)]
 
 
 def programs_text(programs: Mapping[str, int]) -> str:

@@ -10,6 +10,7 @@ are believed, ours included.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -18,7 +19,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.motion_assessment import limit_violation, pairs_along, velocities
 
@@ -37,7 +38,6 @@ FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by w
 CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
 ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
 TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
-TRIES = 5000  # places tried for one object: many times what the most crowded figures have needed
 SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
 
 
@@ -91,10 +91,7 @@ def track(name: str, steps: int = 200) -> Track:
         raise InputError(f"a reach of {steps} steps has no way; give --steps 2 or more")
     figure = wb.load("human")
     start = figure.posture("standing")
-    data = figure.model.createData()
-    pin.framesForwardKinematics(figure.model, data, start)
-    tip = np.array(data.oMf[figure.frame_id("right_index_tip")].translation)
-    thorax = np.array(data.oMf[figure.frame_id("thorax")].translation)
+    tip, thorax = (figure.placement(start, name).translation for name in ("right_index_tip", "thorax"))
     free = smooth_way(np.vstack([tip, FREE]), 400)
     scene = wb.Scene(figure)
     if name != "alone":
@@ -135,7 +132,7 @@ def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Genera
 
 
 def put_objects(
-    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Array | None = None,
+    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]] = SPACE,
     size: float = 1.0, boxes: int = BOXES - 1,
 ) -> None:  # fmt: skip
     """Put boxes, spheres and hulls into a space, clear of what is taken up and of a way for a tip.
@@ -145,41 +142,20 @@ def put_objects(
         taken: by the figure.
         way: (k, 3) of the tip [m].
         rng: of their kinds' sizes and places.
-        space: (2, 3) corners of the space [m]; `SPACE` where None.
+        space: (2, 3) corners of the space [m].
         size: of the objects and of the room around them, as a share of those of the human's reaches.
         boxes: how many of them are boxes.
 
     Raises:
         InputError: no place was found for one of them.
     """
-    low, high = np.array(SPACE) if space is None else space
     kinds = ["box"] * boxes + ["sphere"] * SPHERES + ["hull"] * HULLS
-    for number, kind in enumerate(kinds):
-        for _ in range(TRIES):
-            shape = _shape(kind, rng, size)
-            turn = rng.normal(size=4)
-            at = (*rng.uniform(low, high), *(turn / np.linalg.norm(turn)))
-            if taken.clear_of(shape, at, size * ROOM_START) and _clear_of_way(shape, at, way, size * ROOM_WAY):
-                break
-        else:
-            raise InputError(f"no place was found for object {number} of {len(kinds)} around {scene.figure.name!r}")
-        scene.add(shape, name=f"{kind} {number}", at=at)
+    taken.keep_free(way[::8], size * (ROOM_WAY - ROOM_START))
 
+    def make(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
+        return kinds[number], _shape(kinds[number], rng, size)
 
-def _clear_of_way(shape: wb.Shape, at: tuple[float, ...], way: Array, room: float) -> bool:
-    import coal
-
-    place = pin.XYZQUATToSE3(np.array(at))
-    ball = coal.Sphere(room)
-    for piece in shape.pieces():
-        there = place * piece.placement
-        put = coal.Transform3s(there.rotation, there.translation)
-        for point in way[::8]:
-            found = coal.DistanceResult()
-            request = coal.DistanceRequest()
-            if coal.distance(piece.geometry, put, ball, coal.Transform3s(np.eye(3), point), request, found) <= 0.0:
-                return False
-    return True
+    add_things(scene, len(kinds), taken, size * ROOM_START, rng, space, make)
 
 
 def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import ALL, Adapter, adapters, missing, names
-from wholebody.bench.adapters.base import FIRST_FIT
+from wholebody.bench.adapters.base import FIRST_FIT, Adapter
+from wholebody.bench.adapters.registry import ALL, adapters, missing, names
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError

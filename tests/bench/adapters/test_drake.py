@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.errors import InputError
 
 pytest.importorskip("pydrake")

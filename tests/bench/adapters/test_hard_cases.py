@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import adapters
 from wholebody.bench.adapters.loop import margins, size
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import catalogue
 from wholebody.bench.stability.asking import ask
 from wholebody.bench.stability.case import Posed

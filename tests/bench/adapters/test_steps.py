@@ -12,9 +12,10 @@ import pytest
 
 import wholebody as wb
 from tests.bench.following import followed
-from wholebody.bench.adapters import chosen_tools, differences, installed_tools, make_tool
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
+from wholebody.bench.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
+from wholebody.bench.adapters.urdf import Frames, own_frame
 from wholebody.bench.track import CLEARANCE, Track, judge, track
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
@@ -85,7 +86,7 @@ def test_our_steps_jolt_joints_no_more_than_the_best_peers(name: str, most: floa
 def test_unknown_and_missing_tools_are_named() -> None:
     with pytest.raises(UnknownNameError, match="placo"):
         chosen_tools(["plako"])
-    assert all(differences(name) is not None for name in installed_tools())
+    assert all(tool_class(name).differences is not None for name in installed_tools())
     for name, extra in (("mink", "compare"), ("placo", "placo")):
         if find_spec(name) is None:
             with pytest.raises(MissingPackageError, match=extra):
@@ -97,7 +98,7 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
     mujoco = pytest.importorskip("mujoco")
     scene, figure = short_free.scene, short_free.scene.figure
     frames = ("right_index_tip", "left_foot", "head_top")
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, frames))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, {name: own_frame(figure, name) for name in frames}))
     data = mujoco.MjData(model)
     for name in figure.joints:
         index = figure.model.joints[figure.joint_id(name)].idx_q
@@ -123,6 +124,18 @@ def test_mujoco_has_the_same_human(short_free: Track) -> None:
             assert theirs == pytest.approx(distance, abs=2e-5)
 
 
+def test_a_point_that_a_tool_is_given_by_name_is_where_it_is_in_our_model(short_free: Track) -> None:
+    scene, figure, start = short_free.scene, short_free.scene.figure, short_free.start
+    frames, offset = Frames(), np.array((0.01, -0.02, 0.03))
+    goal = wb.Point("right_index_tip", (0.3, 0.1, 0.9)).resolve(scene, start)
+    joint, place = frames[frames.named(scene.model, goal.place, offset)]
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, start)
+    there = figure.placement(start, "right_index_tip").act(offset)
+    assert np.allclose(data.oMi[joint].act(place.translation), there, atol=1e-12)
+    assert len({*frames, frames.named(scene.model, goal.place)}) == 2, "another point has another name"
+
+
 def test_mjcf_refuses_what_it_does_not_know() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Ellipsoid((0.1, 0.2, 0.3)), name="egg")
     with pytest.raises(InputError, match="egg"):
@@ -136,7 +149,7 @@ def test_mujoco_has_the_same_arm_and_floor(root: Path) -> None:
     lean = pin.SE3(pin.utils.rotate("x", 0.4), np.array([0.0, 0.0, -0.6]))
     scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor", at=lean)
     tip = figure.model.names[-1]
-    model = mujoco.MjModel.from_xml_string(mjcf(scene, [tip]))
+    model = mujoco.MjModel.from_xml_string(mjcf(scene, {tip: own_frame(figure, tip)}))
     data = mujoco.MjData(model)
     rng = np.random.default_rng(2)
     for _ in range(4):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.compare.solving import Ready, solve
 from wholebody.bench.problem_sets.case import Case

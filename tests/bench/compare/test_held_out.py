@@ -8,7 +8,7 @@ from typing import get_type_hints
 
 import pytest
 
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.held_out import beside, report, settings, verdict
 from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.compare.summary import Summary

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.own_task import TaskRow, chart, compared, report
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wholebody.assessment import assess
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability.asking import run
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.stability.catalogue import QUICK, cases, names

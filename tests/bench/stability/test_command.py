@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import page
 from wholebody.bench.stability.asking import run
 from wholebody.bench.stability.catalogue import cases

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters import make_tool
+from wholebody.bench.adapters.registry import make_tool
 from wholebody.bench.track import judge, track
 from wholebody.figures.state import State
 from wholebody.linearisation import Linearisation, Passing

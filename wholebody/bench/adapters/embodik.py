@@ -12,12 +12,11 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, Adapter, few
 from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, placements, pulls, size
-from wholebody.bench.adapters.urdf import joint_name, piece_name, write_urdf
+from wholebody.bench.adapters.urdf import Frames, joint_name, piece_name, write_urdf
 from wholebody.files import Scratch
 from wholebody.methods.base import named_terms
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
-from wholebody.tasks.inputs import Place
 
 STEP = 0.01  # s: its examples' time step
 DAMPING = 0.1  # its examples'
@@ -84,7 +83,7 @@ class EmbodikLoop(Loop):
 class _EmbodikStepper:
     def __init__(self, problem: Problem) -> None:
         self._problem, self._model = problem, problem.scene.model
-        self._frames: dict[str, tuple[int, pin.SE3]] = {}
+        self._frames = Frames()
         for goal in problem.goals:
             self._frame(goal)
         self._read()
@@ -188,13 +187,9 @@ class _EmbodikStepper:
 
     def _frame(self, goal: Any) -> str:
         """Name of the link of a goal's frame, or of a point in it; noted, so that the model gets it."""
-        place: Place = goal.place if isinstance(goal, wb.Point) else goal.residual.place
-        there = self._model.frames[place.frame].placement
         if isinstance(goal, wb.Point):
-            there = there * pin.SE3(np.eye(3), goal.resolved_offset)
-        name = f"frame {place.frame} {there.translation.tolist()}"
-        self._frames[name] = (place.joint, there)
-        return name
+            return self._frames.named(self._model, goal.place, goal.resolved_offset)
+        return self._frames.named(self._model, goal.residual.place)
 
     def _goal(self, goal: Any) -> None:
         import embodik

@@ -6,16 +6,15 @@ To solve a problem it is iterated; a reach is followed with one call a step.
 from __future__ import annotations
 
 from typing import Any, ClassVar
-from xml.etree import ElementTree
 
 import numpy as np
-import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import NEAR, OUT, Loop, Stepper, kept_apart, longest_moves, placements, pulls, size
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
+from wholebody.bench.adapters.urdf import Frames, own_frame
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import TOOL, StepError
@@ -83,7 +82,7 @@ class HardMinkLoop(MinkLoop):
 class _MinkStepper:
     def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
         self._problem, self._loop, self._longest, self._holds_hard = problem, loop, loop.longest, loop.hard
-        self._sites: dict[str, tuple[int, Any]] = {}
+        self._sites = Frames()
         self._room = 0.0
         for term in (*problem.goals, *problem.constraints):
             if isinstance(term, wb.Point):
@@ -144,30 +143,12 @@ class _MinkStepper:
         import mink
         import mujoco
 
-        self._mujoco = mujoco.MjModel.from_xml_string(self._text())
+        self._mujoco = mujoco.MjModel.from_xml_string(mjcf(self._problem.scene, self._sites))
         self._configuration = mink.Configuration(self._mujoco)
         self._limits, self._placed = self._made_limits(), placements(self._problem)
 
     def _site(self, place: Place, offset: Array | None = None) -> str:
-        """Name of the site of a frame, or of a point in it; noted, so that the model gets it."""
-        frame = self._problem.scene.model.frames[place.frame]
-        there = frame.placement if offset is None else frame.placement * pin.SE3(np.eye(3), offset)
-        name = f"{place.frame} {there.translation.tolist()}"
-        self._sites[name] = (place.joint, there)
-        return name
-
-    def _text(self) -> str:
-        """MJCF of the scene with the sites."""
-        top = ElementTree.fromstring(mjcf(self._problem.scene))
-        bodies = {body.attrib["name"]: body for body in top.iter("body")}
-        for name, (joint, there) in self._sites.items():
-            body = bodies[self._problem.scene.model.names[joint]] if joint else top.find("worldbody")
-            assert body is not None
-            x, y, z, w = pin.Quaternion(there.rotation).coeffs()
-            texts = {"pos": there.translation, "quat": (w, x, y, z)}
-            place = {key: " ".join(repr(float(value)) for value in values) for key, values in texts.items()}
-            ElementTree.SubElement(body, "site", {"name": name} | place)
-        return ElementTree.tostring(top, encoding="unicode")
+        return self._sites.named(self._problem.scene.model, place, offset)
 
     def _made_limits(self) -> list[Any]:
         import mink
@@ -305,8 +286,9 @@ class MinkTool(Tool):
         import mujoco
 
         self._mink = mink
-        model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, (track.tip, *track.feet)))
         figure = track.scene.figure
+        sites = {name: own_frame(figure, name) for name in (track.tip, *track.feet)}
+        model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, sites))
         self._order = _Order(figure, model)
         self.reset(track.start)
         self._reach = self._task(track.tip, REACH_COST, 0.0)

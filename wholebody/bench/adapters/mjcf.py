@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import Any
 from xml.etree import ElementTree
 
@@ -17,15 +18,15 @@ from wholebody.scene import Scene
 ROOT = "root_joint"
 
 
-def mjcf(scene: Scene, frames: Sequence[str] = ()) -> str:
+def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
     """Return a scene as MJCF.
 
-    Bodies are named after the joint that moves them, geoms after their pieces and sites after their frames. Links
+    Bodies are named after the joint that moves them, geoms after their pieces. Links
     without mass get a millionth of a kilogram, because MuJoCo refuses none; kinematics do not see it.
 
     Args:
         scene: a figure with turning and sliding joints, on a free root or fixed, and things.
-        frames: names of the frames that become sites.
+        frames: names of sites -> our joint and the placement in it.
 
     Raises:
         InputError: a joint or a shape that this translation does not know.
@@ -40,9 +41,8 @@ def mjcf(scene: Scene, frames: Sequence[str] = ()) -> str:
         bodies.append(_body(model, index, bodies[model.parents[index]]))
     for piece in geometry.geometryObjects:
         _geom(piece, bodies[piece.parentJoint], assets)
-    for name in frames:
-        frame = model.frames[scene.frame_id(name)]
-        ElementTree.SubElement(bodies[frame.parentJoint], "site", {"name": name} | _place(frame.placement))
+    for name, (joint, place) in frames.items():
+        ElementTree.SubElement(bodies[joint], "site", {"name": name} | _place(place))
     return ElementTree.tostring(top, encoding="unicode")
 
 

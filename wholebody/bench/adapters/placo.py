@@ -17,6 +17,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
+from wholebody.bench.adapters.urdf import own_frame
 from wholebody.bench.track import DT, JOINT_SPEED, WITHIN, Track
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
@@ -83,7 +84,7 @@ class PlacoTool(Tool):
         import placo
 
         figure, scene = track.scene.figure, track.scene.geometry
-        self._robot = Robot(figure, {name: _place(figure, name) for name in (track.tip, *track.feet)})
+        self._robot = Robot(figure, {name: own_frame(figure, name) for name in (track.tip, *track.feet)})
         wrapper = self._robot.wrapper
         pieces = wrapper.collision_model
         for piece in scene.geometryObjects:
@@ -203,9 +204,3 @@ def _kept(figure: wb.Figure, built: SceneGeometry) -> Indices:
 def _named(built: SceneGeometry) -> list[tuple[str, str]]:
     pieces = built.geometry.geometryObjects
     return [(pieces[pair.first].name, pieces[pair.second].name) for pair in built.geometry.collisionPairs]
-
-
-def _place(figure: wb.Figure, name: str) -> tuple[int, pin.SE3]:
-    """Joint of a frame, and its placement in it."""
-    frame = figure.model.frames[figure.frame_id(name)]
-    return int(frame.parentJoint), frame.placement

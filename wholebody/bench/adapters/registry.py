@@ -47,6 +47,13 @@ class _Row(NamedTuple):
     def installed(self) -> bool:
         return all(find_spec(module) for module in self.modules)
 
+    def command(self) -> str:
+        return f"pip install 'wholebody[{self.extra}]'"
+
+    def check(self, name: str) -> None:
+        if not self.installed():
+            raise MissingPackageError(f"{name} is not installed; install it with: {self.command()}")
+
 
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
     """The adapters of these names, in the order given; where None, the installed ones of `USUAL`.
@@ -77,8 +84,7 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
         else:
             raise UnknownNameError("method", name, {*rows, *families, ALL})
     for name in chosen:
-        if not rows[name].installed():
-            raise MissingPackageError(f"{name} is not installed; install it with: {_command(rows[name])}")
+        rows[name].check(name)
     return tuple(rows[name].build() for name in chosen)
 
 
@@ -95,11 +101,7 @@ def installed(name: str) -> bool:
 
 def missing() -> Mapping[str, str]:
     """Adapters whose packages are not installed -> the command that installs them."""
-    return MappingProxyType({name: _command(row) for name, row in _rows().items() if not row.installed()})
-
-
-def _command(row: _Row) -> str:
-    return f"pip install 'wholebody[{row.extra}]'"
+    return MappingProxyType({name: row.command() for name, row in _rows().items() if not row.installed()})
 
 
 def _outside(name: str, variant: str = "") -> Adapter:
@@ -144,23 +146,20 @@ def _restarted(row: _Row) -> Adapter:
     return restarted(row.build())
 
 
-STEPPING = {
-    "wholebody": ("osqp",),
-    "wholebody/active_set": ("osqp",),
-    "wholebody/osqp": ("osqp",),
-    "wholebody/daqp": ("daqp",),
-    **{f"wholebody/{solver}": (module,) for solver, module in SOLVERS.items()},
-    "placo": ("placo",),
-    "placo/pruned": ("placo",),
-    "pink": ("pink", "daqp"),
-    "mink": ("mink", "mujoco", "daqp"),
-}
-"""Name of every tool that follows reaches -> the modules it needs."""
+STEPPING = (
+    "wholebody", "wholebody/active_set", "wholebody/osqp", "wholebody/daqp", *(f"wholebody/{name}" for name in SOLVERS),
+    "placo", "placo/pruned", "pink", "mink",
+)  # fmt: skip
+"""Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
+
+
+def _row_of(tool: str) -> _Row:
+    return _rows()[tool.replace("wholebody", "qp")]
 
 
 def installed_tools() -> tuple[str, ...]:
     """Names of the tools whose packages are installed."""
-    return tuple(name for name, modules in STEPPING.items() if all(find_spec(module) for module in modules))
+    return tuple(name for name in STEPPING if _row_of(name).installed())
 
 
 def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
@@ -176,9 +175,7 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
     for name in chosen:
         if name not in STEPPING:
             raise UnknownNameError("tool", name, STEPPING)
-        if name not in installed_tools():
-            extra = "placo" if name.startswith("placo") else "solvers" if name.startswith("wholebody/") else "compare"
-            raise MissingPackageError(f"{name} is not installed; install it with: pip install 'wholebody[{extra}]'")
+        _row_of(name).check(name)
     return chosen
 
 
@@ -195,7 +192,7 @@ def make_tool(name: str, track: Track) -> Tool:
 
 
 def tool_class(name: str) -> Any:
-    """The class of a tool; the others' packages are not imported for it.
+    """The class of a tool, which says what it cannot express; the others' packages are not imported for it.
 
     Raises:
         UnknownNameError: there is no such tool.
@@ -206,14 +203,3 @@ def tool_class(name: str) -> Any:
     module = "own" if family == "wholebody" else family
     kind = "PrunedPlaco" if name == "placo/pruned" else family.capitalize()
     return getattr(import_module(f"wholebody.bench.adapters.{module}"), f"{kind}Tool")
-
-
-def differences(name: str) -> tuple[str, ...]:
-    """What a tool cannot express of the task, or does otherwise; one sentence each.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
-    stated: tuple[str, ...] = tool_class(name).differences
-    return stated

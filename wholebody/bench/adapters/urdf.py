@@ -11,14 +11,35 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.bench.adapters.loop import size
 from wholebody.errors import InputError
+from wholebody.figures.figure import Figure
 from wholebody.figures.urdf_writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene import Scene
+from wholebody.tasks.inputs import Place
 
 ROOT = "root"
 FAST = 1e3  # rad/s, m/s: in place of a limit of speed that is none
 SLAB = 8.0  # of the figure's size: edges of the box that stands for a half-space; its height is a quarter of that
+
+
+class Frames(dict[str, tuple[int, pin.SE3]]):
+    """Frames, and points in them, that a tool is given by name: name -> our joint and the placement in it."""
+
+    def named(self, model: pin.Model, place: Place, offset: Array | None = None) -> str:
+        """Note a frame, or a point in its axes (3,), and return its name."""
+        frame = model.frames[place.frame]
+        there = frame.placement if offset is None else frame.placement * pin.SE3(np.eye(3), offset)
+        name = f"frame {place.frame} {there.translation.tolist()}"
+        self[name] = (place.joint, there)
+        return name
+
+
+def own_frame(figure: Figure, name: str) -> tuple[int, pin.SE3]:
+    """Joint of a frame of a figure, and its placement in it."""
+    frame = figure.model.frames[figure.frame_id(name)]
+    return int(frame.parentJoint), frame.placement
 
 
 def joint_name(index: int) -> str:

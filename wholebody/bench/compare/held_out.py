@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from wholebody.bench.adapters import Adapter
+from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.run import Progress, run
 from wholebody.bench.compare.settings import Settings

@@ -13,7 +13,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.bench.adapters import adapters
+from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.pages import Material
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.statistics import LEAST, median

@@ -99,11 +99,6 @@ class Results:
         """Records at the default budget, refusals too, in the order of cases."""
         return [record for _, record in sorted(self._cell(family, adapter).get(DEFAULT, {}).items())]
 
-    def refuses(self, family: str, adapter: str) -> bool:
-        """Whether a method takes no case of a set."""
-        mine = self.default(family, adapter)
-        return bool(mine) and all(record.outcome == REFUSED for record in mine)
-
     def taken(self, family: str, adapter: str) -> list[Record]:
         """Records at the default budget of the cases that a method did not refuse."""
         return [record for record in self.default(family, adapter) if record.outcome != REFUSED]

@@ -16,7 +16,6 @@ from wholebody.bench.problem_sets.bodies import (
     human,
     is_free,
     movable,
-    place_of,
     point,
     shaken,
     standing_problem,
@@ -62,7 +61,7 @@ def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
 
 def _resolved(figure: wb.Figure, goals: list[wb.Point]) -> list[wb.Goal]:
     start, scene = figure.posture("standing"), alone(figure)
-    feet = [wb.Frame(foot, place_of(figure, start, foot)) for foot in FEET]
+    feet = [wb.Frame(foot, figure.placement(start, foot)) for foot in FEET]
     return [goal.resolve(scene, start) for goal in (*goals, *feet)]
 
 

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import NDArray
 
 import wholebody as wb
@@ -98,19 +97,6 @@ def movable(figure: wb.Figure) -> NDArray[np.intp]:
     return np.setdiff1d(np.arange(figure.model.nv), toes)
 
 
-def place_of(figure: wb.Figure, q: Array, frame: str) -> Any:
-    """Placement (pin.SE3) in the world of a frame in the posture q, shape (nq,)."""
-    data = _data(figure)
-    pin.forwardKinematics(figure.model, data, q)
-    return pin.SE3(pin.updateFramePlacement(figure.model, data, figure.frame_id(frame)))
-
-
-@lru_cache(maxsize=8)
-def _data(figure: wb.Figure) -> Any:
-    """Pinocchio's scratch space for a figure."""
-    return figure.model.createData()
-
-
 def standing_problem(
     scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
 ) -> wb.Problem:
@@ -127,4 +113,4 @@ def standing_problem(
 
 def point(figure: wb.Figure, q: Array, frame: str) -> wb.Point:
     """The goal that a frame is where the posture q, (nq,), has it."""
-    return wb.Point(frame, place_of(figure, q, frame).translation)
+    return wb.Point(frame, figure.placement(q, frame).translation)

@@ -12,7 +12,6 @@ from wholebody.bench.problem_sets.bodies import (
     floor_scene,
     human,
     is_free,
-    place_of,
     shaken,
     standing_problem,
     until_found,
@@ -56,7 +55,7 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
     start = until_found(level)
     witness = until_found(turned)
-    goals = [wb.Frame("right_palm", place_of(figure, witness, "right_palm"))]
+    goals = [wb.Frame("right_palm", figure.placement(witness, "right_palm"))]
     grip = wb.Hold("left_palm", other, relative_to="right_palm")
     return standing_problem(scene, start, goals, grip), witness
 

@@ -21,7 +21,6 @@ from wholebody.bench.problem_sets.bodies import (
     human,
     is_free,
     movable,
-    place_of,
     point,
     sampled_posture,
     standing_problem,
@@ -44,7 +43,7 @@ def _uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """All joints anywhere within their limits, the feet then put on their places; one fingertip, or both."""
     figure = human()
     start = figure.posture("standing")
-    feet = [wb.Frame(foot, place_of(figure, start, foot)).resolve(alone(figure), start) for foot in FEET]
+    feet = [wb.Frame(foot, figure.placement(start, foot)).resolve(alone(figure), start) for foot in FEET]
     limits, dofs = figure.limits, movable(figure)
     toes = [name for name in figure.joints if "toe" in name]
     standing = figure.joint_values(start)

@@ -11,7 +11,6 @@ from wholebody.bench.problem_sets.bodies import (
     TIPS,
     floor_scene,
     human,
-    place_of,
     point,
     sampled_posture,
     standing_problem,
@@ -37,10 +36,10 @@ def _several(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     figure = human()
     start = figure.posture("standing")
     witness = sampled_posture(figure, start, rng)
-    gaze = place_of(figure, witness, "gaze")
+    gaze = figure.placement(witness, "gaze")
     look = wb.Axis("gaze", (1, 0, 0), toward=gaze.act(np.array((rng.uniform(*SEEN), 0.0, 0.0))))
     points = [point(figure, witness, tip) for tip in TIPS]
-    palm = wb.Frame("right_palm", place_of(figure, witness, "right_palm"))
+    palm = wb.Frame("right_palm", figure.placement(witness, "right_palm"))
     goals: list[list[wb.Goal]] = [[*points], [*points, look], [palm, points[1], look]]
     return standing_problem(floor_scene(figure), start, goals[number % len(goals)]), witness
 

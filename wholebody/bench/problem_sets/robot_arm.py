@@ -8,7 +8,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, place_of, until_found
+from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, until_found
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.files import Scratch
@@ -32,7 +32,7 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     witness = until_found(sampled)
     scene = floor_scene(figure)
     add_things(scene, THINGS, Occupied(figure, (start, witness)), ROOM, rng, SPACE)
-    place = place_of(figure, witness, "tool")
+    place = figure.placement(witness, "tool")
     turned = number // len(KINDS) % 2 == 1
     goal = wb.Frame("tool", place) if turned else wb.Point("tool", place.translation)
     return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness

@@ -15,7 +15,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, place_of, until_found
+from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, until_found
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
 from wholebody.errors import InputError
@@ -96,7 +96,7 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     taken = Occupied(figure, (start, witness))
     space = taken.centres.min(axis=0) - AROUND, taken.centres.max(axis=0) + AROUND
     add_things(scene, THINGS, taken, ROOM, rng, (space[0].tolist(), space[1].tolist()))
-    place = place_of(figure, witness, tip)
+    place = figure.placement(witness, tip)
     turned = number // len(ROBOTS) % 2 == 1
     goal = wb.Frame(tip, place) if turned else wb.Point(tip, place.translation)
     return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness

@@ -17,7 +17,7 @@ from wholebody.geometry.swept_points import swept_points
 
 KINDS = ("box", "sphere", "capsule", "hull")
 SPACE = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0))  # m: where things are put around a person
-TRIES = 2000
+TRIES = 5000
 """Places that are tried for one thing: many times what the most crowded postures have needed."""
 
 
@@ -25,7 +25,7 @@ class Occupied:
     """The space that a figure takes up in some postures.
 
     Attributes:
-        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on.
+        places: placements (pin.SE3) of all pieces in the first posture, then in the second, and so on; then of balls.
         centres: (n, 3) of these places.
         count: pieces of the figure.
     """
@@ -43,6 +43,13 @@ class Occupied:
         self.centres = np.array([place.translation for place in self.places]).reshape(-1, 3)
         self._reach = np.array([swept_points(shape).reach for shape in self._shapes])
         self.count = geometry.ngeoms
+
+    def keep_free(self, places: Array, radius: float) -> None:
+        """Take up balls about places (n, 3) too, metres."""
+        self.places += [pin.SE3(np.eye(3), place) for place in places]
+        self._shapes += [coal.Sphere(radius)] * len(places)
+        self.centres = np.vstack([self.centres, places])
+        self._reach = np.append(self._reach, np.full(len(places), radius))
 
     def clear_of(self, shape: wb.Shape, at: Sequence[float] | pin.SE3, room: float) -> bool:
         """Whether a thing at a placement leaves this much room, metres, around the figure in every posture."""
@@ -77,7 +84,7 @@ def add_things(
     taken: Occupied,
     room: float,
     rng: np.random.Generator,
-    space: tuple[Sequence[float], Sequence[float]] = SPACE,
+    space: Sequence[Sequence[float]] = SPACE,
     make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
 ) -> None:
     """Put random things into a box of space, in any orientation, clear of what is taken up; they may cross each other.
@@ -91,11 +98,14 @@ def add_things(
         for _ in range(TRIES):
             kind, shape = (make or household_thing)(number, rng)
             turn = rng.normal(size=4)
-            at = (*rng.uniform(*space), *(turn / np.linalg.norm(turn)))
+            at = (*rng.uniform(space[0], space[1]), *(turn / np.linalg.norm(turn)))
             if taken.clear_of(shape, at, room):
                 break
         else:
-            raise InputError(f"no place is left for thing {number} of {count}; ask for fewer of them or less room")
+            raise InputError(
+                f"no place is left for thing {number} of {count} around {scene.figure.name!r}; ask for fewer of them "
+                "or less room"
+            )
         scene.add(shape, name=f"{kind} {number}", at=at)
 
 

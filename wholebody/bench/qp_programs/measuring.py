@@ -12,15 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.bench.compare.statistics import quantile, wilson
 from wholebody.bench.qp_programs.recording import Recorded
 from wholebody.bench.report import render
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
 from wholebody.methods.qp.solvers.registry import make_solver
-
-RESAMPLES = 1000  # bootstrap: medians of as many draws with replacement
-MARGIN = 0.025  # share of them outside an interval on each side
 
 
 class Residuals(NamedTuple):
@@ -178,12 +176,12 @@ def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
     )
 
 
-def summaries(rows: Sequence[QPRow], solvers: Sequence[str], seed: int) -> list[QPSummary]:
-    """One row a solver; the seed is the bootstrap's."""
-    return [_summary(name, [row for row in rows if row.solver == name], seed) for name in solvers]
+def summaries(rows: Sequence[QPRow], solvers: Sequence[str]) -> list[QPSummary]:
+    """One row a solver."""
+    return [_summary(name, [row for row in rows if row.solver == name]) for name in solvers]
 
 
-def _summary(solver: str, mine: Sequence[QPRow], seed: int) -> QPSummary:
+def _summary(solver: str, mine: Sequence[QPRow]) -> QPSummary:
     itself = ACTIVE_SET if solver == ActiveSetSolver.name else solver
     closed = sum(row.by == itself for row in mine)
     failed = sum(not row.exact for row in mine)
@@ -191,26 +189,21 @@ def _summary(solver: str, mine: Sequence[QPRow], seed: int) -> QPSummary:
     cpu = np.array([row.cpu_us for row in mine])
     own = np.array([row.own_error for row in mine])
     own = own[np.isfinite(own)]
-    drawn = np.random.default_rng(seed).choice(wall, (RESAMPLES, len(wall)))
-    intervals = [np.quantile(np.quantile(drawn, share, axis=1), (MARGIN, 1.0 - MARGIN)) for share in (0.5, 0.95)]
-    (median_low, median_high), (p95_low, p95_high) = intervals
-    from scipy.stats import binomtest
-
-    share = binomtest(closed, len(mine)).proportion_ci(method="wilson")
+    share, median, p95 = wilson(closed, len(mine)), quantile(wall.tolist(), 0.5), quantile(wall.tolist(), 0.95)
     return QPSummary(
         solver=solver,
         programs=len(mine),
         closed=closed,
-        low=float(share.low),
-        high=float(share.high),
+        low=share[0],
+        high=share[1],
         handed_on=len(mine) - closed - failed,
         failed=failed,
         median_us=float(np.median(wall)),
-        median_low=float(median_low),
-        median_high=float(median_high),
+        median_low=median.low,
+        median_high=median.high,
         p95_us=float(np.quantile(wall, 0.95)),
-        p95_low=float(p95_low),
-        p95_high=float(p95_high),
+        p95_low=p95.low,
+        p95_high=p95.high,
         cpu_median_us=float(np.median(cpu)),
         cpu_p95_us=float(np.quantile(cpu, 0.95)),
         iterations=float(np.median([row.iterations for row in mine])),

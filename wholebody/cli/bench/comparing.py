@@ -49,7 +49,7 @@ def compare(arguments: argparse.Namespace) -> None:
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from wholebody.batches import threads
-    from wholebody.bench.adapters import missing
+    from wholebody.bench.adapters.registry import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.advice import advice
     from wholebody.bench.compare.report import PAGE, publish
@@ -87,7 +87,7 @@ def _facts(beside: str) -> dict[str, str]:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    from wholebody.bench.adapters import adapters
+    from wholebody.bench.adapters.registry import adapters
     from wholebody.bench.compare.settings import QUICK, Settings
     from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
 
@@ -108,7 +108,7 @@ def _compare_on_task(arguments: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.bench.adapters import adapters
+    from wholebody.bench.adapters.registry import adapters
     from wholebody.bench.compare import own_task
     from wholebody.cli.tables import table
     from wholebody.taskfile import read_task
@@ -149,7 +149,7 @@ compared in units of a reference kernel. Ends with 1 where what is solved differ
 )
 def reproduce(arguments: argparse.Namespace) -> int:
     """Run and compare."""
-    from wholebody.bench.adapters import missing
+    from wholebody.bench.adapters.registry import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.lock import differences, in_words, locked, read_lock, shares
     from wholebody.bench.compare.report import PAGE, publish
@@ -180,7 +180,7 @@ where it was when it is called again with the same settings and folder.""",
 )
 def held_out(arguments: argparse.Namespace) -> None:
     """Measure, judge, publish."""
-    from wholebody.bench.adapters import adapters, installed
+    from wholebody.bench.adapters.registry import adapters, installed
     from wholebody.bench.compare import held_out
 
     cases = arguments.cases or (4 if arguments.quick else held_out.CASES)

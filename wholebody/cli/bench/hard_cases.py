@@ -16,7 +16,7 @@ from wholebody.errors import InputError, UnknownNameError
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from wholebody.bench.adapters import Adapter
+    from wholebody.bench.adapters.base import Adapter
     from wholebody.bench.attack.case import Case
     from wholebody.bench.attack.report import Row
     from wholebody.bench.stability.case import HardCase
@@ -40,7 +40,7 @@ INTERRUPTED = 130  # exit code after Ctrl-C
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.adapters import ALL, adapters
+    from wholebody.bench.adapters.registry import ALL, adapters
     from wholebody.bench.stability import catalogue, page
 
     _check_page(arguments)

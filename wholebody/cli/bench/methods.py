@@ -30,7 +30,7 @@ QUICK = 45  # quadratic programs
 def step(arguments: argparse.Namespace) -> None:
     """Measure steps."""
     from wholebody.bench import step
-    from wholebody.bench.adapters import chosen_tools, differences
+    from wholebody.bench.adapters.registry import chosen_tools, tool_class
     from wholebody.bench.figure_track import figure_tracks
     from wholebody.bench.person_cost import person_costs
     from wholebody.bench.step_goals import goal_lines
@@ -54,7 +54,7 @@ def step(arguments: argparse.Namespace) -> None:
         times += timed
         if "wholebody" in taken:
             shares[course.name] = step.linearise_us(course)
-    stated = {name: differences(name) for name in tools}
+    stated = {name: tool_class(name).differences for name in tools}
     costs = []
     if not figures:
         humans = [track(name, steps) for name in VARIANTS]
@@ -85,7 +85,7 @@ def step(arguments: argparse.Namespace) -> None:
 def reaches(arguments: argparse.Namespace) -> None:
     """Measure random reaches."""
     from wholebody.bench import reaches
-    from wholebody.bench.adapters import adapters
+    from wholebody.bench.adapters.registry import adapters
 
     seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count))
     methods = [adapter.name for adapter in adapters(arguments.methods)]
@@ -112,7 +112,7 @@ def reaches(arguments: argparse.Namespace) -> None:
 def solve(arguments: argparse.Namespace) -> None:
     """Measure whole solves."""
     from wholebody.bench import solve
-    from wholebody.bench.adapters import adapters
+    from wholebody.bench.adapters.registry import adapters
     from wholebody.cli.demo import packaged_tasks
 
     task, facts = arguments.task or packaged_tasks()["shelf"], machine()
@@ -175,7 +175,7 @@ def qp(arguments: argparse.Namespace) -> None:
         programs = [one for one in files.load(arguments.programs) if one.set in sets]
     facts = machine() | {"seed": str(arguments.seed)}
     rows = measure(programs, solvers, print)
-    totals = summaries(rows, solvers, arguments.seed)
+    totals = summaries(rows, solvers)
     report = qp_report(rows, totals, facts)
     publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
 
