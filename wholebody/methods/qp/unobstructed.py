@@ -112,16 +112,16 @@ def unobstructed(problem: Problem, workspace: Workspace, tolerance: float, most:
         goals are not met with everything held.
     """
     built = problem.scene.built
-    lineariser = problem.lineariser(workspace)
-    if not takes(lineariser.plan):
-        return None
     with built.pool(PlainChain, lambda: PlainChain(built.model, problem.scene.figure.limits)).borrow() as chain:
         if not chain.plain:
+            return None
+        lineariser = problem.lineariser(workspace)
+        if not takes(lineariser.plan):
             return None
         q, seen = chain.reach(lineariser.plan, problem.scene.figure.clamp(problem.start), tolerance, most)
         entries = tuple(TraceEntry(left, 0.0, 0.0, step, "unobstructed") for left, step in seen[1:].tolist())
         left = float(seen[-1, 0])
-    if left > tolerance:
+    if not left <= tolerance:
         return None
     at = lineariser.at(q, 0.0)
     if (at.gap < at.clearance).any():
