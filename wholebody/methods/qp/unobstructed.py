@@ -140,7 +140,7 @@ def takes(plan: TermPlan) -> bool:
 
 
 def _is_plain(joint: pin.JointModel) -> bool:
-    return joint.nq == joint.nv == 1 and joint.shortname().startswith(("JointModelR", "JointModelP"))
+    return bool(joint.nq == joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
 
 
 @lru_cache(maxsize=1)
