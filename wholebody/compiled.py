@@ -24,7 +24,7 @@ TOGETHER = (
         "wholebody.methods.qp.subproblem",
     ),
     ("wholebody.dynamics.loops",),
-    ("wholebody.linearisation",),
+    ("wholebody.linearisation", "wholebody.methods.qp.unobstructed"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",

@@ -173,6 +173,11 @@ class Lineariser:
         if self._approach is not None:
             self._most = np.add(clearances, self._approach, out=self._most)
 
+    @property
+    def plan(self) -> TermPlan:
+        """The terms as arrays."""
+        return self._plan
+
     def goal_rows(self) -> list[int]:
         """How many rows each goal has."""
         others = iter(self._plan.others)

@@ -46,7 +46,8 @@ class Solution:
         message: one sentence that explains the status.
         programs: number of quadratic programs that each solver closed, such as {"osqp": 1, "active set": 7}. There,
             "active set" is the hot start, "semismooth newton" closed what neither did, and "not exact" are programs
-            that none closed. Empty for methods without programs.
+            that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
+            "unobstructed" have none.
     """
 
     q: Array

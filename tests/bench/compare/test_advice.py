@@ -24,7 +24,7 @@ def row(family: str, success: float, low: float, high: float, method: str = "qp"
 
 
 def rival(method: str, ratio: float) -> Rival:
-    return Rival("one", "worst", method, 1e-3, ratio, 0.01, 0.02, 40)
+    return Rival("one", "worst", method, 1e-3, ratio, 0.9 * ratio, 1.1 * ratio, 0.01, 0.02, 40)
 
 
 def test_a_share_is_reached_or_missed_by_its_interval() -> None:
@@ -50,7 +50,7 @@ def test_who_is_ahead_in_a_chart_is_named_once() -> None:
     wall = [rival("dls", 1.4), rival("dls", 2.0), rival("", 0.0), rival("placo", 0.5)]
     _, said = targets([row("sure_one", 1.0, 0.981, 1.0)], wall, [rival("placo", 0.5)])
     assert "the front of 2 of 4 charts, and of 1 of 1 by the time" in said
-    assert said.endswith("ahead of it in a chart: `dls`.")
+    assert said.endswith("ahead of it in a chart: `dls`, in 2 charts by more than the interval of the ratio.")
     _, all_on = targets([row("sure_one", 1.0, 0.981, 1.0)], wall[2:], wall[3:])
     assert "ahead" not in all_on
 

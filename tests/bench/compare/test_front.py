@@ -134,6 +134,44 @@ def test_the_same_method_with_another_solver_is_no_rival() -> None:
     assert fronts(results(curve_of("other", (1e-4, 0.1, 1e-5)))) == []
 
 
+def many(adapter: str, seconds: np.ndarray, error: float = 1e-6) -> list[Record]:
+    return [record(adapter, number, 1e-4, float(each), error) for number, each in enumerate(seconds)]
+
+
+def test_a_ratio_has_the_interval_of_its_problems() -> None:
+    """A method that takes half as long in every problem does so in every draw; one that does by chance is not apart."""
+    rng = np.random.default_rng(0)
+    base = 0.01 * np.exp(rng.normal(size=40))
+    twice = front(results(many(OURS, 2.0 * base), many("other", base)), "s", WORST)
+    assert twice is not None
+    assert (twice.ratio, twice.low, twice.high) == (pytest.approx(2.0), pytest.approx(2.0), pytest.approx(2.0))
+    assert (twice.on_front, twice.verdict) == (False, "no")
+    half = front(results(many(OURS, base), many("other", 2.0 * base)), "s", WORST)
+    assert half is not None
+    assert (half.on_front, half.verdict) == (True, "yes")
+    noisy_ones = (base * np.exp(0.3 * rng.normal(size=40)) for _ in range(2))
+    alike = front(
+        results(*(many(name, each) for name, each in zip((OURS, "other"), noisy_ones, strict=True))), "s", WORST
+    )
+    assert alike is not None
+    assert alike.low < 1.0 < alike.high
+    assert alike.verdict == "not told apart"
+
+
+def test_where_so_few_solve_a_problem_the_interval_says_so() -> None:
+    """Twelve of twenty: in many draws fewer than half get there, and the ratio is endless; four say nothing."""
+    base = np.full(20, 0.01)
+    ours = [*many(OURS, base)[:12], *(record(OURS, number, 1e-4, 0.01, 0.5) for number in range(12, 20))]
+    found = front(results(ours, many("other", 2.0 * base)), "s", WORST)
+    assert found is not None
+    assert found.ratio == pytest.approx(0.5)
+    assert isinf(found.high)
+    assert found.verdict == "not told apart"
+    few = front(results(many(OURS, base[:4]), many("other", 3.0 * base[:4])), "s", WORST)
+    assert few is not None
+    assert (few.low, few.high, few.verdict) == (0.0, inf, "not told apart")
+
+
 def test_points_are_medians_with_their_spread() -> None:
     points = curve(results(OURS_CURVE), "s", OURS, WORST)
     assert [point.seconds for point in points] == pytest.approx([0.010, 0.020, 0.030])

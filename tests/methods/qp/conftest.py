@@ -9,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.stability.bodies import Builder
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 
 
@@ -57,3 +58,17 @@ def honest(least_distance: Callable[..., float]) -> Callable[..., wb.Solution]:
         return solution
 
     return checked
+
+
+@pytest.fixture(scope="module")
+def two_arms() -> wb.Figure:
+    """A slide that carries two arms of three joints."""
+    builder = Builder("two arms")
+    base = builder.joint("py", "slide")
+    for side, y in (("left", 0.2), ("right", -0.2)):
+        joint, at = base, (0.0, y, 0.0)
+        for kind, name in (("rz", "yaw"), ("ry", "lift"), ("ry", "bend")):
+            joint = builder.joint(kind, f"{side}_{name}", parent=joint, at=at)
+            at = (0.3, 0.0, 0.05)
+        builder.frame(joint, side, at)
+    return builder.figure()

@@ -161,3 +161,24 @@ def test_a_joint_does_not_brake_where_it_has_to_leave_something(method: wb.QP, t
     assert step.q == pytest.approx(0.999, abs=1e-6)
     alone = wb.Problem(wb.Scene(wb.load(path)), start, goals=[wb.Point("ball", (2.0, 0.0, 0.0))], constraints=[limit])
     assert method.tracker(alone, 0.01).step(start).q == pytest.approx(1.0 - 0.005 * np.exp(-0.2), abs=1e-6)
+
+
+def test_a_frame_that_is_asked_for_exactly_is_held_exactly(two_arms: wb.Figure) -> None:
+    """One hand held, the other on a curve; the judgement shares nothing with the tracker."""
+    start = np.array([0.1, 0.3, 0.4, 0.8, -0.2, 0.5, 0.8])
+    scene = wb.Scene(two_arms)
+    centre = np.array(scene.state(start).frame(two_arms.frame_id("right")).translation)
+    worst = {}
+    for tolerance in (None, 1e-8):
+        problem = wb.Problem(scene, start, constraints=[wb.Hold("left", orientation=False)])
+        tracker, q, missed = wb.QP().tracker(problem, 1 / 60), start, []
+        for angle in np.linspace(0.0, 2.0, 60):
+            goal = centre + 0.05 * np.array([np.cos(angle) - 1.0, np.sin(angle), 0.0])
+            problem.retarget([wb.Point("right", goal)])
+            q = tracker.frame(q, tolerance).q
+            judged = wb.assess(problem, q)
+            missed.append((judged.goal_error, judged.constraint_violation))
+        worst[tolerance] = np.max(missed, axis=0)
+    assert (worst[1e-8] < 2e-8).all()
+    assert (worst[None] < 1e-4).all()
+    assert worst[None][1] > 1e-8, "as a drag needs it, holds are not looked at again"

@@ -73,11 +73,11 @@ class Restarted:
         Raises:
             InputError: the method cannot express the problem.
         """
-        began, worked = time.perf_counter(), time.process_time()
+        began, worked = time.perf_counter(), time.thread_time()
         best: Solution = self.method.solve(problem, progress)
         tried, judging = 1, best.assessment.seconds
         further = starts(problem)
-        while not best.solved and time.process_time() - worked < self.seconds:
+        while not best.solved and time.thread_time() - worked < self.seconds:
             start = next(further, None)
             if start is None:
                 break

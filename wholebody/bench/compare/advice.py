@@ -217,7 +217,12 @@ def targets(rows: Sequence[Summary], wall: Sequence[Rival], dependable: Sequence
             f"front of {sum(rival.on_front for rival in wall)} of {len(wall)} charts, and of "
             f"{sum(rival.on_front for rival in dependable)} of {len(dependable)} by the time in which nine problems in "
             f"ten are solved"
-            + (f"; ahead of it in a chart: {', '.join(f'`{name}`' for name in ahead)}." if ahead else ".")
+            + (
+                f"; ahead of it in a chart: {', '.join(f'`{name}`' for name in ahead)}, in "
+                f"{sum(rival.verdict == 'no' for rival in wall)} charts by more than the interval of the ratio."
+                if ahead
+                else "."
+            )
         )
     return said
 

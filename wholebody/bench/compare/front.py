@@ -8,16 +8,22 @@ so that a failure is infinitely slow, and a method that fails in more than half 
 the front of a chart where no other has a smaller t(a) at any accuracy a from 1e-3 down to 1e-8: nobody is both faster
 and as accurate. Two methods are compared on the cases that both were given at all their budgets. Where a method must
 not fail, nine in ten say more than the median: t(a) is then the time in which so many of the cases are solved.
+
+A ratio of such times has the bootstrap's interval, cases drawn with replacement and the same for both. Where it holds 1
+nobody is told apart. It is of the accuracy at which ours does worst, picked by looking, so it errs against ours.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
+from typing import Literal
 
 import numpy as np
 
-from wholebody.bench.compare.results import Quantity, Results, middle
+from wholebody.arrays import Array
+from wholebody.bench.compare.results import Quantity, Results
+from wholebody.bench.compare.statistics import budget_ratio
 
 ACCURACIES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
 """From where an accuracy is worth the name to where coal's distances end."""
@@ -41,6 +47,7 @@ class Rival:
         method: which other method; empty where no other gets to any accuracy.
         accuracy: at which the ratio is greatest.
         ratio: our time over the other's there; up to 1 we are on the front. Infinite where we do not get there.
+        low, high: interval of the ratio.
         ours, other: seconds.
         cases: compared.
     """
@@ -50,6 +57,8 @@ class Rival:
     method: str
     accuracy: float
     ratio: float
+    low: float
+    high: float
     ours: float
     other: float
     cases: int
@@ -58,6 +67,25 @@ class Rival:
     def on_front(self) -> bool:
         """Whether no other method is faster at any accuracy."""
         return self.ratio <= 1.0
+
+    @property
+    def verdict(self) -> Literal["yes", "no", "not told apart"]:
+        """Whether we are on the front, where the interval leaves no doubt."""
+        if not self.method:
+            return "yes" if self.on_front else "no"
+        return "yes" if self.high <= 1.0 else "no" if self.low > 1.0 else "not told apart"
+
+
+def times_to(
+    results: Results, family: str, adapter: str, quantity: Quantity, accuracy: float, cases: frozenset[int]
+) -> Array:
+    """Seconds (budgets, cases) of a method, infinite where it does not get to an accuracy."""
+    rows = [
+        np.where(values <= accuracy, seconds, inf)
+        for level in results.levels(family, adapter)
+        for seconds, values in [results.values(family, adapter, level, quantity, cases)]
+    ]
+    return np.array(rows or [np.full(len(cases), inf)])
 
 
 def time_to(
@@ -70,11 +98,12 @@ def time_to(
     share: float = HALF,
 ) -> float:
     """Seconds of a method to an accuracy; infinite where it gets there in less than that share of the cases."""
-    times = [inf]
-    for level in results.levels(family, adapter):
-        seconds, values = results.values(family, adapter, level, quantity, cases)
-        times.append(middle(np.where(values <= accuracy, seconds, inf), share) if len(seconds) else inf)
-    return min(times)
+    return _least(times_to(results, family, adapter, quantity, accuracy, cases), share)
+
+
+def _least(times: Array, share: float) -> float:
+    """The least over the budgets of a quantile, which is one of the times, of times (budgets, cases)."""
+    return float(np.quantile(times, share, axis=1, method="inverted_cdf").min()) if times.shape[1] else inf
 
 
 def front(results: Results, family: str, quantity: Quantity, share: float = HALF) -> Rival | None:
@@ -82,7 +111,7 @@ def front(results: Results, family: str, quantity: Quantity, share: float = HALF
     own = results.swept(family, OURS)
     if not own:
         return None
-    worst: Rival | None = None
+    worst: tuple[Rival, Array, Array] | None = None
     for other in results.adapters:
         if other == OURS or other.startswith(FAMILY):
             continue
@@ -92,17 +121,21 @@ def front(results: Results, family: str, quantity: Quantity, share: float = HALF
         for accuracy in ACCURACIES:
             if accuracy < quantity.floor:
                 continue
-            there = time_to(results, family, other, quantity, accuracy, cases, share)
+            theirs = times_to(results, family, other, quantity, accuracy, cases)
+            there = _least(theirs, share)
             if there == inf:
                 continue
-            here = time_to(results, family, OURS, quantity, accuracy, cases, share)
-            rival = Rival(family, quantity.name, other, accuracy, here / there, here, there, len(cases))
-            if worst is None or rival.ratio > worst.ratio:
-                worst = rival
+            ours = times_to(results, family, OURS, quantity, accuracy, cases)
+            here = _least(ours, share)
+            rival = Rival(family, quantity.name, other, accuracy, here / there, 0.0, inf, here, there, len(cases))
+            if worst is None or rival.ratio > worst[0].ratio:
+                worst = rival, ours, theirs
     if worst is None:
         here = time_to(results, family, OURS, quantity, ACCURACIES[0], own, share)
-        return Rival(family, quantity.name, "", ACCURACIES[0], 0.0 if here < inf else inf, here, inf, len(own))
-    return worst
+        ratio = 0.0 if here < inf else inf
+        return Rival(family, quantity.name, "", ACCURACIES[0], ratio, ratio, ratio, here, inf, len(own))
+    found = budget_ratio(*worst[1:], share)
+    return replace(worst[0], low=found.low, high=found.high)
 
 
 def fronts(results: Results, share: float = HALF) -> list[Rival]:

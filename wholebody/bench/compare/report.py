@@ -108,7 +108,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
         picked=choices(results, given.rows), targets=targets(given.rows, wall, dependable),
         plain=_plain,
         ranked=standings(results, given.rows), reference=reference(results), error=error, effort=effort,
-        slowness=slowness, rival=_rival, chart=_chart,
+        slowness=slowness, rival=_rival, ratio=_ratio, chart=_chart,
         least=min(counts, default=0), most=max(counts, default=0), few=FEW,
         wall=wall, off=[rival for rival in wall if not rival.on_front], dependable=dependable,
         by_cpu=by_cpu, by_most=by_most, ours=OURS,
@@ -156,7 +156,13 @@ def _rival(rival: Rival | None) -> str:
     """A ratio and the method that it is to, in a cell beside the others."""
     if rival is None or not rival.method:
         return "" if rival is None else "no other" if rival.on_front else "none"
-    return f"{formatted(rival.ratio, '.2g', none='∞')} ({rival.method})"
+    return f"{_ratio(rival)} ({rival.method})"
+
+
+def _ratio(rival: Rival) -> str:
+    """A ratio of times with its interval."""
+    value, low, high = (formatted(number, ".2g", none="∞") for number in (rival.ratio, rival.low, rival.high))
+    return f"{value} [{low}, {high}]"
 
 
 def _anchor(title: str) -> str:

@@ -77,14 +77,26 @@ class Settings:
         return self.cases, self.sweep // MOVING if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
-        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`."""
+        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
+
+        Budgets of first fit are chosen among themselves, as many as their share: the most exact of them is the time to
+        an exact posture where least measures are not asked for.
+        """
         listed = [level for level in adapter.loose if level != DEFAULT and not (moving and level[1] == FIRST_FIT)]
         most = min(self.levels, MOVING_LEVELS) if moving else self.levels
         if len(listed) <= most:
             return listed
-        if most == 1:
-            return listed[:1]
-        return [listed[round(place * (len(listed) - 1) / (most - 1))] for place in range(most)]
+        first = [level for level in listed if level[1] == FIRST_FIT]
+        others = [level for level in listed if level[1] != FIRST_FIT]
+        share = round(most * len(first) / len(listed))
+        return [*_evenly(first, share), *_evenly(others, most - share)]
+
+
+def _evenly(listed: list[Budget], most: int) -> list[Budget]:
+    """So many of them, the first and the last among them; the first where it is one."""
+    if len(listed) <= most:
+        return listed
+    return [listed[round(place * (len(listed) - 1) / max(most - 1, 1))] for place in range(most)]
 
 
 def seed_of(seed: int, number: int) -> int:

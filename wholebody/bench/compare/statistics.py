@@ -122,6 +122,32 @@ def quantile_ratio(one: Array, other: Array, part: float) -> Interval:
     return Interval(float(_run_ratio(one, other, part)), *_ends(drawn), runs * steps)
 
 
+def budget_ratio(one: Array, other: Array, part: float) -> Interval:
+    """A method's time over that of another, each the least over its budgets of a quantile over the problems.
+
+    Problems are drawn with replacement, the same for both. Where neither gets there, nobody is ahead: the ratio is 1.
+
+    Args:
+        one: (budgets, problems) times, infinite where a problem was not solved well enough.
+        other: (its budgets, problems) times for the same problems.
+        part: of the quantile.
+    """
+    count = one.shape[1]
+    value = float(_least_ratio(one[:, None], other[:, None], part)[0])
+    if count < LEAST:
+        return Interval(value, 0.0, inf, count)
+    draws = _draws(count)
+    return Interval(value, *_ends(_least_ratio(one[:, draws], other[:, draws], part)), count)
+
+
+def _least_ratio(one: Array, other: Array, part: float) -> Array:
+    """Ratios (draws,) of the least quantiles of times (budgets, draws, problems)."""
+    place = int(np.quantile(np.arange(one.shape[-1]), part, method="inverted_cdf"))
+    here, there = (np.partition(times, place, axis=-1)[..., place].min(axis=0) for times in (one, other))
+    nobody = np.isinf(here) & np.isinf(there)
+    return np.asarray(np.where(nobody, 1.0, here / np.where(nobody, 1.0, there)))
+
+
 def _run_ratio(one: Array, other: Array, part: float) -> Array:
     """Median over the runs of what a quantile is to the other's (..., runs, steps)."""
     return np.asarray(np.median(np.quantile(one, part, axis=-1) / np.quantile(other, part, axis=-1), axis=-1))

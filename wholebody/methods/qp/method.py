@@ -13,6 +13,7 @@ from wholebody.methods.qp.multistart import Search, Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
+from wholebody.methods.qp.unobstructed import unobstructed
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
@@ -83,6 +84,9 @@ class QP:
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
         """Find a posture; the best of a descent, of another that seeks feasibility first, and of seeded starts.
 
+        A robot of plain joints on a fixed base that is asked for places and rotations alone first goes to its goals as
+        if nothing were in its way. Where nothing is, the descent begins there, or ends there without measures.
+
         The later ones are tried only when the earlier ones did not reach the goals, and within the budget. Never
         raises for a goal out of reach or a start in penetration: the status says so.
 
@@ -97,12 +101,16 @@ class QP:
         began = time.perf_counter()
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
-            search = Search(problem, workspace, self._qp_solver(), settings, control)
-            best = search.run()
-        ending = Ending(
-            best.q, best.converged, search.spent, tuple(search.trace), search.how,
-            contradictions=search.contradictions, programs=search.solver.counted(),
-        )  # fmt: skip
+            met = unobstructed(problem, workspace, self.tolerance, self.iterations, control)
+            if met is not None and not self.measures:
+                ending = Ending(met.q, True, len(met.trace), met.trace, "directly")
+            else:
+                search = Search(problem, workspace, self._qp_solver(), settings, control)
+                best, before = (search.run(), ()) if met is None else (search.run(met.q), met.trace)
+                ending = Ending(
+                    best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
+                    contradictions=search.contradictions, programs=search.solver.counted(),
+                )  # fmt: skip
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _qp_solver(self) -> QPSolver:

@@ -91,9 +91,9 @@ class Search:
         assert self._best is not None
         return self._best
 
-    def run(self) -> LocalSolution:
-        """Try one way after the other until the goals are met; the best that was found."""
-        self._try_ways()
+    def run(self, begin: Array | None = None) -> LocalSolution:
+        """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found."""
+        self._try_ways(begin)
         self._settle()
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than what is asked
@@ -101,9 +101,9 @@ class Search:
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
-    def _try_ways(self) -> None:
+    def _try_ways(self, begin: Array | None) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        first = self._descend(start, full_step=not self.settings.measures, early_exit=True)
+        first = self._descend(start if begin is None else begin, full_step=not self.settings.measures, early_exit=True)
         if self._accept(first, "directly") or self.control.over:
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)

@@ -37,7 +37,7 @@ MIDWAY = 4.0  # times that much and more at the end is too much half way too, wh
 CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
 CUTS = 6  # times that a step is halved before it is given up
 OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
-PROGRAMS = 3  # most of a frame; more = nearer to a goal that turns quickly, dearer frames where it cannot be met
+PROGRAMS = (3, 6)  # most of a frame, and where less than `OF_A_FRAME` is asked for; more = nearer to goals that turn
 BRAKED = 1e-6  # m, rad: what must hold is missed by more where joints brake for their limits: they do not then
 OUT = 5e-5  # m: overlap with what came into the figure that is left; half of what counts as an overlap
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
@@ -164,27 +164,29 @@ class QPTracker(OfOneRun):
 
         Args:
             q: (nq,) posture of the frame before.
-            tolerance: to which the goals of a frame are met, metres and radians; `OF_A_FRAME` where None.
+            tolerance: of the goals, metres and radians, and of holds where it is less than `OF_A_FRAME`, the default.
 
         Raises:
             InputError: as for `step`.
         """
         enough = OF_A_FRAME if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        exact = enough < OF_A_FRAME
         # a bound on speeds is one of the way of a whole frame
-        most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS
-        first, error = self.step(q), np.inf
-        if first.path:
-            return FrameStep(first.q, len(first.path) - 1, first.collisions)
-        here = first.q
+        most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS[exact]
+        last, error, way = self.step(q), np.inf, np.inf
+        if last.path:
+            return FrameStep(last.q, len(last.path) - 1, last.collisions)
         for spent in range(1, most):
-            before, error = error, goal_error(self.problem, self.workspace, here)
-            if error <= enough or error > WORTH * before:
-                return FrameStep(here, spent)
-            there = self.step(here, measures=False).q
-            if not is_free(self.workspace, q, there, SHORT):
+            before, error = error, goal_error(self.problem, self.workspace, last.q)
+            longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
+            # what is held is missed by the square of a step, and each runs ahead of that as the one before was curved
+            curved = exact and max(longest, way) ** 2 > enough
+            if not curved and (error <= enough or error > WORTH * before):
+                return FrameStep(last.q, spent)
+            here, last = last.q, self.step(last.q, measures=False)
+            if not is_free(self.workspace, q, last.q, SHORT):
                 return FrameStep(here, spent + 1)
-            here = there
-        return FrameStep(here, most)
+        return FrameStep(last.q, most)
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, begun at the posture q (nq,)."""
@@ -207,8 +209,7 @@ class QPTracker(OfOneRun):
         workspace, model = self.workspace, self.workspace.model
         q = posture(q, model.nq)
         most = at_speeds(self.problem.bounds, workspace.state.update(q), self.dt)
-        path, steps = [(0.0, q)], list[QPStep]()
-        before = np.inf
+        path, steps, before = [(0.0, q)], list[QPStep](), np.inf
         while True:
             share, here = path[-1]
             if share < 1.0:

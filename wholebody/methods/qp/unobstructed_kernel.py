@@ -1,0 +1,163 @@
+"""A chain of plain joints brought to its goals by damped least squares, as one compiled loop: see `unobstructed`."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.compiled import compiled
+from wholebody.methods.qp.dense_kernel import solve
+from wholebody.residual_kernel import residuals
+from wholebody.term_entries import Integers
+
+
+@compiled(error_model="numpy")
+def reach(
+    parents: Indices,
+    places: Array,
+    turns: Array,
+    slides: Array,
+    support: NDArray[np.int8],
+    tables: Array,
+    entries: Integers,
+    lower: Array,
+    upper: Array,
+    tolerance: float,
+    damping: float,
+    most: int,
+    joints: Array,
+    columns: Array,
+    jacobian: Array,
+    free: Mask,
+    q: Array,
+    trace: Array,
+) -> int:
+    """Step from a posture until the errors of the goals are as small as they get, or the steps are used up.
+
+    Args:
+        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
+        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
+        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
+        slides: (n, 3) axis that it slides along; zero for one that turns.
+        support: (n + 1, n) 1 where a column moves a joint.
+        tables: (e, 36) floats of the goals, as in `term_entries.RESIDUAL`.
+        entries: (e, 7) their integers.
+        lower: (n,) least values of the joints.
+        upper: (n,) greatest values.
+        tolerance: norm of all errors at which the goals are met, metres and radians.
+        damping: squared, of a step at the goals.
+        most: steps.
+        joints: (n + 1, 4, 3) room for the placements of the joints; the first is the world's.
+        columns: (n, 6) room for the columns of the joint Jacobian.
+        jacobian: (rows, n) room for the rows of the goals.
+        free: (n,) room.
+        q: (n,) where to begin; becomes the answer.
+        trace: (most + 1, 2) written: norm of the errors at each posture, and the longest entry of the step to it.
+
+    Returns:
+        How many postures were looked at; the last one is the answer.
+    """
+    rows, size = jacobian.shape
+    wrench, value, right = np.empty((rows, 6)), np.empty(rows), np.empty(rows)
+    system, dq = np.empty((rows, rows)), np.empty(size)
+    longest = 0.0
+    for count in range(most + 1):
+        _place(parents, places, turns, slides, q, joints, columns)
+        wrench[:] = 0.0
+        residuals(tables, entries, joints, wrench, value)
+        square = 0.0
+        for r in range(rows):
+            square += value[r] * value[r]
+        left = np.sqrt(square)
+        trace[count, 0], trace[count, 1] = left, longest
+        met = left <= tolerance
+        if count == most or left == 0.0 or (met and count and left > 0.5 * trace[count - 1, 0]):
+            return count + 1
+        _rows(tables, entries, wrench, support, columns, jacobian)
+        for i in range(size):
+            free[i], dq[i] = True, 0.0
+        held = True
+        while held:  # every round holds one more joint, so the loop ends
+            damped = damping  # as Sugihara 2011: half of the squared error beside the least
+            for r in range(rows):
+                right[r] = -value[r]
+                for i in range(size):
+                    if not free[i]:
+                        right[r] -= jacobian[r, i] * dq[i]
+                damped += 0.5 * right[r] * right[r]
+            for r in range(rows):
+                for s in range(r + 1):
+                    total = 0.0
+                    for i in range(size):
+                        if free[i]:
+                            total += jacobian[r, i] * jacobian[s, i]
+                    system[r, s] = total
+                system[r, r] += damped
+            if not solve(system, right):
+                return count + 1
+            held = False
+            for i in range(size):
+                if free[i]:
+                    dq[i] = 0.0
+                    for r in range(rows):
+                        dq[i] += jacobian[r, i] * right[r]
+            for i in range(size):
+                if free[i] and not lower[i] <= q[i] + dq[i] <= upper[i]:
+                    dq[i] = min(max(dq[i], lower[i] - q[i]), upper[i] - q[i])
+                    free[i], held = False, True
+        longest = 0.0
+        for i in range(size):
+            q[i] = min(max(q[i] + dq[i], lower[i]), upper[i])
+            longest = max(longest, abs(dq[i]))
+    return most + 1
+
+
+@compiled(inner=True, error_model="numpy")
+def _place(
+    parents: Indices, places: Array, turns: Array, slides: Array, q: Array, joints: Array, columns: Array
+) -> None:
+    """Placements of the joints, and the columns of their Jacobian in the world, linear part at its origin first."""
+    axis = np.empty(3)
+    for k in range(len(parents)):
+        base, place, joint, column = joints[parents[k]], places[k], joints[k + 1], columns[k]
+        for i in range(3):
+            joint[3, i] = base[3, i]
+            for m in range(3):
+                joint[3, i] += base[m, i] * place[3, m]
+        for j in range(3):
+            for i in range(3):
+                joint[j, i] = base[0, i] * place[j, 0] + base[1, i] * place[j, 1] + base[2, i] * place[j, 2]
+        for i in range(3):
+            column[i] = joint[0, i] * slides[k, 0] + joint[1, i] * slides[k, 1] + joint[2, i] * slides[k, 2]
+            axis[i] = joint[0, i] * turns[k, 0] + joint[1, i] * turns[k, 1] + joint[2, i] * turns[k, 2]
+        for i in range(3):
+            joint[3, i] += q[k] * column[i]
+        x, y, z = axis[0], axis[1], axis[2]
+        column[3], column[4], column[5] = x, y, z
+        if x != 0.0 or y != 0.0 or z != 0.0:
+            column[0] += joint[3, 1] * z - joint[3, 2] * y
+            column[1] += joint[3, 2] * x - joint[3, 0] * z
+            column[2] += joint[3, 0] * y - joint[3, 1] * x
+            cosine, sine = np.cos(q[k]), np.sin(q[k])
+            for j in range(3):  # Rodrigues
+                a, b, c = joint[j, 0], joint[j, 1], joint[j, 2]
+                along = (1.0 - cosine) * (x * a + y * b + z * c)
+                joint[j, 0] = cosine * a + sine * (y * c - z * b) + along * x
+                joint[j, 1] = cosine * b + sine * (z * a - x * c) + along * y
+                joint[j, 2] = cosine * c + sine * (x * b - y * a) + along * z
+
+
+@compiled(inner=True)
+def _rows(
+    tables: Array, entries: Integers, wrench: Array, support: NDArray[np.int8], columns: Array, jacobian: Array
+) -> None:
+    """Rows of the goals: the rates at which their wrenches work on the motion of a joint relative to another."""
+    for e in range(len(tables)):
+        for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
+            for k in range(len(columns)):
+                moved = support[entries[e, 1], k] - support[entries[e, 2], k]
+                jacobian[r, k] = 0.0
+                if moved != 0:
+                    for i in range(6):
+                        jacobian[r, k] += moved * wrench[r, i] * columns[k, i]
