@@ -6,7 +6,7 @@ contacts. Terms of other classes join through their own methods, and cost only t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import lru_cache
 from math import sqrt
@@ -196,7 +196,7 @@ class Lineariser:
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
         """
-        contacts, clearance, count = self._contacts(q, within)
+        contacts, clearance, count = self._contacts(self.workspace.near, q, within)
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         value, jacobian = np.empty(rows), np.empty((rows + count, nv))
         squares = np.empty((self._plan.squares, nv))
@@ -221,7 +221,7 @@ class Lineariser:
         Raises:
             InputError: as for `at`.
         """
-        contacts, clearance, count = self._contacts(q, within)
+        contacts, clearance, count = self._contacts(self.workspace.passing, q, within)
         if self._passing is None or len(self._passing.jacobian) < len(self._passing.value) + count:
             self._passing = self._made()
         room = self._passing
@@ -241,14 +241,15 @@ class Lineariser:
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
 
-    def _contacts(self, q: Array, within: float) -> tuple[Contacts, Array, int]:
-        """Contacts at a posture, the clearance asked of each, and how many rows were written of them."""
-        workspace = self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance, self._most)
+    def _contacts(
+        self, near: Callable[[Array, float, Array | None], Contacts], q: Array, within: float
+    ) -> tuple[Contacts, Array, int]:
+        """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
+        contacts = near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
         if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
-        count = workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
         return contacts, clearance, count
 
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:

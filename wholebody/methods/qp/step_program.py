@@ -162,12 +162,12 @@ class StepProgram:
 
     def rows(self, at: Passing) -> Rows:
         """The rows of the last program; overwritten by the next."""
-        n, k, ends = self._variables, self._elastic, self._ends()
-        labels = self._integers[: 2 * k].reshape(2, k)
+        k, first = self._elastic, self._first_elastic
+        after = first + k * self._variables
         return Rows(
             self._soft_rows, self._soft_values[0], self._soft_values[1], self.goals,
-            self._floats[ends[6] : ends[7]].reshape(k, n), self._floats[ends[7] : ends[8]], labels[0],
-            self._subproblem.one_sided + len(at.contacts.distance), labels[1],
+            self._floats[first:after].reshape(k, self._variables), self._floats[after : after + k], self._integers[:k],
+            self._subproblem.one_sided + len(at.contacts.distance), self._integers[k : 2 * k],
         )  # fmt: skip
 
     def program(self) -> QuadraticProgram:
@@ -260,7 +260,7 @@ class StepProgram:
         self._x, self._target = floats[:n], floats[ends[2] : ends[3]]
         self._soft_values = floats[ends[3] : ends[4]].reshape(2, m)
         self._entries = floats[ends[4] : ends[5]].reshape(4, n)
-        self._soft_rows = floats[ends[5] : ends[6]].reshape(m, n)
+        self._soft_rows, self._first_elastic = floats[ends[5] : ends[6]].reshape(m, n), ends[6]
 
 
 def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[Constraint], NDArray[np.intp]]:

@@ -9,6 +9,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import solve_growing, work_size
+from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.subproblem_kernel import motion, program, sort_rows
 
 Ends: TypeAlias = tuple[int, int, int, int, int, int, int, int, int, int, int, int]
@@ -155,9 +156,7 @@ def solve(
             count += 1
     left = 0.0
     for r in range(m):
-        gone = 0.0
-        for i in range(n):
-            gone += soft[r, i] * x[i]
+        gone = dot(soft[r], x)
         after[last + r] = soft_values[0, r] + gone
         if r < goals:
             left += (gone - target[r]) ** 2
@@ -165,9 +164,7 @@ def solve(
     after[last + m], after[last + m + 1] = left, 1.0
     spare, missed = np.inf, 0.0
     for j in range(k):
-        ahead = -violated[j]
-        for i in range(n):
-            ahead += elastic[j, i] * x[i]
+        ahead = dot(elastic[j], x) - violated[j]
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
@@ -227,9 +224,7 @@ def run_ahead(
     largest = 0.0
     for r in range(goals, len(error)):
         foreseen = min(max(error[r] - before[last + r], -most), most) if known else 0.0
-        curved = there[r - goals] - asked[r - goals] - error[r]
-        for i in range(len(x)):
-            curved -= soft[r, i] * x[i]
+        curved = there[r - goals] - asked[r - goals] - error[r] - dot(soft[r], x)
         largest = max(largest, abs(min(max(curved, -most), most) - foreseen))
         before[last + r] = error[r] - curved
     return largest > straight
