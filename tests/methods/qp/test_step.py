@@ -213,7 +213,7 @@ def test_a_tracker_is_kept_from_step_to_step(planar_arm):
 
 
 def test_answers_of_steps_are_kept_when_the_next_step_comes(planar_arm):
-    scene = wb.Scene(planar_arm()).add(wb.Sphere(0.1), name="ball", at=(0.3, 0.5, 0.0))
+    scene = wb.Scene(planar_arm((0.4, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.3, 0.5, 0.0))
     problem = wb.Problem(scene, goals=[wb.Point("tip", (0.3, 0.4, 0.0))])
     tracker, q = wb.QP().tracker(problem, 0.01), problem.start
     steps, copies = [], []
