@@ -63,6 +63,7 @@ class Answer(NamedTuple):
         spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
             negative infinite where it is not known.
         missed: largest violation of an elastic row after the displacement, metres or radians, to first order.
+        asked: least clearance asked of a contact, metres; infinite without contacts.
         exact: see `QPSolution`, like the next two.
         iterations: of the solver.
         by: what closed the program.
@@ -74,6 +75,7 @@ class Answer(NamedTuple):
     worst: float
     spare: float
     missed: float
+    asked: float
     exact: bool
     iterations: int
     by: str
@@ -213,7 +215,7 @@ class StepProgram:
         if 5 * k > len(self._integers):
             self._grow(2 * k)
         held = working.held if working.hot else self._unknown
-        solved, count, motion, turn, worst, spare, missed, damping, asked = self._kernel.solve(
+        solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
             self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
             workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
@@ -223,7 +225,7 @@ class StepProgram:
         if solved:
             working.pushing = self._integers[2 * k : 2 * k + count].copy()
             by = working.solver.count([ACTIVE_SET])
-            return Answer(self._x, motion, turn, worst, spare, missed, True, 0, by), damping, asked
+            return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
         rows = self.rows(at)
         answer = working.solve(self.program(), rows.key)
         motion, turn = self.motion(at, answer.x)
@@ -232,7 +234,7 @@ class StepProgram:
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
         answered = (answer.exact, answer.iterations, answer.by)
-        return Answer(answer.x, motion, turn, worst, spare, missed, *answered), damping, asked
+        return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
     def _foresee(self, at: Passing, displacement: Array) -> bool:
         """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.

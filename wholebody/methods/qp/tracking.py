@@ -19,7 +19,7 @@ from wholebody.methods.qp.escaping import WITHIN, Barriers, barriers, free_end
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
-from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, unseen_by_rows
+from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
 from wholebody.pool import OneAtATime
@@ -272,7 +272,9 @@ class QPTracker(OfOneRun):
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
-            bent = self._turning.bent(at, program.rows(at), displacement, curved)
+            bent = (
+                self._turning.bent(at, program.rows(at), displacement) if curved > least_unseen(answer.asked) else 0.0
+            )
             if bent > 0.0:
                 displacement, share, following = self._looked_after(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)

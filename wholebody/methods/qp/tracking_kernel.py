@@ -44,7 +44,7 @@ def solve(
     measures: bool,
     hot: bool,
     least_damping: float,
-) -> tuple[bool, int, float, float, float, float, float, float, float]:
+) -> tuple[bool, int, float, float, float, float, float, float, float, float]:
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
@@ -80,7 +80,7 @@ def solve(
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
         violation of an elastic row; least room that a contact row has after the step, and largest violation of an
-        elastic row then; the damping, and what the answer asks for.
+        elastic row then; least clearance asked of a contact; the damping, and what the answer asks for.
     """
     n, goals = box.shape[1], len(share)
     equal, one_sided = 0, 0
@@ -129,12 +129,15 @@ def solve(
         measure[0][:n], measure[1][:n], box[0], box[1], soft_values[0], soft_values[1], goals, violated, shift,
         measures, numbers[4] > 0.0, numbers[:10], entries, target, least,
     )  # fmt: skip
+    least_asked = np.inf
+    for c in range(len(number)):
+        least_asked = min(least_asked, clearance[c])
     worst = 0.0
     for j in range(k):
         elastic_weight[j] = numbers[12]
         worst = max(worst, violated[j])
     if not hot:
-        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
     for i in range(n):
         at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = solve_growing(
@@ -142,7 +145,7 @@ def solve(
         labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[18:24], work, places, x,
     )  # fmt: skip
     if rounds < 0:
-        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
     for i in range(n):
         held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = 0
@@ -176,7 +179,7 @@ def solve(
         spread, columns, joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
         joints[len(joints) - pieces :], placement, reach,
     )  # fmt: skip
-    return True, count, way, turn, worst, spare, missed, damping, asked
+    return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled()

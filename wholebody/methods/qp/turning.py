@@ -39,14 +39,13 @@ class Turning:
         self._point = np.array([len(own) == 1 for own in points], dtype=bool)
         self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
 
-    def bent(self, at: Passing, rows: Rows, displacement: Array, curved: float) -> float:
+    def bent(self, at: Passing, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
 
         Args:
             at: where the step begins, and the workspace's state is.
             rows: of its program.
             displacement: (nv,) of the step.
-            curved: metres by which any pair can be nearer than its rows say, roughly.
 
         Returns:
             0 where every pair keeps its distance to that, and more than 1 where one may not.
@@ -56,7 +55,7 @@ class Turning:
         share: float = self._kernel.bent(
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
             self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
-            at.clearance[:count], curved, displacement, rows.elastic, rows.elastic_violation, rows.contact,
+            at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
             rows.contacts - count, self._lengths,
         )  # fmt: skip
         return share
@@ -71,9 +70,14 @@ def compiled_kernel() -> Any:
     turning_kernel.bent(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
         np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
-        np.zeros((0, 3)), none, 0.0, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
+        np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
     )  # fmt: skip
     return turning_kernel
+
+
+def least_unseen(asked: float) -> float:
+    """The least of `unseen_by_rows` where at least this distance is asked of all contacts."""
+    return min(max(asked, INSIDE), UNSEEN)
 
 
 def unseen_by_rows(asked: Array) -> Array:

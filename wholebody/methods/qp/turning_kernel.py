@@ -23,7 +23,6 @@ def bent(
     distance: Array,
     normal: Array,
     asked: Array,
-    curved: float,
     step: Array,
     elastic: Array,
     violation: Array,
@@ -53,7 +52,6 @@ def bent(
         distance: (k,) of the contacts.
         normal: (k, 3) from the first piece of each to the second.
         asked: (k,) clearances.
-        curved: by which any pair can be nearer than its rows say, roughly: nothing is looked at where all may.
         step: (nv,) the displacement.
         elastic: (r, nv) elastic rows.
         violation: (r,) what they are violated by before it.
@@ -63,11 +61,6 @@ def bent(
             witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
             by how many radians its normal may be off; least and largest that is unseen.
     """
-    least = np.inf
-    for c in range(len(asked)):
-        least = min(least, asked[c])
-    if not curved > min(max(least, lengths[4]), lengths[5]):
-        return 0.0
     joints = len(parents)
     twist, change = np.zeros((joints, 6)), np.zeros((joints, 6))
     own = np.zeros((joints, 6))
