@@ -300,8 +300,22 @@ class Lineariser:
                 part = np.atleast_1d(part)
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
-            dense = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else derivative
-            jacobian[row : row + rows] = dense
+            if isinstance(derivative, Wrench):
+                self._write_rows(derivative, jacobian[row : row + rows])
+            else:
+                jacobian[row : row + rows] = derivative
+
+    def _write_rows(self, wrench: Wrench, rows: Array) -> None:
+        """Write the rows (m, nv) of a wrench."""
+        joint, against, last = int(wrench.joint), int(wrench.against), self.state.model.njoints - 1
+        if not (0 <= joint <= last and 0 <= against <= last):
+            raise InputError(f"a Wrench is of the joints {joint} and {against}; give indices from 0 to {last}")
+        wrenches = np.ascontiguousarray(wrench.rows, dtype=float)
+        if wrenches.shape != (len(rows), 6):
+            raise InputError(f"the rows of a Wrench have shape {wrenches.shape}; give ({len(rows)}, 6)")
+        self._kernel.wrench_rows(
+            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
+        )
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
@@ -354,5 +368,8 @@ def compiled_kernel() -> Any:
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
         _NO_WRENCHES, _NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
         np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
+    )  # fmt: skip
+    term_kernel.wrench_rows(
+        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
     )  # fmt: skip
     return term_kernel

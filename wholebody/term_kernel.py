@@ -181,6 +181,20 @@ def linearise(
         )  # fmt: skip
 
 
+@compiled(error_model="numpy")
+def wrench_rows(
+    wrench: Array, joint: int, against: int, columns: Array, integers: Integers, layout: Integers, rows: Array
+) -> None:
+    """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another.
+
+    `columns`, `integers` and `layout` are as for `linearise`.
+    """
+    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
+    rows[:] = 0.0
+    for r in range(len(wrench)):
+        _row(wrench[r], joint, against, columns, bodies, column, rows[r])
+
+
 @compiled(inner=True)
 def _row(
     wrench: Array, joint: int, against: int, columns: Array, bodies: Integers, column: Integers, row: Array
