@@ -37,6 +37,7 @@ class Turning:
              for own, reach in zip(points, table.reach, strict=True)]
         ).reshape(-1)  # fmt: skip
         self._point = np.array([len(own) == 1 for own in points], dtype=bool)
+        self._twists = np.empty((3, workspace.model.njoints, 6))
         self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
 
     def bent(self, at: Passing, rows: Rows, displacement: Array) -> float:
@@ -56,7 +57,7 @@ class Turning:
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
             self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
             at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
-            rows.contacts - count, self._lengths,
+            rows.contacts - count, self._lengths, self._twists,
         )  # fmt: skip
         return share
 
@@ -71,6 +72,7 @@ def compiled_kernel() -> Any:
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
         np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
         np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
+        np.zeros((3, 1, 6)),
     )  # fmt: skip
     return turning_kernel
 

@@ -29,6 +29,7 @@ def bent(
     contact: Indices,
     first: int,
     lengths: Array,
+    twists: Array,
 ) -> float:
     """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
 
@@ -60,10 +61,11 @@ def bent(
         lengths: room within which a pair counts, in times of what it may be nearer by; how much farther than the
             witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
             by how many radians its normal may be off; least and largest that is unseen.
+        twists: (3, njoints, 6) room.
     """
     joints = len(parents)
-    twist, change = np.zeros((joints, 6)), np.zeros((joints, 6))
-    own = np.zeros((joints, 6))
+    twists[:] = 0.0
+    twist, change, own = twists[0], twists[1], twists[2]
     for c in range(len(columns)):
         for i in range(6):
             own[column_joint[c], i] += columns[c, i] * displacement[c]
