@@ -109,6 +109,7 @@ class StepProgram:
         self._holds = ConstraintValues(holding, state)
         self._asked = self._subproblem.bound[0, self._held]
         self._there = State(state.model)
+        self._twist = np.empty((state.model.njoints, 6))
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
         self._joints = np.concatenate(
@@ -199,7 +200,7 @@ class StepProgram:
         state, table = self._workspace.state, self._workspace.table
         way, turn = self._motion(
             state.spread(displacement), state.columns, state.column_joint, state.parents, table.joint,
-            at.contacts.placements, table.reach,
+            at.contacts.placements, table.reach, self._twist,
         )  # fmt: skip
         return way, turn
 
@@ -218,8 +219,8 @@ class StepProgram:
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
             self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
-            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
-            self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
+            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._twist,
+            self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
         )  # fmt: skip
         self._settled = solved
         if solved:
@@ -310,7 +311,7 @@ def compiled_kernel() -> Any:
     tracking_kernel.solve(
         none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
         np.zeros(2), index, np.zeros((2, 0)), none, np.zeros((2, 1), dtype=bool), index, np.zeros((1, 6)),
-        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), index,
+        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros((1, 6)), np.zeros(ends[-1]), index,
         np.zeros(2, dtype=bool), numbers_of(1.0, 1.0), True, False, 0.0,
     )  # fmt: skip
     ahead = np.zeros((2, 0))

@@ -37,6 +37,7 @@ def solve(
     joints: Indices,
     placement: Array,
     reach: Array,
+    twist: Array,
     floats: Array,
     integers: Indices,
     masks: Mask,
@@ -69,6 +70,7 @@ def solve(
         joints: place in the tangent and joint of each column, parents of the joints, joints of the pieces.
         placement: (pieces, 4, 3) see `subproblem_kernel.motion`.
         reach: (pieces,).
+        twist: (njoints, 6) room.
         floats: room, which `parts` lays out.
         integers: room for 5 k: labels and keys of the elastic rows, the keys of those that push, places.
         masks: room for 2 n + 2 k.
@@ -177,7 +179,7 @@ def solve(
         spread[c] = x[joints[c]]
     way, turn = motion(
         spread, columns, joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
-        joints[len(joints) - pieces :], placement, reach,
+        joints[len(joints) - pieces :], placement, reach, twist,
     )  # fmt: skip
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
