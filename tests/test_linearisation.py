@@ -8,8 +8,9 @@ import pytest
 
 import wholebody as wb
 from tests.reference.linearisation import ReferenceLineariser
+from wholebody.figures.state import Wrench
 from wholebody.linearisation import ConstraintValues
-from wholebody.tasks.base import Goal, Measure
+from wholebody.tasks.base import Goal, Measure, filled
 from wholebody.term_plan import make_plan
 
 
@@ -25,6 +26,26 @@ class Squared(Goal):
         return row
 
 
+class Apart(Goal):
+    """A goal with a wrench between two bodies: half the squared distance of two frames' origins."""
+
+    def __init__(self, first, second):
+        self.first, self.second, self.ids = first, second, None
+
+    def resolve(self, scene, start):
+        frames = [scene.figure.frame_id(name) for name in (self.first, self.second)]
+        return filled(self, ids=frames)
+
+    def error(self, state):
+        way = state.frame(self.ids[0]).translation - state.frame(self.ids[1]).translation
+        return np.array([0.5 * way @ way])
+
+    def jacobian(self, state):
+        place, other = (state.frame(frame).translation for frame in self.ids)
+        joints = [int(state.model.frames[frame].parentJoint) for frame in self.ids]
+        return Wrench([[*(place - other), *np.cross(place, place - other)]], *joints)
+
+
 @pytest.fixture(scope="module")
 def problem():
     scene = wb.Scene(wb.load("human"))
@@ -37,6 +58,7 @@ def problem():
         goals=[
             wb.Point("right_index_tip", (0.5, -0.2, 1.0)),
             Squared(),
+            Apart("right_index_tip", "left_palm"),
             wb.Frame("left_palm", (0.4, 0.3, 1.0, 0.0, 0.0, 0.0, 1.0)),
             wb.CenterOfMass((0.0, 0.0, 1.0)),
             wb.Relative("left_palm", "right_palm", (0.3, 0.0, 0.0)),
@@ -82,6 +104,30 @@ def test_goals_constraints_and_measures(problem, seed):
         assert at.value_jacobian[:, k] == pytest.approx(slope, abs=2e-6)
         slope = (ahead.measure - behind.measure) / (2 * step)
         assert at.gradient[k] == pytest.approx(slope, rel=1e-5, abs=1e-5)
+
+
+def test_wrenches_of_joints_that_there_are_not_and_of_other_shapes_are_refused(problem):
+    tip = problem.scene.frame_id("right_index_tip")
+
+    class Odd(Goal):
+        wrench = Wrench(np.zeros((1, 6)), 1)
+
+        def error(self, state):
+            return state.frame(tip).translation[:1]
+
+        def jacobian(self, state):
+            return self.wrench
+
+    odd = wb.Problem(problem.scene, goals=[goal := Odd()])
+    lineariser = odd.lineariser(odd.workspace())
+    lineariser.at(odd.start, 0.1)
+    for wrong in (-1, problem.scene.model.njoints):
+        goal.wrench = Wrench(np.zeros((1, 6)), wrong)
+        with pytest.raises(wb.InputError, match="give indices from 0 to"):
+            lineariser.at(odd.start, 0.1)
+    goal.wrench = Wrench(np.zeros((1, 5)), 1)
+    with pytest.raises(wb.InputError, match=r"have shape \(1, 5\)"):
+        lineariser.at(odd.start, 0.1)
 
 
 def test_values_of_some_constraints_are_their_own(problem):
@@ -367,7 +413,8 @@ def test_joints_that_follow_others_and_round_joints(tmp_path):
         wanted = pin.integrate(figure.model, figure.neutral, 0.8 * np.ones(figure.model.nv))
         asked = wb.Problem(
             scene,
-            goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4)), wb.Posture(wanted)],
+            goals=[wb.Frame("l4", (0.1, 0.2, 0.8)), wb.CenterOfMass((0.1, 0.0, 0.4)), wb.Posture(wanted)]
+            + [Apart("l4", "l2")],
             measures=[wb.Effort(), wb.Displacement(), wb.Discomfort(), wb.PotentialEnergy(0.3)],
         )
         lineariser, plain = asked.lineariser(asked.workspace()), reference(asked, asked.workspace())

@@ -6,7 +6,7 @@ contacts. Terms of other classes join through their own methods, and cost only t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from functools import lru_cache
 from math import sqrt
@@ -201,7 +201,7 @@ class Lineariser:
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
         """
-        contacts, clearance, count = self._contacts(q, within)
+        contacts, clearance, count = self._contacts(self.workspace.near, q, within)
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         value, jacobian = np.empty(rows), np.empty((rows + count, nv))
         squares = np.empty((self._plan.squares, nv))
@@ -226,7 +226,7 @@ class Lineariser:
         Raises:
             InputError: as for `at`.
         """
-        contacts, clearance, count = self._contacts(q, within)
+        contacts, clearance, count = self._contacts(self.workspace.passing, q, within)
         if self._passing is None or len(self._passing.jacobian) < len(self._passing.value) + count:
             self._passing = self._made()
         room = self._passing
@@ -246,14 +246,15 @@ class Lineariser:
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
 
-    def _contacts(self, q: Array, within: float) -> tuple[Contacts, Array, int]:
-        """Contacts at a posture, the clearance asked of each, and how many rows were written of them."""
-        workspace = self.workspace
-        contacts = workspace.near(q, within + self._largest_clearance, self._most)
+    def _contacts(
+        self, near: Callable[[Array, float, Array | None], Contacts], q: Array, within: float
+    ) -> tuple[Contacts, Array, int]:
+        """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
+        contacts = near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
         if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
-        count = workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
         return contacts, clearance, count
 
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
@@ -304,8 +305,22 @@ class Lineariser:
                 part = np.atleast_1d(part)
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
-            dense = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else derivative
-            jacobian[row : row + rows] = dense
+            if isinstance(derivative, Wrench):
+                self._write_rows(derivative, jacobian[row : row + rows])
+            else:
+                jacobian[row : row + rows] = derivative
+
+    def _write_rows(self, wrench: Wrench, rows: Array) -> None:
+        """Write the rows (m, nv) of a wrench."""
+        joint, against, last = int(wrench.joint), int(wrench.against), self.state.model.njoints - 1
+        if not (0 <= joint <= last and 0 <= against <= last):
+            raise InputError(f"a Wrench is of the joints {joint} and {against}; give indices from 0 to {last}")
+        wrenches = np.ascontiguousarray(wrench.rows, dtype=float)
+        if wrenches.shape != (len(rows), 6):
+            raise InputError(f"the rows of a Wrench have shape {wrenches.shape}; give ({len(rows)}, 6)")
+        self._kernel.wrench_rows(
+            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
+        )
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
@@ -358,5 +373,8 @@ def compiled_kernel() -> Any:
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
         _NO_WRENCHES, _NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
         np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
+    )  # fmt: skip
+    term_kernel.wrench_rows(
+        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
     )  # fmt: skip
     return term_kernel

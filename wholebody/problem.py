@@ -268,9 +268,8 @@ class Problem(checks.Settled):
         asked, count = self.clearances, len(self.scene.built.table.pairs)
         if asked.shape != (count,):
             raise InputError(f"clearances have shape {asked.shape}; give one for each of the {count} pairs")
-        good = (asked >= 0.0) & (asked <= LARGEST_CLEARANCE)
-        if not good.all():
-            wrong = int(np.argmin(good))
+        if count and not (np.minimum.reduce(asked) >= 0.0 and np.maximum.reduce(asked) <= LARGEST_CLEARANCE):
+            wrong = int(np.argmin((asked >= 0.0) & (asked <= LARGEST_CLEARANCE)))
             raise InputError(
                 f"clearances[{wrong}] is {asked[wrong]}; give numbers between 0 and {LARGEST_CLEARANCE:g} m"
             )

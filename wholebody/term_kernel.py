@@ -108,13 +108,17 @@ def linearise(
     jacobian[:terms] = 0.0
     wrench[:] = 0.0
     residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
-    planes(_floats(floats, layout, PLANE), _integers(integers, layout, PLANE), joints, wrench, value)
-    axis_errors(_floats(floats, layout, AXIS), _integers(integers, layout, AXIS), joints, wrench, value)
-    cones(
-        _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints, wrench,
-        value,
-    )  # fmt: skip
-    twists(_floats(floats, layout, TWIST), _integers(integers, layout, TWIST), joints, wrench, value)
+    if layout[PLANE, 1]:
+        planes(_floats(floats, layout, PLANE), _integers(integers, layout, PLANE), joints, wrench, value)
+    if layout[AXIS, 1]:
+        axis_errors(_floats(floats, layout, AXIS), _integers(integers, layout, AXIS), joints, wrench, value)
+    if layout[CONE, 1]:
+        cones(
+            _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints,
+            wrench, value,
+        )  # fmt: skip
+    if layout[TWIST, 1]:
+        twists(_floats(floats, layout, TWIST), _integers(integers, layout, TWIST), joints, wrench, value)
     for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
         entries = _integers(integers, layout, table)
         for e in range(len(entries)):
@@ -131,17 +135,22 @@ def linearise(
             centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY), bodies, column, joints,
             columns, value, jacobian,
         )  # fmt: skip
-    coordinates(
-        _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
-    )  # fmt: skip
-    turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
-    roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
-    coupled_ranges(
-        _floats(floats, layout, COUPLED), _integers(integers, layout, COUPLED), q, value, jacobian
-    )  # fmt: skip
-    elliptic_ranges(
-        _floats(floats, layout, ELLIPSE), _integers(integers, layout, ELLIPSE), q, value, jacobian
-    )  # fmt: skip
+    if layout[COORDINATE, 1]:
+        coordinates(
+            _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
+        )  # fmt: skip
+    if layout[TURN, 1]:
+        turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
+    if layout[ROOT, 1]:
+        roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
+    if layout[COUPLED, 1]:
+        coupled_ranges(
+            _floats(floats, layout, COUPLED), _integers(integers, layout, COUPLED), q, value, jacobian
+        )  # fmt: skip
+    if layout[ELLIPSE, 1]:
+        elliptic_ranges(
+            _floats(floats, layout, ELLIPSE), _integers(integers, layout, ELLIPSE), q, value, jacobian
+        )  # fmt: skip
     _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
     constant = _floats(floats, layout, CURVATURE)
     for v in range(nv):
@@ -155,17 +164,35 @@ def linearise(
         _integers(integers, layout, DISCOMFORT), q, measure,
     )  # fmt: skip
     root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
-    rhythms(
-        _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
-        _integers(integers, layout, LUMBAR), q, measure, squares,
-    )  # fmt: skip
-    balls(
-        _floats(floats, layout, BALL), _integers(integers, layout, BALL), q, measure, squares,
-        layout[ELEVATION, 1] + layout[LUMBAR, 1],
-    )  # fmt: skip
-    heights(
-        _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column, measure
-    )  # fmt: skip
+    if layout[ELEVATION, 1] + layout[LUMBAR, 1]:
+        rhythms(
+            _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
+            _integers(integers, layout, LUMBAR), q, measure, squares,
+        )  # fmt: skip
+    if layout[BALL, 1]:
+        balls(
+            _floats(floats, layout, BALL), _integers(integers, layout, BALL), q, measure, squares,
+            layout[ELEVATION, 1] + layout[LUMBAR, 1],
+        )  # fmt: skip
+    if layout[HEIGHT, 1]:
+        heights(
+            _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column,
+            measure,
+        )  # fmt: skip
+
+
+@compiled(error_model="numpy")
+def wrench_rows(
+    wrench: Array, joint: int, against: int, columns: Array, integers: Integers, layout: Integers, rows: Array
+) -> None:
+    """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another.
+
+    `columns`, `integers` and `layout` are as for `linearise`.
+    """
+    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
+    rows[:] = 0.0
+    for r in range(len(wrench)):
+        _row(wrench[r], joint, against, columns, bodies, column, rows[r])
 
 
 @compiled(inner=True)

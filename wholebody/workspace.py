@@ -143,6 +143,10 @@ class Workspace(OfOneRun):
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
         return self.proximity.query(self.state.update(q), within, most)
 
+    def passing(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+        """What `near` returns, in arrays that the next call of this overwrites."""
+        return self.proximity.passing(self.state.update(q), within, most)
+
     def largest_approach(self, most: Array) -> Array:
         """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
 

@@ -70,7 +70,8 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
             proximity = Proximity(scene.pair_table) if k == 0 else used
-            found = proximity.query(scene.state(q), within)
+            ask = proximity.passing if k % 2 else proximity.query
+            found = ask(scene.state(q), within)
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
             seen["inside"] += int((found.distance < 0.0).sum())
@@ -137,6 +138,20 @@ def test_answers_are_kept_when_the_next_question_comes(free_bodies):
     scene.contacts(q, 1.0)
     for part, copy in zip(first, copies, strict=True):
         assert np.array_equal(part, copy)
+
+
+def test_answers_in_passing_are_overwritten_and_take_no_memory(free_bodies):
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Box((0.1, 0.1, 0.1))))
+    workspace, q = scene.workspace(), scene.figure.neutral
+    first, kept = workspace.passing(q, 1.0), workspace.near(q, 1.0)
+    for part, again in zip(first, kept, strict=True):
+        assert np.array_equal(part, again)
+    q[7:10] = 0.2, 0.1, 0.0
+    second = workspace.passing(q, 1.0)
+    for before, after, same in zip(first, second, kept, strict=True):
+        assert np.shares_memory(before, after)
+        assert not np.shares_memory(after, same)
+    assert second.distance[0] != kept.distance[0]
 
 
 @pytest.mark.parametrize(
@@ -307,6 +322,7 @@ def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step)
         before = workspace.proximity.asked
         found = workspace.near(q, 0.04)
         asked.append(workspace.proximity.asked - before)
+        assert sum(workspace.proximity.results.activeCollisionPairs) == asked[-1]  # and coal is asked for no other
         wanted = {pair: row[0] for pair, row in asked_one_by_one(scene, q).items() if row[0] < 0.04}
         assert {pair for pair, distance in wanted.items() if distance < 0.04 - 1e-5} <= {
             *map(tuple, found.pair.tolist())

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
@@ -169,25 +168,29 @@ def gather(
 
 
 @compiled(inner=True)
-def mark(active: NDArray[np.bool_], pairs: Indices, marked: Indices, before: int, index: Indices, count: int) -> bool:
-    """Set the entries (first, second) of the pairs ``index[:count]`` in a matrix that has those of ``marked[:before]``.
-
-    Both become the same pairs.
+def renew(marked: Indices, before: int, index: Indices, count: int, changed: Indices) -> tuple[int, int]:
+    """Make ``marked[:before]`` the same pairs as ``index[:count]``, both in ascending order.
 
     Returns:
-        Whether they were others before.
+        How many pairs are marked no longer, and how many newly; they go to the front of `changed`, in this order.
     """
-    same = before == count
+    gone, came, k = 0, 0, 0
+    for m in range(before):
+        while k < count and index[k] < marked[m]:
+            k += 1
+        if k == count or index[k] != marked[m]:
+            changed[gone] = marked[m]
+            gone += 1
+    m = 0
     for k in range(count):
-        same = same and marked[k] == index[k]
-    if same:
-        return False
-    for k in range(before):
-        active[pairs[marked[k], 0], pairs[marked[k], 1]] = False
+        while m < before and marked[m] < index[k]:
+            m += 1
+        if m == before or marked[m] != index[k]:
+            changed[gone + came] = index[k]
+            came += 1
     for k in range(count):
         marked[k] = index[k]
-        active[pairs[index[k], 0], pairs[index[k], 1]] = True
-    return True
+    return gone, came
 
 
 @compiled()
@@ -203,15 +206,16 @@ def look(
     within: float,
     most: Array,
     index: Indices,
-    active: NDArray[np.bool_],
     marked: Indices,
     before: int,
-) -> tuple[int, bool]:
-    """`travel`, `cull` and, where there is room in `marked`, `mark`.
+    changed: Indices,
+) -> tuple[int, int, int]:
+    """`travel`, `cull` and `renew`.
 
     Returns:
-        How many pairs may be near, and whether they are others than those that were marked.
+        How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
     travel(placement, last, reach, travelled)
     count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
-    return count, len(marked) > 0 and count > 0 and mark(active, pairs, marked, before, index, count)
+    gone, came = renew(marked, before, index, count, changed)
+    return count, gone, came

@@ -212,6 +212,20 @@ def test_a_tracker_is_kept_from_step_to_step(planar_arm):
     assert {"active set"} in closed[1:]
 
 
+def test_answers_of_steps_are_kept_when_the_next_step_comes(planar_arm):
+    scene = wb.Scene(planar_arm((0.4, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.3, 0.5, 0.0))
+    problem = wb.Problem(scene, goals=[wb.Point("tip", (0.3, 0.4, 0.0))])
+    tracker, q = wb.QP().tracker(problem, 0.01), problem.start
+    steps, copies = [], []
+    for _ in range(5):
+        steps.append(tracker.step(q))
+        copies.append([np.array(part) for part in steps[-1][:3]])
+        q = steps[-1].q
+    for step, kept in zip(steps, copies, strict=True):
+        assert all(np.array_equal(part, copy) for part, copy in zip(step[:3], kept, strict=True))
+        assert np.abs(step.displacement).max() > 0.0
+
+
 def test_moved_objects_count_in_the_next_step(free_bodies, least_distance):
     """A wall that comes nearer pushes the body before it."""
     scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Box((0.1, 1.0, 1.0)), name="wall", at=(-0.3, 0.0, 0.0))

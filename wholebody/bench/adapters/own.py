@@ -22,6 +22,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, Quadra
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.tracking import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
@@ -173,6 +174,9 @@ class UnfinishedQP(QP):
         return Unfinished()
 
 
+FORCES = np.eye(3, 6)  # along the world's axes, without their moments
+
+
 class MovingPoint(Goal):
     """The origin of a frame at a place that moves: write the place into `target`, shape (3,)."""
 
@@ -192,8 +196,9 @@ class MovingPoint(Goal):
 
     def jacobian(self, state: State) -> Wrench:
         """Three forces along the world's axes, through the frame's origin."""
-        x, y, z = state.frame(self._id).translation
-        rows = np.array([[1.0, 0.0, 0.0, 0.0, z, -y], [0.0, 1.0, 0.0, -z, 0.0, x], [0.0, 0.0, 1.0, y, -x, 0.0]])
+        x, y, z = state.frame(self._id).translation.tolist()
+        rows = FORCES.copy()
+        rows[0, 4], rows[0, 5], rows[1, 3], rows[1, 5], rows[2, 3], rows[2, 4] = z, -y, -z, x, y, -x
         return Wrench(rows, self._joint)
 
 
@@ -220,22 +225,19 @@ class WholebodyTool(Tool):
         self._target = goal.target
         self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
         self._q = np.array(track.start)
-        self._told: list[tuple[int, bool]] = []
-        self._programs: Counter[str] = Counter()
+        self._told: list[QPStep] = []
 
     def reset(self, q: Array) -> None:
         """Go to a posture."""
         self._q = np.array(q)
         self._told.clear()
-        self._programs.clear()
 
     def step(self, target: Array) -> None:
         """Move one step."""
         self._target[:] = target
         step = self._tracker.step(self._q)
         self._q = step.q
-        self._told.append((step.rows, step.exact))
-        self._programs.update(step.programs)
+        self._told.append(step)
 
     def posture(self) -> Array:
         """Where it is."""
@@ -243,9 +245,9 @@ class WholebodyTool(Tool):
 
     def remarks(self) -> dict[str, float]:
         """Mean number of contact rows, and share of steps whose program was solved exactly."""
-        rows, exact = zip(*self._told, strict=True)
+        rows, exact = ([getattr(step, name) for step in self._told] for name in ("rows", "exact"))
         return {"rows": float(np.mean(rows)), "exact": float(np.mean(exact))}
 
     def programs(self) -> dict[str, int]:
         """How many programs each closed."""
-        return dict(self._programs)
+        return dict(sum((Counter(step.programs) for step in self._told), Counter[str]()))

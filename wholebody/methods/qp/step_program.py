@@ -63,6 +63,7 @@ class Answer(NamedTuple):
         spare: least distance beyond its clearance that a contact has after the displacement, metres, to first order;
             negative infinite where it is not known.
         missed: largest violation of an elastic row after the displacement, metres or radians, to first order.
+        asked: least clearance asked of a contact, metres; infinite without contacts.
         exact: see `QPSolution`, like the next two.
         iterations: of the solver.
         by: what closed the program.
@@ -74,6 +75,7 @@ class Answer(NamedTuple):
     worst: float
     spare: float
     missed: float
+    asked: float
     exact: bool
     iterations: int
     by: str
@@ -107,6 +109,7 @@ class StepProgram:
         self._holds = ConstraintValues(holding, state)
         self._asked = self._subproblem.bound[0, self._held]
         self._there = State(state.model)
+        self._twist = np.empty((state.model.njoints, 6))
         self._unknown = np.zeros((2, self._variables), dtype=bool)
         places = np.arange(state.model.nv, dtype=float)
         self._joints = np.concatenate(
@@ -162,12 +165,12 @@ class StepProgram:
 
     def rows(self, at: Passing) -> Rows:
         """The rows of the last program; overwritten by the next."""
-        n, k, ends = self._variables, self._elastic, self._ends()
-        labels = self._integers[: 2 * k].reshape(2, k)
+        k, first = self._elastic, self._first_elastic
+        after = first + k * self._variables
         return Rows(
             self._soft_rows, self._soft_values[0], self._soft_values[1], self.goals,
-            self._floats[ends[6] : ends[7]].reshape(k, n), self._floats[ends[7] : ends[8]], labels[0],
-            self._subproblem.one_sided + len(at.contacts.distance), labels[1],
+            self._floats[first:after].reshape(k, self._variables), self._floats[after : after + k], self._integers[:k],
+            self._subproblem.one_sided + len(at.contacts.distance), self._integers[k : 2 * k],
         )  # fmt: skip
 
     def program(self) -> QuadraticProgram:
@@ -197,7 +200,7 @@ class StepProgram:
         state, table = self._workspace.state, self._workspace.table
         way, turn = self._motion(
             state.spread(displacement), state.columns, state.column_joint, state.parents, table.joint,
-            at.contacts.placements, table.reach,
+            at.contacts.placements, table.reach, self._twist,
         )  # fmt: skip
         return way, turn
 
@@ -213,17 +216,17 @@ class StepProgram:
         if 5 * k > len(self._integers):
             self._grow(2 * k)
         held = working.held if working.hot else self._unknown
-        solved, count, motion, turn, worst, spare, missed, damping, asked = self._kernel.solve(
+        solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
             self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
-            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._floats,
-            self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
+            workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._twist,
+            self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
         )  # fmt: skip
         self._settled = solved
         if solved:
             working.pushing = self._integers[2 * k : 2 * k + count].copy()
             by = working.solver.count([ACTIVE_SET])
-            return Answer(self._x, motion, turn, worst, spare, missed, True, 0, by), damping, asked
+            return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
         rows = self.rows(at)
         answer = working.solve(self.program(), rows.key)
         motion, turn = self.motion(at, answer.x)
@@ -232,7 +235,7 @@ class StepProgram:
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
         asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
         answered = (answer.exact, answer.iterations, answer.by)
-        return Answer(answer.x, motion, turn, worst, spare, missed, *answered), damping, asked
+        return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
     def _foresee(self, at: Passing, displacement: Array) -> bool:
         """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.
@@ -260,7 +263,7 @@ class StepProgram:
         self._x, self._target = floats[:n], floats[ends[2] : ends[3]]
         self._soft_values = floats[ends[3] : ends[4]].reshape(2, m)
         self._entries = floats[ends[4] : ends[5]].reshape(4, n)
-        self._soft_rows = floats[ends[5] : ends[6]].reshape(m, n)
+        self._soft_rows, self._first_elastic = floats[ends[5] : ends[6]].reshape(m, n), ends[6]
 
 
 def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[Constraint], NDArray[np.intp]]:
@@ -308,7 +311,7 @@ def compiled_kernel() -> Any:
     tracking_kernel.solve(
         none, np.zeros((0, 1)), none, index, none, index, np.zeros((2, 2)), np.zeros((2, 1)), none, np.zeros(2),
         np.zeros(2), index, np.zeros((2, 0)), none, np.zeros((2, 1), dtype=bool), index, np.zeros((1, 6)),
-        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros(ends[-1]), index,
+        np.zeros(4, dtype=np.intp), np.zeros((1, 4, 3)), np.ones(1), np.zeros((1, 6)), np.zeros(ends[-1]), index,
         np.zeros(2, dtype=bool), numbers_of(1.0, 1.0), True, False, 0.0,
     )  # fmt: skip
     ahead = np.zeros((2, 0))

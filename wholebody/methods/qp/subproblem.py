@@ -266,5 +266,7 @@ def compiled_kernel() -> Any:
         one, one, one, one, none, none, 0, none, none, True, True, number, np.ones((4, 1)), none, none
     )
     one_joint = np.zeros(1, dtype=np.intp)
-    subproblem_kernel.motion(one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one)
+    subproblem_kernel.motion(
+        one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one, np.zeros((1, 6))
+    )
     return subproblem_kernel

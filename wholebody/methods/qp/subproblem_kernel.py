@@ -197,14 +197,15 @@ def motion(
     joint: Indices,
     placement: Array,
     reach: Array,
+    twist: Array,
 ) -> tuple[float, float]:
     """Longest way of any point of any piece [m], and largest turn [rad], to first order.
 
     `displacement` (n,) is spread over the `columns` (n, 6) of the joint Jacobian, which belong to `column_joint` (n,);
     `parents` (njoints,) are the joints' parents; the pieces are carried by `joint` (p,), stand at `placement` (p, 4, 3)
-    and reach `reach` (p,) from there.
+    and reach `reach` (p,) from there. `twist` (njoints, 6) is room.
     """
-    twist = np.zeros((len(parents), 6))
+    twist[:] = 0.0
     for k in range(len(columns)):
         for i in range(6):
             twist[column_joint[k], i] += columns[k, i] * displacement[k]

@@ -19,7 +19,7 @@ from wholebody.methods.qp.escaping import WITHIN, Barriers, barriers, free_end
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
-from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, unseen_by_rows
+from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
 from wholebody.pool import OneAtATime
@@ -273,11 +273,11 @@ class QPTracker(OfOneRun):
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
-            unseen = unseen_by_rows(at.clearance[: len(at.contacts.distance)])
-            if curved > np.minimum.reduce(unseen, initial=np.inf):
-                bent = self._turning.bent(at, program.rows(at), displacement, unseen)
-                if bent > 0.0:
-                    displacement, share, following = self._looked_after(at, displacement, share, unseen, bent > MIDWAY)
+            bent = (
+                self._turning.bent(at, program.rows(at), displacement) if curved > least_unseen(answer.asked) else 0.0
+            )
+            if bent > 0.0:
+                displacement, share, following = self._looked_after(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
@@ -289,23 +289,20 @@ class QPTracker(OfOneRun):
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
-    def _looked_after(
-        self, at: Passing, displacement: Array, share: float, unseen: Array, midway: bool
-    ) -> tuple[Array, float, Array]:
+    def _looked_after(self, at: Passing, displacement: Array, share: float, midway: bool) -> tuple[Array, float, Array]:
         """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
 
         Args:
             at: where the step begins.
             displacement: (nv,) of the step.
             share: of the program's own displacement.
-            unseen: (k,) metres by which each contact may be nearer than foreseen.
             midway: whether to look half way too.
 
         Returns:
             The displacement (nv,), its share, and the posture (nq,) where it ends.
         """
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
-        began = np.minimum(contacts.distance, asked)
+        began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
         rows, groups = self._program.rows(at), None
         for _ in range(CORRECTIONS):
             short, q = self._shortfall(

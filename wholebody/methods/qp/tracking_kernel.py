@@ -9,6 +9,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import solve_growing, work_size
+from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.subproblem_kernel import motion, program, sort_rows
 
 Ends: TypeAlias = tuple[int, int, int, int, int, int, int, int, int, int, int, int]
@@ -36,6 +37,7 @@ def solve(
     joints: Indices,
     placement: Array,
     reach: Array,
+    twist: Array,
     floats: Array,
     integers: Indices,
     masks: Mask,
@@ -43,7 +45,7 @@ def solve(
     measures: bool,
     hot: bool,
     least_damping: float,
-) -> tuple[bool, int, float, float, float, float, float, float, float]:
+) -> tuple[bool, int, float, float, float, float, float, float, float, float]:
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
@@ -68,6 +70,7 @@ def solve(
         joints: place in the tangent and joint of each column, parents of the joints, joints of the pieces.
         placement: (pieces, 4, 3) see `subproblem_kernel.motion`.
         reach: (pieces,).
+        twist: (njoints, 6) room.
         floats: room, which `parts` lays out.
         integers: room for 5 k: labels and keys of the elastic rows, the keys of those that push, places.
         masks: room for 2 n + 2 k.
@@ -79,7 +82,7 @@ def solve(
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
         violation of an elastic row; least room that a contact row has after the step, and largest violation of an
-        elastic row then; the damping, and what the answer asks for.
+        elastic row then; least clearance asked of a contact; the damping, and what the answer asks for.
     """
     n, goals = box.shape[1], len(share)
     equal, one_sided = 0, 0
@@ -128,12 +131,15 @@ def solve(
         measure[0][:n], measure[1][:n], box[0], box[1], soft_values[0], soft_values[1], goals, violated, shift,
         measures, numbers[4] > 0.0, numbers[:10], entries, target, least,
     )  # fmt: skip
+    least_asked = np.inf
+    for c in range(len(number)):
+        least_asked = min(least_asked, clearance[c])
     worst = 0.0
     for j in range(k):
         elastic_weight[j] = numbers[12]
         worst = max(worst, violated[j])
     if not hot:
-        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
     for i in range(n):
         at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = solve_growing(
@@ -141,7 +147,7 @@ def solve(
         labels[1], pushed, at_lower, at_upper, pushing, chosen, numbers[18:24], work, places, x,
     )  # fmt: skip
     if rounds < 0:
-        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, damping, 0.0
+        return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
     for i in range(n):
         held[0, i], held[1, i] = at_lower[i], at_upper[i]
     count = 0
@@ -155,9 +161,7 @@ def solve(
             count += 1
     left = 0.0
     for r in range(m):
-        gone = 0.0
-        for i in range(n):
-            gone += soft[r, i] * x[i]
+        gone = dot(soft[r], x)
         after[last + r] = soft_values[0, r] + gone
         if r < goals:
             left += (gone - target[r]) ** 2
@@ -165,9 +169,7 @@ def solve(
     after[last + m], after[last + m + 1] = left, 1.0
     spare, missed = np.inf, 0.0
     for j in range(k):
-        ahead = -violated[j]
-        for i in range(n):
-            ahead += elastic[j, i] * x[i]
+        ahead = dot(elastic[j], x) - violated[j]
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
@@ -177,9 +179,9 @@ def solve(
         spread[c] = x[joints[c]]
     way, turn = motion(
         spread, columns, joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
-        joints[len(joints) - pieces :], placement, reach,
+        joints[len(joints) - pieces :], placement, reach, twist,
     )  # fmt: skip
-    return True, count, way, turn, worst, spare, missed, damping, asked
+    return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled()
@@ -227,9 +229,7 @@ def run_ahead(
     largest = 0.0
     for r in range(goals, len(error)):
         foreseen = min(max(error[r] - before[last + r], -most), most) if known else 0.0
-        curved = there[r - goals] - asked[r - goals] - error[r]
-        for i in range(len(x)):
-            curved -= soft[r, i] * x[i]
+        curved = there[r - goals] - asked[r - goals] - error[r] - dot(soft[r], x)
         largest = max(largest, abs(min(max(curved, -most), most) - foreseen))
         before[last + r] = error[r] - curved
     return largest > straight

@@ -37,26 +37,27 @@ class Turning:
              for own, reach in zip(points, table.reach, strict=True)]
         ).reshape(-1)  # fmt: skip
         self._point = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF])
+        self._twists = np.empty((3, workspace.model.njoints, 6))
+        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
 
-    def bent(self, at: Passing, rows: Rows, displacement: Array, unseen: Array) -> float:
-        """Largest share of `unseen` by which a pair that may end too near can be nearer than its rows say.
+    def bent(self, at: Passing, rows: Rows, displacement: Array) -> float:
+        """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
 
         Args:
             at: where the step begins, and the workspace's state is.
             rows: of its program.
             displacement: (nv,) of the step.
-            unseen: (k,) metres by which each contact may be nearer than its rows say.
 
         Returns:
-            0 where every pair keeps its distance to `unseen`, and more than 1 where one may not.
+            0 where every pair keeps its distance to that, and more than 1 where one may not.
         """
         state, contacts = self._workspace.state, at.contacts
+        count = len(contacts.distance)
         share: float = self._kernel.bent(
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
             self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
-            at.clearance[: len(unseen)], unseen, displacement, rows.elastic, rows.elastic_violation, rows.contact,
-            rows.contacts - len(unseen), self._lengths,
+            at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
+            rows.contacts - count, self._lengths, self._twists,
         )  # fmt: skip
         return share
 
@@ -70,9 +71,15 @@ def compiled_kernel() -> Any:
     turning_kernel.bent(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
         np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
-        np.zeros((0, 3)), none, none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(4),
+        np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
+        np.zeros((3, 1, 6)),
     )  # fmt: skip
     return turning_kernel
+
+
+def least_unseen(asked: float) -> float:
+    """The least of `unseen_by_rows` where at least this distance is asked of all contacts."""
+    return min(max(asked, INSIDE), UNSEEN)
 
 
 def unseen_by_rows(asked: Array) -> Array:

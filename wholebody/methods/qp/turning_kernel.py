@@ -6,6 +6,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.methods.qp.dense_kernel import dot
 
 
 @compiled()
@@ -22,15 +23,18 @@ def bent(
     distance: Array,
     normal: Array,
     asked: Array,
-    unseen: Array,
     step: Array,
     elastic: Array,
     violation: Array,
     contact: Indices,
     first: int,
     lengths: Array,
+    twists: Array,
 ) -> float:
-    """Largest share of its `unseen` by which a pair that may end too near can be nearer than its rows say; 0 for none.
+    """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
+
+    Unseen is what a pair may end nearer than its rows say: what is asked of it, within bounds. 0 where no pair can be
+    nearer by so much.
 
     The distance of a pair is at least that of its points to a plane that moves with one of its pieces. To second order
     a point leaves its tangent by half of its acceleration at constant joint speeds, as seen from the plane; only what
@@ -49,7 +53,6 @@ def bent(
         distance: (k,) of the contacts.
         normal: (k, 3) from the first piece of each to the second.
         asked: (k,) clearances.
-        unseen: (k,) by which each may end nearer than its rows say.
         step: (nv,) the displacement.
         elastic: (r, nv) elastic rows.
         violation: (r,) what they are violated by before it.
@@ -57,11 +60,12 @@ def bent(
         first: label of the first contact.
         lengths: room within which a pair counts, in times of what it may be nearer by; how much farther than the
             witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
-            by how many radians its normal may be off.
+            by how many radians its normal may be off; least and largest that is unseen.
+        twists: (3, njoints, 6) room.
     """
     joints = len(parents)
-    twist, change = np.zeros((joints, 6)), np.zeros((joints, 6))
-    own = np.zeros((joints, 6))
+    twists[:] = 0.0
+    twist, change, own = twists[0], twists[1], twists[2]
     for c in range(len(columns)):
         for i in range(6):
             own[column_joint[c], i] += columns[c, i] * displacement[c]
@@ -80,10 +84,7 @@ def bent(
     for r in range(len(violation)):
         c = contact[r] - first
         if c >= 0:
-            ahead = -violation[r]
-            for i in range(len(step)):
-                ahead += elastic[r, i] * step[i]
-            room[c] = min(room[c], ahead)
+            room[c] = min(room[c], dot(elastic[r], step) - violation[r])
     worst, vectors = 0.0, np.empty((5, 3))
     for c in range(len(distance)):
         nearer, way = np.inf, np.inf
@@ -100,12 +101,13 @@ def bent(
             if bend < nearer:
                 nearer, way = bend, gone
         nearer += lengths[3] * way
-        if nearer <= unseen[c]:
+        unseen = min(max(asked[c], lengths[4]), lengths[5])
+        if nearer <= unseen:
             continue
         spare = distance[c] - asked[c]
         beyond = lengths[1] if spare <= lengths[2] else 0.0
         if room[c] < lengths[0] * nearer or (not round_piece and spare + beyond < way):
-            worst = max(worst, nearer / unseen[c])
+            worst = max(worst, nearer / unseen)
     return worst
 
 
