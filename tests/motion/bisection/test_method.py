@@ -291,19 +291,19 @@ def test_a_search_that_other_starts_may_end_is_short(swing: Clip) -> None:
 
 
 def test_the_search_goes_on_where_no_start_leads_to_a_free_posture_soon(swing: Clip) -> None:
-    kept = list[wb.Solution]()
+    scene, kept = dressed(swing.figure, "side_sphere"), list[wb.Solution]()
+    overlapping = swing.q[np.argmax(depths(scene, swing.q))]
 
     class Slow(wb.QP):
-        """Has found nothing when it is ended."""
+        """Has found a posture that overlaps when it is ended."""
 
         def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
             found = super().solve(problem)
             if progress is not None:
-                return replace(found, q=problem.start)
+                return replace(found, q=overlapping)
             kept.append(found)
             return found
 
-    scene = dressed(swing.figure, "side_sphere")
     result = Bisection(method=Slow(restarts=0), frozen=("root",)).avoid(swing, scene, (), None)
     assert not result.message
     assert kept
