@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -321,6 +323,25 @@ def test_the_caller_may_end_it(swing: Clip) -> None:
     assert "ended" in result.message
     assert len(told) < 10
     assert all(0.0 <= progress.share <= 1.0 for progress in told)
+
+
+def test_ctrl_c_in_a_prediction_ends_all(swing: Clip) -> None:
+    """A solve on its own answers Ctrl-C with the best posture so far; the others would go on."""
+    begun = list[float]()
+
+    class Interrupted(wb.QP):
+        def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
+            begun.append(0.0)
+            return super().solve(problem, lambda entry: os.kill(os.getpid(), signal.SIGINT))
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            wb.avoid(swing, dressed(swing.figure, "side_sphere"), method=Bisection(method=Interrupted(restarts=0)))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(begun) == 1
 
 
 def test_a_clip_beyond_its_limits_comes_back_within_them(swing: Clip) -> None:
