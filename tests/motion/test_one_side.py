@@ -63,3 +63,17 @@ def test_postures_of_one_side_stay_as_they_are(planar_arm: Callable[..., Figure]
     found, asked = kept(clip, scene, q)
     np.testing.assert_array_equal(found, q)
     assert asked == 0
+
+
+def test_few_frames_take_the_side_of_most_at_both_ends_too(planar_arm: Callable[..., Figure]) -> None:
+    """The arm waits in the post from the first to the last frame; both ends are on the farther side."""
+    figure = planar_arm((0.5, 0.5), radius=0.02)
+    clip, scene = wb.Clip(figure, np.zeros((26, 2)), DT), with_post(figure)
+    near, far = -0.1, 0.14  # rad: from 0.9 m away, 90 mm and 126 mm beside the centre of the post
+    q = np.stack([np.full(26, near), np.zeros(26)], axis=1)
+    q[[0, 1, 2, -2, -1], 0] = far
+    assert wb.check(clip.with_q(q), scene).deepest_between > 0.04
+    found, _ = kept(clip, scene, q)
+    np.testing.assert_array_equal(found[3:-2], q[3:-2])
+    assert wb.check(clip.with_q(found), scene).deepest_between < 1e-3
+    assert found[:, 0].max() < 0.0

@@ -5,7 +5,8 @@ from __future__ import annotations
 import signal
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from types import FrameType, TracebackType
 from typing import Any
 
@@ -108,6 +109,24 @@ class Control:
         if self.reason:
             signal.default_int_handler(number, frame)
         self.reason = "Ctrl-C ended it"
+
+
+@contextmanager
+def ctrl_c_ends_all() -> Iterator[None]:
+    """Inside it Ctrl-C raises KeyboardInterrupt at once: in work of many solves it would end one of them alone."""
+    main = threading.current_thread() is threading.main_thread()
+    if not main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+        yield
+        return
+
+    def end(number: int, frame: FrameType | None) -> None:
+        signal.default_int_handler(number, frame)
+
+    signal.signal(signal.SIGINT, end)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
 def check_time_limit(value: float | None) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import a, flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
@@ -199,7 +200,8 @@ def avoid(
     stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
     terms = frame_terms(scene, clip.q, clip.dt, given, chosen.clearance)
     began = time.perf_counter()
-    result = chosen.avoid(clip, scene, given, progress)
+    with ctrl_c_ends_all():
+        result = chosen.avoid(clip, scene, given, progress)
     seconds = time.perf_counter() - began
     found = clip.with_q(result.q)
     change = None

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from typing import NamedTuple
+
 import numpy as np
 import pinocchio as pin
 
@@ -95,32 +98,44 @@ def keep_back(follower: Follower, workspace: Workspace, q: Array, gap: int, most
     Returns:
         Whether a way back to the other frames was found; if not, q stays as it is.
     """
-    best: tuple[int, Array] | None = None
-    for side in (1, -1):
-        found = _beside(follower, workspace, q, gap, side, most, first)
-        if found is not None:
-            best, most = (gap + 1 if side > 0 else gap + 1 - len(found), found), len(found) - 1
-    if best is not None:
-        q[best[0] : best[0] + len(best[1])] = best[1]
-    return best is not None
+    ways = {side: _beside(follower, workspace, q, gap, side, first) for side in (1, -1)}
+    found = dict[int, list[Array]]((side, []) for side in ways)
+    for _ in range(most):
+        for side, way in list(ways.items()):  # in turn, so that the shorter way ends both
+            posture = next(way, None)
+            if posture is None:
+                del ways[side]
+                continue
+            found[side].append(posture.q)
+            if posture.joined:
+                begin = gap + 1 if side > 0 else gap + 1 - len(found[side])
+                q[begin : begin + len(found[side])] = found[side][::side]
+                return True
+    return False
 
 
-def _beside(
-    follower: Follower, workspace: Workspace, q: Array, gap: int, side: int, most: int, first: int
-) -> Array | None:
-    """Frames (k, nq) on the one side of what a motion between two frames passes, as far as they were on the other.
+class _Beside(NamedTuple):
+    """A frame on the one side of what is passed.
+
+    Attributes:
+        q: (nq,) posture.
+        joined: whether the motion to the next frame as it is passes nothing.
+    """
+
+    q: Array
+    joined: bool
+
+
+def _beside(follower: Follower, workspace: Workspace, q: Array, gap: int, side: int, first: int) -> Iterator[_Beside]:
+    """Frames on the one side of what a motion between two frames passes, as far as they were on the other.
 
     They follow the original motion from one end of the gap, in contact with what is in the way, until the way from
     there to the next one of q passes nothing. For `side` 1 it is frames after the gap, for -1 frames before it.
     """
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
-    found: list[Array] = []
-    while 0 <= frame < len(q) and len(found) < most:
+    while 0 <= frame < len(q):
         there = follower.frame(first + frame, here)
         if max(depth(workspace, there), dip_depth(workspace, here, there)) > SHALLOW:
-            return None
-        found.append(there)
+            return
         here, frame = there, frame + side
-        if not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= SHALLOW:
-            return np.array(found[::side])
-    return None
+        yield _Beside(here, not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= SHALLOW)

@@ -8,6 +8,7 @@ the way, until the motion to the next frame passes nothing.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 
 import numpy as np
 import pinocchio as pin
@@ -24,14 +25,20 @@ PASSED = 1e-2
 """Metres: a motion that is deeper passes through something. Others are mostly arcs between two postures in contact,
 which rows free; less changes more frames, more leaves more to the rows."""
 
+FEW = 0.25
+"""Share of the frames up to which those on one side take the other: more follows more frames, and where the sides are
+those of several limbs, in vain."""
+
 
 def one_sided(
     terms: FrameTerms, follower: Callable[[], Follower], workspace: Workspace, q: Array, watch: Watch
 ) -> Array:
     """Postures (n, nq) of a clip of which fewer motions pass something; the given ones where that is not found.
 
-    Motions that pass are gone through from the first to the last one, each side being that of the frame before, and
-    from the last to the first one where that leaves as many.
+    Motions that pass divide the clip into runs of frames, on one side and on the other in turn. A posture is mostly on
+    the side from which it deviates less. So where one side has few frames, these take the other. Else, or where
+    something is passed still, motions that pass are gone through from the first to the last one, each side being
+    that of the frame before, and from the last to the first one where that leaves as many.
 
     Args:
         terms: original postures, and what is held.
@@ -42,6 +49,17 @@ def one_sided(
     """
     depths = depths_between(workspace, q, range(len(q) - 1))
     passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
+    runs = [range(*each) for each in pairwise([0, *(gap + 1 for gap in passing), len(q)])]
+    fewer = min((runs[::2], runs[1::2]), key=_frames)
+    if passing and _frames(fewer) <= FEW * len(q):
+        found = q
+        for run in fewer:
+            gap, side = (run[0] - 1, 1) if run[0] else (run[-1], -1)
+            found = _kept(terms, follower(), workspace, found, [gap], side, watch)
+        if watch.ended:
+            return q
+        if max(depths_between(workspace, found, depths).values()) <= PASSED:
+            return found
     for side in (1, -1) if passing else ():
         found = _kept(terms, follower(), workspace, q, passing, side, watch)
         if watch.ended:
@@ -52,6 +70,11 @@ def one_sided(
         if sum(deep > PASSED for deep in now.values()) < len(passing):
             return found
     return q
+
+
+def _frames(runs: Sequence[range]) -> int:
+    """How many frames some runs have."""
+    return sum(map(len, runs))
 
 
 def _kept(

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -13,10 +16,12 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.methods.control import Progress
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
 from wholebody.motion.bisection.path_planes import path_planes
+from wholebody.motion.bisection.recursion import SHORT
 from wholebody.motion.clip import Clip
 from wholebody.motion.ready_equipment import equipment
 
@@ -268,6 +273,45 @@ def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None
     assert np.array_equal(result.q, swing.q)
 
 
+def test_a_search_that_other_starts_may_end_is_short(swing: Clip) -> None:
+    lengths = list[int]()
+
+    class Endless(wb.QP):
+        """Has its answer at once, and goes on until it is ended."""
+
+        def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
+            found, told = super().solve(problem), 0
+            while progress is not None and told < 10 * SHORT and progress(found.trace[-1]) is not True:
+                told += 1
+            lengths.append(told if progress is not None else 10 * SHORT)
+            return found
+
+    result = Bisection(method=Endless(restarts=0)).avoid(swing, dressed(swing.figure, "torus"), (), None)
+    assert not result.message
+    assert lengths
+    assert max(lengths) < SHORT
+
+
+def test_the_search_goes_on_where_no_start_leads_to_a_free_posture_soon(swing: Clip) -> None:
+    scene, kept = dressed(swing.figure, "side_sphere"), list[wb.Solution]()
+    overlapping = swing.q[np.argmax(depths(scene, swing.q))]
+
+    class Slow(wb.QP):
+        """Has found a posture that overlaps when it is ended."""
+
+        def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
+            found = super().solve(problem)
+            if progress is not None:
+                return replace(found, q=overlapping)
+            kept.append(found)
+            return found
+
+    result = Bisection(method=Slow(restarts=0), frozen=("root",)).avoid(swing, scene, (), None)
+    assert not result.message
+    assert kept
+    assert depths(scene, result.q).max() <= DEEP
+
+
 def test_the_caller_may_end_it(swing: Clip) -> None:
     told: list[AvoidProgress] = []
 
@@ -279,6 +323,25 @@ def test_the_caller_may_end_it(swing: Clip) -> None:
     assert "ended" in result.message
     assert len(told) < 10
     assert all(0.0 <= progress.share <= 1.0 for progress in told)
+
+
+def test_ctrl_c_in_a_prediction_ends_all(swing: Clip) -> None:
+    """A solve on its own answers Ctrl-C with the best posture so far; the others would go on."""
+    begun = list[float]()
+
+    class Interrupted(wb.QP):
+        def solve(self, problem: wb.Problem, progress: Progress | None = None) -> wb.Solution:
+            begun.append(0.0)
+            return super().solve(problem, lambda entry: os.kill(os.getpid(), signal.SIGINT))
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            wb.avoid(swing, dressed(swing.figure, "side_sphere"), method=Bisection(method=Interrupted(restarts=0)))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert len(begun) == 1
 
 
 def test_a_clip_beyond_its_limits_comes_back_within_them(swing: Clip) -> None:

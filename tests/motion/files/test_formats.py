@@ -433,3 +433,9 @@ def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> No
     assert frames(moving) == 20
     ways_in = rest + np.linspace(0.0, 1.0, 20)[:, None] * (moving[:1] - rest)
     assert frames(np.vstack([ways_in, moving])) == 40  # it moves out of that posture
+
+
+def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, tmp_path: Path) -> None:
+    (tmp_path / "walk.mocap").write_text("HIERARCHY\n")
+    with pytest.raises(wb.FileFormatError, match=r"as \.mocap; give one of \.bvh, \.csv, \.npz, \.txt$"):
+        wb.read_clip(tmp_path / "walk.mocap", human)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -86,6 +87,7 @@ class Predictor:
         planes: Sequence[Plane] = (),
         *,
         effort_from: Array | None = None,
+        most: int | None = None,
     ) -> Prediction:
         """Predict the posture of a frame.
 
@@ -94,6 +96,7 @@ class Predictor:
             start: (nq,) where the search starts.
             planes: further constraints.
             effort_from: (nq,) posture from which the effort is counted instead.
+            most: iterations of the method after which its best posture so far is taken; None for as many as it likes.
         """
         asked = self.terms.asked(frame)
         goals = [term for term in asked if isinstance(term, Goal)]
@@ -108,7 +111,9 @@ class Predictor:
         )
         if effort_from is not None:
             problem.measures = tuple(measure.resolve(self.scene, effort_from) for measure in self._measures)
-        solution = self._method.solve(problem.with_start(start))
+        told = itertools.count(1)
+        progress = None if most is None else lambda entry: next(told) >= most
+        solution = self._method.solve(problem.with_start(start), progress)
         free = self.free(solution.q)
         return Prediction(solution.q, free, free and self.holds(frame, solution.q), sum(solution.programs.values()))
 
@@ -118,7 +123,11 @@ class Predictor:
 
     def free(self, q: Array) -> bool:
         """Whether no pair overlaps."""
-        return bool(self._workspace.near(q, 0.0).distance.min(initial=0.0) >= -self.overlap)
+        return self.depth(q) <= self.overlap
+
+    def depth(self, q: Array) -> float:
+        """Depth of the deepest overlap in a posture, metres."""
+        return -float(self._workspace.near(q, 0.0).distance.min(initial=0.0))
 
     def holds(self, frame: int, q: Array) -> bool:
         """Whether what is held in a frame holds."""

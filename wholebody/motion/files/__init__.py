@@ -57,14 +57,15 @@ def read_frames(path: str | os.PathLike[str], figure: Figure) -> Frames:
         FileFormatError: as for `wb.read_clip`.
     """
     path = checked_path(path, "path")
-    return READERS[_ending(path, READERS, "read")](path, figure)
+    return READERS[_ending(path, READERS, "read", (".bvh",))](path, figure)
 
 
-def _ending(path: Path, known: Collection[str], done: str) -> str:
+def _ending(path: Path, known: Collection[str], done: str, others: Collection[str] = ()) -> str:
+    """The ending of a file's name, one of some; the error names `others` too, which `wb.read_clip` takes before."""
     ending = path.suffix.lower()
     if ending not in known:
         raise FileFormatError(
             f"{one_line(path.name)}: a clip cannot be {done} as {one_line(ending) or 'a file without ending'}; "
-            f"give one of {', '.join(sorted(known))}"
+            f"give one of {', '.join(sorted({*known, *others}))}"
         )
     return ending
