@@ -16,7 +16,7 @@ from wholebody.figures.state import State
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
-from wholebody.motion.bisection.path_planes import path_planes
+from wholebody.motion.bisection.prediction import path_planes
 from wholebody.motion.clip import Clip
 from wholebody.motion.ready_equipment import equipment
 
