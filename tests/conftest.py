@@ -29,9 +29,10 @@ settings.register_profile("default", deadline=None, suppress_health_check=[Healt
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
 # Tests that press Ctrl-C do so as in a terminal; what runs in the background is started with it ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-# Pieces of meshes are made anew in every run of the tests, by the code under test.
-_CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
-os.environ["WHOLEBODY_CACHE"] = _CACHE.name
+# Pieces of meshes are made anew in every run of the tests, by the code under test; workers of one run share them.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
+    os.environ["WHOLEBODY_CACHE"] = _CACHE.name
 # Child processes keep the byte code of modules, as those of users do: without it each compiles 150 files again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 # The tests' own byte code is kept too: to rewrite their assertions is most of what collecting them takes.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -211,9 +211,7 @@ def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ..
 SCHEMES = ("package://", "model://")
 
 
-def find_mesh(
-    name: str, place: str, path: Path, package_dirs: Sequence[Path], environ: Mapping[str, str] = os.environ
-) -> Path:
+def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path:
     """Find a mesh.
 
     A path is looked up beside the file and in `package_dirs`; ``package://<package>/<path>`` in `package_dirs`, the
@@ -225,7 +223,6 @@ def find_mesh(
         place: of the mesh in the file, for messages.
         path: of the file.
         package_dirs: the caller's folders.
-        environ: the environment variables.
 
     Raises:
         FileFormatError: no name, or no such file.
@@ -237,7 +234,7 @@ def find_mesh(
         parts = [part for part in name.split("://", 1)[1].split("/") if part not in ("", ".")]
         if not parts or ".." in parts[:1]:
             raise FileFormatError(f"{place}: the mesh {shown(name)} names no package; write package://<package>/<path>")
-        bases = [*package_dirs, folder, *folder.parents, *_ros_folders(environ)]
+        bases = [*package_dirs, folder, *folder.parents, *_ros_folders()]
         candidates = [base.joinpath(*tail) for base in bases for tail in (parts, parts[1:]) if tail]
     else:
         plain = Path(name.removeprefix("file://"))
@@ -251,10 +248,10 @@ def find_mesh(
     )
 
 
-def _ros_folders(environ: Mapping[str, str]) -> list[Path]:
-    folders = [Path(entry) for entry in environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if entry]
+def _ros_folders() -> list[Path]:
+    folders = [Path(entry) for entry in os.environ.get("ROS_PACKAGE_PATH", "").split(os.pathsep) if entry]
     return folders + [
-        Path(entry) / "share" for entry in environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
+        Path(entry) / "share" for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
     ]
 
 
