@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
+import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -27,11 +29,14 @@ settings.register_profile("default", deadline=None, suppress_health_check=[Healt
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
 # Tests that press Ctrl-C do so as in a terminal; what runs in the background is started with it ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)
-# Pieces of meshes are made anew in every run of the tests, by the code under test.
-_CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
-os.environ["WHOLEBODY_CACHE"] = _CACHE.name
+# Pieces of meshes are made anew in every run of the tests, by the code under test; workers of one run share them.
+if "PYTEST_XDIST_WORKER" not in os.environ:
+    _CACHE = tempfile.TemporaryDirectory(prefix="wholebody-cache-")
+    os.environ["WHOLEBODY_CACHE"] = _CACHE.name
 # Child processes keep the byte code of modules, as those of users do: without it each compiles 150 files again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+# The tests' own byte code is kept too: to rewrite their assertions is most of what collecting them takes.
+sys.dont_write_bytecode = False
 
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
@@ -69,6 +74,12 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     if missing := [str(path) for path in places if not path.is_file()]:
         raise pytest.UsageError(f"LONG in tests/conftest.py names {', '.join(missing)}, which is no file")
     items.sort(key=lambda item: places.get(item.path, len(places)))
+
+
+def pytest_collection_finish() -> None:
+    """Leave what was imported and collected out of the garbage collector: it is looked through often, and stays."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

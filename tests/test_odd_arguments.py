@@ -652,15 +652,16 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "avoid_many(case)", Call(partial(wb.avoid_many, folder=path / "many", methods=["frames"]), given)
     yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
     clip.write(path / "read.npz")
-    files = {"files": [path / "read.npz"], "folder": path / "many", "figure": arm, "jobs": 1, "progress": print}
-    yield "read_many", Call(wb.read_many, files)
+    files = {"files": [], "folder": path / "many", "jobs": 1, "progress": print}
+    yield "read_many", Call(partial(wb.read_many, figure=arm), files)
+    yield "read_many(figure)", Call(partial(wb.read_many, [path / "read.npz"], path / "many"), {"figure": arm})
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
-    varied = {"task": path / "task.toml", "layouts": {"as it is": {}}, **at_once}
-    yield "study", Call(wb.study, varied)
-    anything = partial(wb.study, lambda *given: ask, progress=lambda told: True)
-    yield "study(function)", Call(anything, {"people": [arm], "targets": [places[0]], "layouts": [None]})
+    varied = {"task": path / "task.toml", "layouts": {"as it is": {}}}
+    yield "study", Call(partial(wb.study, progress=lambda told: True), varied)
+    anything = {"people": [arm], "targets": [places[0]], "layouts": [None], **at_once}
+    yield "study(function)", Call(partial(wb.study, lambda *given: ask), anything)
     grid = {"problem": ask, "frame": "link4", "low": (0.1, 0.1, 1.0), "high": (0.2, 0.1, 1.0), "step": 0.1}
     grid |= {"offset": (0.0, 0.0, 0.1), "jobs": 1, "progress": lambda *told: True}
 

@@ -76,9 +76,9 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
         raise FileFormatError(f"{kind} {_named(path)}, line {line}: is no UTF-8 text; save it in UTF-8") from None
 
 
-def check_file(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> None:
+def check_file(path: str | PathLike[str], kind: str) -> None:
     """Check a path before a library reads it: raises like `read_bytes`, without reading."""
-    with _opened(path, kind, largest):
+    with _opened(path, kind, LARGEST):
         pass
 
 

@@ -315,7 +315,7 @@ def _shares(units: Array, products: Array, right: Array, pushing: Mask) -> Array
     share, rows, square = np.zeros(len(units)), units[pushing], products[np.ix_(pushing, pushing)]
     try:
         first = np.linalg.solve(square, rows @ right)
-        share[pushing] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # mends the squared condition
+        share[pushing] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # refined once
     except np.linalg.LinAlgError:
         return None
     return share

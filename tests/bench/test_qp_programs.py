@@ -142,19 +142,19 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     docs = tmp_path / "docs"
     docs.mkdir()
     (docs / "results.md").write_text("# Results\n\n<!-- bench:qp -->\n<!-- /bench:qp -->\n")
-    words = ["bench", "qp", "--count", "6", "--sets", "robot_arm", "--solvers", "osqp", "daqp"]
+    words = ["bench", "qp", "--count", "2", "--sets", "robot_arm", "--solvers", "osqp", "daqp"]
     assert main([*words, "--out", str(tmp_path / "a"), "--update-docs", str(docs)]) == 0
     facts, rows = read_rows(tmp_path / "a" / "qp-programs.csv", QPRow)
     assert facts["seed"] == "0"
-    assert len(rows) == 12
+    assert len(rows) == 4
     _, totals = read_rows(tmp_path / "a" / "qp.csv", QPSummary)
     assert [total.solver for total in totals] == ["osqp", "daqp"]
     page = (docs / "results.md").read_text()
     assert "| osqp | " in page
     assert "| robot arm |" in page
-    assert len(list((tmp_path / "a" / "qp-programs").glob("*.npz"))) == 6
+    assert len(list((tmp_path / "a" / "qp-programs").glob("*.npz"))) == 2
     again = ["--programs", str(tmp_path / "a" / "qp-programs"), "--out", str(tmp_path / "b")]
     assert main([*words, *again]) == 0
     _, kept = read_rows(tmp_path / "b" / "qp-programs.csv", QPRow)
     assert {row.name for row in kept} == {row.name for row in rows}
-    assert "6 programs of 1 problem sets" in capsys.readouterr().out
+    assert "2 programs of 1 problem sets" in capsys.readouterr().out

@@ -366,7 +366,7 @@ def test_levels_of_the_spine_share_a_motion_as_their_ranges_do(angle: str, mean:
 def test_packaged_files_are_the_builders_output():
     folder = urdf_path("human").parent
     for name, text in packaged_files().items():
-        assert (folder / name).read_text(encoding="utf-8") == text, f"{name} is stale: write it again"
+        assert (folder / name).read_text(encoding="utf-8") == text, f"{name} is stale: write it again by write_packaged"
 
 
 @pytest.mark.parametrize("name", ["human", "avatar", "hand"])

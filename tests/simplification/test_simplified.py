@@ -18,7 +18,7 @@ from wholebody.geometry.swept_points import swept_points
 from wholebody.simplification.active_joints import active_joints
 from wholebody.simplification.embedding import EmbeddedConstraint, EmbeddedGoal
 from wholebody.simplification.simplified import Simplified
-from wholebody.simplification.simplified_pieces import simplified_piece
+from wholebody.simplification.simplify import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]

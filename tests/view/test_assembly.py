@@ -13,7 +13,7 @@ import wholebody as wb
 from wholebody.view import Viewer, style
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe
-from wholebody.view.viewed_assembly import ViewedAssembly
+from wholebody.view.viewed_scene import ViewedAssembly
 
 
 @pytest.fixture(scope="module")

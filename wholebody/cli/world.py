@@ -122,7 +122,7 @@ def _animation(
     from wholebody.bench.world_runs import moments
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
-    from wholebody.view.viewed_world import ViewedWorld
+    from wholebody.view.viewed_scene import ViewedWorld
 
     viewed = ViewedWorld(scene.scene, frames[-1].placements)
     postures = [viewed.configuration(frame.q, frame.placements) for frame in frames]

@@ -16,17 +16,17 @@ AROUND = 10
 """Rings of vertices between the poles, and vertices on each: 52 vertices, 2 * 5 * 10 = 100 triangles."""
 
 
-@lru_cache(maxsize=8)
-def unit_sphere(rings: int = RINGS, around: int = AROUND) -> tuple[Array, NDArray[np.intp]]:
+@lru_cache(maxsize=1)
+def unit_sphere() -> tuple[Array, NDArray[np.intp]]:
     """Return vertices (n, 3) on the unit sphere, mirror-symmetric in y, and triangles (m, 3) seen from outside.
 
     Every second ring is turned by half a step, so that no four vertices of the sides lie in one plane.
     """
     points = [np.array([0.0, 0.0, 1.0])]
-    for ring in range(1, rings + 1):
-        polar = np.pi * ring / (rings + 1)
-        for k in range(around):
-            turn = 2.0 * np.pi * (k + 0.5 * (ring % 2)) / around
+    for ring in range(1, RINGS + 1):
+        polar = np.pi * ring / (RINGS + 1)
+        for k in range(AROUND):
+            turn = 2.0 * np.pi * (k + 0.5 * (ring % 2)) / AROUND
             points.append(np.array([np.sin(polar) * np.cos(turn), np.sin(polar) * np.sin(turn), np.cos(polar)]))
     points.append(np.array([0.0, 0.0, -1.0]))
     vertices = np.array(points)

@@ -181,8 +181,9 @@ def _transform(placement: pin.SE3) -> Any:
     return coal.Transform3s(placement.rotation, placement.translation)
 
 
-def _net(count: int = 32) -> Array:
+def _net() -> Array:
     """Unit vectors spread over the sphere: a Fibonacci spiral, its opposites and the axes."""
+    count = 32
     k = np.arange(count) + 0.5
     z, turn = 1.0 - 2.0 * k / count, np.pi * (1.0 + np.sqrt(5.0)) * k
     ring = np.sqrt(1.0 - z * z)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -11,7 +13,11 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
+from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.pieces import Piece
+from wholebody.geometry.proximity import COAL_ACCURACY
+from wholebody.geometry.simplified_hull import simplified_hull
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.scene_geometry import SceneGeometry, SceneObject
@@ -19,7 +25,6 @@ from wholebody.simplification.active_joints import ActiveJoints, active_joints
 from wholebody.simplification.embedding import Embedding, restated_term
 from wholebody.simplification.pairs import reachable_pairs
 from wholebody.simplification.simplified import LeftOut, Simplified
-from wholebody.simplification.simplified_pieces import simplified_piece
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
 
@@ -249,3 +254,58 @@ def _left_out(
             "pieces": (whole.scene.geometry.ngeoms, small.scene.geometry.ngeoms),
         },
     )
+
+
+FEW = 64  # corners: simplifying pieces with at most as many saves no measurable time
+CORNERS = (8, 16, 32, 48)  # tried in turn
+PROBE = 1e-4  # m: radius of the ball that represents a point in coal
+
+
+def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
+    """A piece with fewer corners around a hull.
+
+    Args:
+        piece: any piece.
+        growth: how far the new piece may protrude from the hull, metres.
+
+    Returns:
+        The piece and how far it protrudes at most; None if the piece has few corners, or cannot be simplified.
+    """
+    if not isinstance(piece.geometry, coal.Convex):
+        return None
+    points = np.array(piece.geometry.points())
+    if len(points) <= FEW:
+        return None
+    found = _around(points.tobytes(), growth)
+    if found is None:
+        return None
+    made, out = found
+    coarse = pin.GeometryObject(
+        piece.name, piece.parentJoint, piece.parentFrame, piece.placement * made.placement, made.geometry
+    )
+    coarse.meshColor[:] = piece.meshColor
+    return coarse, out
+
+
+@lru_cache(maxsize=256)
+def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
+    """The simplest hull around these corners that protrudes no farther, and how far it does."""
+    points = np.frombuffer(corners).reshape(-1, 3)
+    whole = hull_piece(points)
+    for most in CORNERS:
+        outer = simplified_hull(points, most)
+        out = farthest(outer - whole.placement.translation, whole.geometry)
+        if out <= growth:
+            return hull_piece(outer), out
+    return None
+
+
+def farthest(points: Array, hull: coal.Convex) -> float:
+    """How far a polytope with these corners, (n, 3), protrudes from a hull: the distance is convex, so a corner's."""
+    probe, here, request = coal.Sphere(PROBE), coal.Transform3s.Identity(), coal.DistanceRequest()
+    out = 0.0
+    for point in points:
+        there = coal.Transform3s(np.eye(3), point)
+        # a new result for each query: coal keeps the least distance of all queries of one result
+        out = max(out, float(coal.distance(hull, here, probe, there, request, coal.DistanceResult())) + PROBE)
+    return out + COAL_ACCURACY

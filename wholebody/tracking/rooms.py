@@ -89,9 +89,9 @@ def _sculptures(scene: Scene) -> None:
     scene.add(Capsule(radius=0.12, length=1.2), name="column", at=(4.4, 1.9, 0.72), color=STONE)
 
 
-def _cylinder(radius: float, height: float, corners: int = 24) -> Hull:
-    angle = 2.0 * math.pi * np.arange(corners) / corners
-    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(corners)])
+def _cylinder(radius: float, height: float) -> Hull:
+    angle = np.linspace(0.0, 2.0 * math.pi, 25)[:-1]
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(len(angle))])
     half = np.array([0.0, 0.0, 0.5 * height])
     return Hull(np.vstack([ring - half, ring + half]))
 

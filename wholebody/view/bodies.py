@@ -16,8 +16,7 @@ from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
 from wholebody.view.style import Color
 from wholebody.view.surface import surface_of
-from wholebody.view.viewed_assembly import ViewedAssembly
-from wholebody.view.viewed_scene import ViewedScene
+from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,10 @@
-"""The part of a scene that the viewer uses."""
+"""What the viewer shows: the part of a scene that it uses, assemblies, and scenes whose things move."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Protocol
 
 import numpy as np
@@ -12,8 +14,55 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.checks import a
 from wholebody.errors import InputError
+from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.view.viewed_assembly import ViewedAssembly
+from wholebody.moving_scene import MovingScene
+from wholebody.scene import Scene
+from wholebody.scene_geometry import SceneGeometry
+from wholebody.view import style
+from wholebody.view.style import Color
+from wholebody.workspace import Workspace
+
+
+@dataclass(frozen=True)
+class _Colored:
+    color: Color | None
+
+
+class ViewedAssembly:
+    """The bodies and things that an assembly has now.
+
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. People are
+    drawn with their surface, as in a scene.
+
+    Attributes:
+        figures: each figure by name, and the color that it was given.
+    """
+
+    figure = None
+    revision = 0
+
+    def __init__(self, assembly: Assembly) -> None:
+        """Read shapes and colors."""
+        self._scene = assembly.scene
+        self.model, self.geometry = self._scene.model, self._scene.geometry
+        self.piece_owner = self._scene.piece_owner
+        self.figures = {name: (figure, assembly.colors.get(name)) for name, figure in assembly.figures.items()}
+        self.objects = MappingProxyType({name: _Colored(_color(assembly, name)) for name in self.piece_owner})
+
+    def contacts(self, q: Array, within: float = 0.05) -> Contacts:
+        """Pairs nearer than `within` metres at the posture q (nq,), nearest first."""
+        return self._scene.contacts(q, within)
+
+
+def _color(assembly: Assembly, owner: str) -> Color | None:
+    """The color of a body, a figure's segment or a thing; None for the viewer's choice."""
+    if owner in assembly.scene.objects:
+        return assembly.scene.objects[owner].color
+    figure = owner.split("/")[0]
+    if owner not in assembly.bodies and figure in assembly.figures:
+        return assembly.colors.get(figure, style.FIGURE)
+    return assembly.colors.get(owner)
 
 
 def checked_scene(scene: Any) -> Any:
@@ -88,3 +137,30 @@ class ViewedScene(Protocol):
 
     def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
         """Pairs nearer than `within` metres at the posture q, nearest first."""
+
+
+class ViewedWorld:
+    """A figure, the things that stay, and things that move.
+
+    A posture is what `configuration` makes of one of the figure's and the placements of the things that move. So
+    `Viewer(ViewedWorld(scene, names)).play(configurations, dt)` shows all of them move.
+    """
+
+    revision = 0
+
+    def __init__(self, scene: Scene, names: Iterable[str]) -> None:
+        """Give joints to the things that move.
+
+        Raises:
+            UnknownNameError: there is no such thing.
+        """
+        self._moving = MovingScene(scene.built, names)
+        self.figure, self.objects = scene.figure, scene.objects
+        self.model, self.geometry = self._moving.model, self._moving.geometry
+        self.piece_owner = self._moving.owners
+        self.configuration = self._moving.configuration
+        self._workspace = Workspace(SceneGeometry(self.model, self.geometry, tuple(self.piece_owner), {}))
+
+    def contacts(self, q: Array, within: float = 0.05) -> Contacts:
+        """Pairs nearer than `within` metres in a configuration (nq,), nearest first."""
+        return self._workspace.near(np.asarray(q, dtype=float), within).nearest_first()

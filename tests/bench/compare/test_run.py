@@ -23,7 +23,7 @@ pytestmark = pytest.mark.usefixtures("one_process")
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
 CAP = 1.0  # s of the processor: much more than a solve takes
-SHORT = 0.1  # s of the processor: of methods that never come back; by the clock it is ten times as much
+SHORT = 0.1  # s of the processor: of a method that does not come back; by the clock it is ten times as much
 
 
 def settings(fakes: ModuleType, *does: str, cases: int = 1, sweep: int = 1, cap: float = 5.0) -> Settings:
@@ -38,7 +38,7 @@ def timeless(records: list[Record]) -> list[dict[str, object]]:
 def misbehaved(fakes: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> dict[str, list[Record]]:
     """Return records by method of runs with every fault there is."""
     found: dict[str, list[Record]] = {}
-    for cap, does in ((CAP, ("solves", "raises", "refuses", "dies", "nan", "lies")), (SHORT, ("hangs", "spins"))):
+    for cap, does in ((CAP, ("solves", "raises", "refuses", "dies", "nan", "lies")), (SHORT, ("spins",))):
         store = run(settings(fakes, *does, cap=cap), tmp_path_factory.mktemp("run"))
         found |= {name: [record for record in store.records if record.method == name] for name in does}
     return found
@@ -73,9 +73,8 @@ def test_a_refusal_is_one_record_with_its_sentence(misbehaved: dict[str, list[Re
     assert record.said == "it cannot take goals[0], Point; leave it out"
 
 
-@pytest.mark.parametrize("does", ["hangs", "spins"])
-def test_a_solve_that_takes_too_long_is_ended_wherever_it_is(does: str, misbehaved: dict[str, list[Record]]) -> None:
-    records = misbehaved[does]
+def test_a_solve_that_takes_too_long_is_ended_in_compiled_code_too(misbehaved: dict[str, list[Record]]) -> None:
+    records = misbehaved["spins"]
     assert len(records) == 3  # further budgets count as what they would have been
     assert {record.outcome for record in records} == {OVERTIME}
     assert records[0].said == f"ended after {SHORT:g} s"
@@ -112,12 +111,12 @@ from wholebody.bench.compare.run import run
 from wholebody.bench.compare.settings import Settings
 if __name__ == "__main__":
     adapters = (fakes.adapter("solves"), fakes.adapter("sleeps"))
-    run(Settings((fakes.SET,), adapters, 6, 1, cap=5.0, minutes=3.0), Path(sys.argv[2]), jobs=2)
+    run(Settings((fakes.SET,), adapters, 4, 1, cap=5.0, minutes=3.0), Path(sys.argv[2]))
 """
 
 
 def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path) -> None:
-    asked = settings(fakes, "solves", "sleeps", cases=6)
+    asked = settings(fakes, "solves", "sleeps", cases=4)
     script, folder = tmp_path / "run.py", tmp_path / "killed"
     script.write_text(SCRIPT)
     call = [sys.executable, str(script), str(Path(fakes.__file__).parent), str(folder)]
@@ -132,10 +131,10 @@ def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path) ->
     os.killpg(process.pid, signal.SIGKILL)
     process.wait()
     kept = lines.read_bytes()
-    assert kept.count(b"\n") < 7, "it was over before it was killed"
+    assert kept.count(b"\n") < 5, "it was over before it was killed"
     resumed = run(asked, folder)
     assert lines.read_bytes().startswith(kept[: kept.rfind(b"\n") + 1])  # what was finished is not done again
-    assert len(resumed.chunks) == len({chunk.number for chunk in resumed.chunks}) == 6
+    assert len(resumed.chunks) == len({chunk.number for chunk in resumed.chunks}) == 4
     by_method = sorted(timeless(resumed.records), key=str)
     assert by_method == sorted(timeless(run(asked, tmp_path / "whole").records), key=str)
 

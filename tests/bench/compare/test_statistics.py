@@ -66,14 +66,14 @@ def test_the_bootstrap_is_scipys_up_to_its_own_chance() -> None:
 def test_nine_in_ten_intervals_of_a_quantiles_ratio_hold_the_truth() -> None:
     """Steps are slow or quick in runs of seven, alike in all repeats and for both tools; the ratio is 0.25."""
     rng, held = np.random.default_rng(3), {0.5: 0, 0.95: 0}
-    for _ in range(30):
+    for _ in range(20):
         course = np.repeat(np.exp(rng.normal(0.0, 0.5, 30)), 7)
         one, other = (course * scale * np.exp(rng.normal(0.0, 0.2, (5, 210))) for scale in (0.25, 1.0))
         for part in held:
             found = statistics.quantile_ratio(one, other, part)
             assert found.low <= found.value <= found.high
             held[part] += found.low <= 0.25 <= found.high
-    assert min(held.values()) >= 27
+    assert min(held.values()) >= 18
 
 
 def test_both_tools_of_a_quantiles_ratio_have_the_same_draws() -> None:

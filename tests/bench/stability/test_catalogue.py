@@ -78,6 +78,6 @@ def test_best_answers_that_are_known_are_possible() -> None:
 def test_qp_is_never_wrong() -> None:
     qp = adapters(["qp/osqp"])
     chosen = cases(FAST)
-    found = result(chosen, ["qp/osqp"], list(run(chosen, qp, jobs=2)))
+    found = result(chosen, ["qp/osqp"], list(run(chosen, qp)))
     wrong = {key: verdict.figure for key, verdict in found.verdicts.items() if verdict.kind == "wrong"}
     assert not wrong

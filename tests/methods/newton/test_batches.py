@@ -12,10 +12,8 @@ import pytest
 import wholebody as wb
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.angles import Angle
-from wholebody.methods.newton.batches import Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.batches import Batch, Coincide, MassCenter, RootMotion, Slide, Turn, Unit
 from wholebody.methods.newton.directions import Cone, Toward
-from wholebody.methods.newton.mass_center import MassCenter
-from wholebody.methods.newton.root_motion import RootMotion
 
 K, N, H = 5, 6, 1e-6
 

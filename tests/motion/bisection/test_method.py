@@ -20,7 +20,7 @@ from wholebody.methods.control import Progress
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
-from wholebody.motion.bisection.path_planes import path_planes
+from wholebody.motion.bisection.prediction import path_planes
 from wholebody.motion.bisection.recursion import SHORT
 from wholebody.motion.clip import Clip
 from wholebody.motion.ready_equipment import equipment

@@ -10,7 +10,7 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.motion.bisection.path_planes import path_planes
+from wholebody.motion.bisection.prediction import path_planes
 
 
 @pytest.fixture(scope="module")

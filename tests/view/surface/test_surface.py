@@ -263,9 +263,9 @@ def test_the_drawn_neck_has_the_girth_that_was_measured(case: str) -> None:
     low, high = shape.at("neck"), shape.at("head")
     turn = np.linspace(0.0, 2.0 * np.pi, 91)[:-1]
     around = np.column_stack([np.cos(turn), np.sin(turn), np.zeros(len(turn))])
-    radii = np.linspace(0.02, 0.15, 521)
+    radii = np.linspace(0.03, 0.12, 181)  # half a millimetre apart
     girths = []
-    for share in np.linspace(0.2, 0.9, 8):
+    for share in np.linspace(0.2, 0.9, 5):
         rays = low + share * (high - low) + radii[:, None, None] * around
         inside = head.field(rays.reshape(-1, 3)).reshape(rays.shape[:2]) < 0.0
         ends = radii[inside.sum(axis=0) - 1, None] * around

@@ -28,8 +28,7 @@ from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
-from wholebody.methods.newton.patterns import Patterns
-from wholebody.methods.newton.system import System
+from wholebody.methods.newton.system import Patterns, System
 from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.tasks.inputs import point

@@ -18,12 +18,44 @@ from wholebody.methods.newton.assembly_bodies import WORLD, AssemblyBodies
 from wholebody.methods.newton.assembly_constraint import AssemblyConstraint, OwnRows, checked, names_of
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.equations import EquationSet, axes_along
-from wholebody.methods.newton.joint_register import JointRegister
 from wholebody.methods.newton.surfaces import OnSurface, surface
 from wholebody.tasks.inputs import direction, point, target_placement
 
 if TYPE_CHECKING:
     from typing_extensions import Self
+
+
+SAME_PLACE = 1e-9  # m: joints of one kind between two bodies that are nearer than this are the same joint
+
+
+class JointRegister:
+    """Joints by kind and pair of bodies, with their positions in both, so that a joint given twice is refused."""
+
+    def __init__(self) -> None:
+        """Make an empty register."""
+        self._known: dict[tuple[str, frozenset[str]], list[dict[str, Array]]] = {}
+
+    def add(self, kind: str, first: str, second: str, places: tuple[Array, Array] | None = None) -> None:
+        """Add a joint.
+
+        Args:
+            kind: such as "revolute joint".
+            first: name of a body.
+            second: another.
+            places: (3,) positions of the joint in either body; joints at different positions are different, such as two
+                hinges. None for joints without a position.
+
+        Raises:
+            InputError: the joint exists already.
+        """
+        listed = self._known.setdefault((kind, frozenset((first, second))), [])
+        at = (np.zeros(3), np.zeros(3)) if places is None else places
+        here = {first: at[0], second: at[1]}
+        for other in listed:
+            if all(np.abs(other[name] - place).max() <= SAME_PLACE for name, place in here.items()):
+                where = "" if places is None else " there"
+                raise InputError(f"{kind}: {first!r} and {second!r} have one already{where}; leave the second out")
+        listed.append(here)
 
 
 class AssemblyJoints(AssemblyBodies):

@@ -13,8 +13,7 @@ from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.contacts import LONGEST, ContactSet
-from wholebody.methods.newton.patterns import Patterns
-from wholebody.methods.newton.system import WORLD, ActiveSystem, unit
+from wholebody.methods.newton.system import WORLD, ActiveSystem, Patterns, unit
 from wholebody.scene import Scene
 
 Batches = Sequence[tuple[Batch, Key]]

@@ -10,6 +10,7 @@ from abc import ABC, abstractmethod
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.errors import InputError
@@ -243,3 +244,74 @@ class Slide(Batch):
             upper[:, :, block] = result[:, block, TURN].transpose(0, 2, 1)
         result[:, TURN, :] = upper
         return result
+
+
+class MassCenter(Batch):
+    """The centre of mass along directions: n . sum_j s_j (r_j + R_j c_j) - h = 0, with s_j the bodies' shares of mass.
+
+    One group of equations of all bodies with mass. As an inequality it keeps the centre of mass above a polygon.
+    """
+
+    def __init__(
+        self, bodies: Indices, labels: list[str], shares: Array, centers: Array, directions: Array, height: Array
+    ) -> None:
+        """Take bodies (1, b), shares (b,), centers (b, 3) in the bodies, directions (m, 3) and heights (m,) [m]."""
+        super().__init__(bodies, labels)
+        self.size = len(directions)
+        self.shares, self.centers, self.directions, self.height = shares, centers, directions, height
+        along = (directions != 0.0)[:, None, :].repeat(bodies.shape[1], axis=1)
+        self.pattern = np.concatenate([along, np.ones((*along.shape[:2], 4), dtype=bool)], axis=2).reshape(
+            self.size, -1
+        )
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        pair = x[self.bodies[0]]
+        center = self.shares @ (pair[:, PLACE] + quat.rotate(pair[:, TURN], self.centers))
+        result: Array = (self.directions @ center - self.height)[None]
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        turns = x[self.bodies[0]][:, TURN]
+        result = np.empty((1, self.size, len(turns), 7))
+        result[0, :, :, PLACE] = self.directions[:, None, :] * self.shares[:, None]
+        slopes = self.shares[:, None, None] * quat.rotate_derivative(turns, self.centers)  # (b, 3, 4)
+        result[0, :, :, TURN] = np.einsum("mi,bij->mbj", self.directions, slopes)
+        return result.reshape(1, self.size, -1)
+
+
+class RootMotion(Batch):
+    """Displacement of a free root from a posture, in its own axes there, less a target; linear in the body.
+
+    Three rows are R_a' (r - r_a), three are 2 vec(conj(e_a) e). At r = r_a and e = e_a their derivative is that of
+    Pinocchio's tangent displacement.
+    """
+
+    size = 6
+    pattern = np.zeros((6, 7), dtype=bool)
+    pattern[:3, PLACE] = pattern[3:, TURN] = True
+
+    def __init__(self, body: int, label: str) -> None:
+        """Take the number of the root's body; `anchor` says from where it moves."""
+        super().__init__(np.array([[body]]), [label])
+        self._place, self._target, self._slope = np.zeros(3), np.zeros(6), np.zeros((6, 7))
+
+    def anchor(self, root: Array, target: Array) -> None:
+        """Count from the root's placement (7,), position and quaternion x, y, z, w, towards a displacement (6,)."""
+        a, b, c, w = root[3:].tolist()
+        self._place, self._target = root[:3].copy(), target
+        self._slope[:3, PLACE] = pin.Quaternion(root[3:]).toRotationMatrix().T
+        self._slope[3:, TURN] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
+
+    def residual(self, x: Array) -> Array:  # noqa: D102
+        body = x[self.bodies[0, 0]]
+        turned = self._slope[3:, TURN] @ body[TURN]
+        moved = self._slope[:3, PLACE] @ (body[PLACE] - self._place)
+        result: Array = np.concatenate([moved, turned])[None] - self._target
+        return result
+
+    def jacobian(self, x: Array) -> Array:  # noqa: D102
+        result: Array = self._slope[None].copy()
+        return result
+
+    def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
+        return np.zeros((1, 7, 7))

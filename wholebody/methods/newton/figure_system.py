@@ -9,8 +9,7 @@ from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key, Unit
 from wholebody.methods.newton.contacts import LONGEST, ContactSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.objective import Objective
-from wholebody.methods.newton.patterns import Patterns
-from wholebody.methods.newton.system import ActiveSystem
+from wholebody.methods.newton.system import ActiveSystem, Patterns
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
 from wholebody.workspace import Workspace

@@ -15,9 +15,8 @@ import numpy as np
 from wholebody.arrays import Array, Indices
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
-from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.batches import Batch, RootMotion
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.root_motion import RootMotion
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.tangent_rows import TangentRows, square_rows
 from wholebody.problem import Problem

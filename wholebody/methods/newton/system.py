@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Hashable, Sequence
 
 import numpy as np
 
@@ -10,6 +11,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.methods.control import Control
 from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
+from wholebody.methods.newton.linear_algebra.choice import linear_algebra
 
 WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
@@ -166,3 +168,33 @@ def unit(x: Array) -> Array:
     bodies[:, 3:] /= np.sqrt((bodies[:, 3:] ** 2).sum(axis=1, keepdims=True))
     result: Array = bodies.ravel()
     return result
+
+
+REMEMBERED = 32  # cached structures; more = more memory
+
+
+class Patterns:
+    """Systems by what lays them out: each pattern is analysed once while it is remembered; contacts come and go.
+
+    Attributes:
+        structures: number of patterns that were analysed.
+        laying: processor's time of these analyses [s].
+    """
+
+    def __init__(self, count: int, weight: Array, algebra: str) -> None:
+        """Take the number of bodies, the weights (7 count,) of the least motion, and the name of the factorisation."""
+        self._count, self._weight, self._algebra = count, weight, algebra
+        self._known: dict[Hashable, tuple[System, LinearAlgebra]] = {}
+        self.structures, self.laying = 0, 0.0
+
+    def system(self, laid: Hashable, batches: Sequence[tuple[Batch, Key]]) -> tuple[System, LinearAlgebra]:
+        """The system of these equations and its factorisation; `laid` tells patterns apart."""
+        if laid not in self._known:
+            if len(self._known) >= REMEMBERED:
+                self._known.clear()
+            began = time.process_time()
+            system = System(self._count, batches, self._weight)
+            self._known[laid] = (system, linear_algebra(system.pattern, self._algebra))
+            self.structures += 1
+            self.laying += time.process_time() - began
+        return self._known[laid]

@@ -12,11 +12,10 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.batches import Batch, MassCenter
 from wholebody.methods.newton.directions import Cone, Toward
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.mass_center import MassCenter
 from wholebody.methods.newton.quaternions import axes_with_z
 from wholebody.methods.newton.tangent_rows import constraint_rows, goal_rows
 from wholebody.problem import Problem

@@ -42,7 +42,7 @@ PATIENCE = 6
 PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
 UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the measure: then it ends
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
-RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to mend
+RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
@@ -132,7 +132,7 @@ class SQP:
         self._radius, self._measures, self._full_step = FIRST_RADIUS, self.measures, self.full_step
         self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
-        self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not mended
+        self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0

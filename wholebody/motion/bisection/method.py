@@ -15,10 +15,8 @@ from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.interpolation import Kind, key_frames
-from wholebody.motion.bisection.path_planes import ANKLES, ELBOWS
-from wholebody.motion.bisection.prediction import Predictor
-from wholebody.motion.bisection.recursion import Recursion, changed_frames, hold_between
-from wholebody.motion.bisection.stays import Stays
+from wholebody.motion.bisection.prediction import ANKLES, ELBOWS, Predictor
+from wholebody.motion.bisection.recursion import Recursion, Stays, changed_frames, hold_between
 from wholebody.motion.clip import Clip
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms

@@ -10,6 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
@@ -18,6 +20,45 @@ from wholebody.tasks import Effort, Freeze, Plane
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 from wholebody.workspace import Workspace
+
+ELBOWS = ("left_elbow", "right_elbow")
+ANKLES = ("left_ankle", "right_ankle")
+
+STANDS = 1e-4  # m: a shorter way from frame to frame has no direction; trackers are less exact than this
+
+
+def path_planes(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[Plane]:
+    """Planes through the places of joints at a frame, normal to their paths there (eqs. 3.2 and 3.3 of the thesis).
+
+    Elbows and wrists leave their paths only sideways.
+
+    The normal is the direction from the place at this frame to the place at the next one, at the last frame from the
+    one before. They are made anew from the present curves each time that a posture is predicted.
+
+    Args:
+        figure: the figure.
+        q: (n, nq) the present curves.
+        frame: which.
+        joints: names of the frames that move in their planes.
+        state: of the run; it is moved.
+
+    Returns:
+        One plane for each joint that moves there.
+    """
+    if len(q) < 2:
+        return []
+    numbers = [figure.frame_id(joint) for joint in joints]
+    here, there = (frame, frame + 1) if frame + 1 < len(q) else (frame - 1, frame)
+    places = []
+    for which in (here, there):
+        state.update(q[which])
+        places.append([np.array(state.frame(number).translation) for number in numbers])
+    planes = []
+    for joint, start, end, at in zip(joints, *places, places[frame - here], strict=True):
+        if np.linalg.norm(end - start) > STANDS:
+            planes.append(Plane(joint, end - start, point=at))
+    return planes
+
 
 HELD = 2e-4  # m, rad: by which what is held may be missed in a frame; a fifth of the millimetre that is visible
 ROOT_WEIGHT = 100.0  # of the root in the effort [1/m^2, 1/rad^2]: as the spine's, since moving it moves the whole body
