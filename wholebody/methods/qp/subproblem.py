@@ -265,6 +265,8 @@ def compiled_kernel() -> Any:
     subproblem_kernel.program(
         one, one, one, one, none, none, 0, none, none, True, True, number, np.ones((4, 1)), none, none
     )
+    subproblem_kernel.multipliers(rows, none, none, rows, none, none, np.zeros(0, dtype=bool), one, 1.0, none, none)
+    subproblem_kernel.work(none, none, index, none, index, none)
     one_joint = np.zeros(1, dtype=np.intp)
     subproblem_kernel.motion(one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one)
     return subproblem_kernel
