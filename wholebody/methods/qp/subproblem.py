@@ -117,8 +117,8 @@ class Subproblem:
             size = max(len(low), len(high))
             if size == 1:  # one bound may be that of many rows
                 size = np.size(constraint.value(state))
-            lower.append(np.broadcast_to(low, size))
-            upper.append(np.broadcast_to(high, size))
+            lower.append(low if len(low) == size else np.full(size, low[0]))
+            upper.append(high if len(high) == size else np.full(size, high[0]))
         for goal in problem.goals:
             weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
