@@ -2,9 +2,9 @@
 
 Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it
 leads to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is
-far, a step must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that
-narrows. No penalty weight has to be guessed, and measures may improve along curved constraints in long steps. Steps
-that could have jumped over something are swept.
+far, a step must lessen the violation; near, it must lessen the measures, as the Lagrangian counts them, and stay inside
+a funnel of violation that narrows. No penalty weight has to be guessed, and measures may improve along curved
+constraints in long steps. Steps that could have jumped over something are swept.
 """
 
 from __future__ import annotations
