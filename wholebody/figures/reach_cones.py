@@ -57,7 +57,6 @@ class ReachCone:
         self.boundaries: Array = normals / lengths[:, None]
         self._slices = np.cross(self.visible, self.vertices)
         self._following = following
-        self._next = np.roll(np.arange(len(following)), -1)
         across = (np.cross(self.boundaries, self.vertices), np.cross(following, self.boundaries))
         self.planes: Array = np.vstack([self.boundaries, *across, self.vertices, self._slices])
 
@@ -106,21 +105,26 @@ class ReachCone:
         return angle, away
 
     def _signed_angle_of_one(self, direction: Array) -> tuple[float, Array]:
-        """The same for one direction in a quarter of the time: constraints evaluate one limb at a time."""
-        count = len(self.vertices)
-        height, before, after, corner, side = (self.planes @ direction).reshape(5, count)
-        within = (before >= 0.0) & (after >= 0.0)
-        on_circle = np.sqrt(np.maximum(1.0 - height * height, 0.0))
-        nearness = np.where(within, on_circle, np.maximum(corner, corner[self._next]))
-        edge = int(nearness.argmax())
-        following = (edge + 1) % count
-        if within[edge] and on_circle[edge] > PARALLEL:
+        """The same for one direction in a tenth of the time: constraints evaluate one limb at a time."""
+        height, before, after, corner, side = (self.planes @ direction).reshape(5, -1).tolist()
+        edge, following, nearness, crossed = 0, 0, -inf, 0
+        last = len(height) - 1
+        for k in range(last, -1, -1):  # downwards: of edges that are equally near the first counts
+            beyond = k + 1 if k < last else 0
+            if before[k] >= 0.0 and after[k] >= 0.0:
+                near = sqrt(max(1.0 - height[k] * height[k], 0.0))
+            else:
+                near = max(corner[k], corner[beyond])
+            if near >= nearness:
+                edge, following, nearness = k, beyond, near
+            if side[k] >= 0.0 and side[beyond] < 0.0:
+                crossed = k
+        if before[edge] >= 0.0 and after[edge] >= 0.0 and nearness > PARALLEL:
             nearest = direction - height[edge] * self.boundaries[edge]
             nearest /= sqrt(nearest @ nearest)
         else:
             nearest = self.vertices[following if corner[following] > corner[edge] else edge]
-        wedge = np.flatnonzero((side >= 0.0) & (side[self._next] < 0.0))
-        sign = 1.0 if height[wedge[0] if len(wedge) else 0] >= 0.0 else -1.0
+        sign = 1.0 if height[crossed] >= 0.0 else -1.0
         cosine = float(direction @ nearest)
         away = cosine * direction - nearest
         sine = sqrt(away @ away)

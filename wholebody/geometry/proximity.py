@@ -118,6 +118,9 @@ class PairTable:
         joint: (n,) joint that carries each piece; 0 is the world.
         reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
         widths: (pairs,) width of both pieces together, metres.
+        points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
+        first_point: (n + 1,) where those of each piece begin.
+        radius: (n,) around them, metres.
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
@@ -136,7 +139,10 @@ class PairTable:
         self.half = np.array([half_box(swept) for swept in self.swept]).reshape(-1, 3)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
-        radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
+        radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
+        self.points = np.concatenate([np.zeros((0, 3)), *(swept.points for swept in self.swept)])
+        counts = [len(swept.points) for swept in self.swept]
+        self.first_point: Indices = np.cumsum([0, *counts], dtype=np.intp)
         # where round pieces' swept points meet, coal's normal is zero or noise along an axis
         self.points_meet = np.where(
             (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf

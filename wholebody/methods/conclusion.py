@@ -123,6 +123,8 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
 
 def _way_out(problem: Problem, judgement: Assessment) -> str:
     """What to state where the margin of a person's default balance stands in the way of what it can be; else empty."""
+    if not judgement.blockers:
+        return ""
     for term, name in zip(problem.constraints, problem.constraint_names, strict=True):
         margin = term.margin if isinstance(term, Balance) and term in problem.defaults else 0.0
         near = judgement.goal_error <= WORTH * margin

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.errors import InputError
 from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 
@@ -45,6 +45,26 @@ def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
     return found
 
 
+def parted(table: PairTable, before: Placed, after: Placed, pairs: Indices, dip: float) -> Mask:
+    """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it.
+
+    The heights of the arcs that points describe are allowed for; a pair that was not near before is not parted.
+
+    Args:
+        table: the pieces and pairs.
+        before: near pairs before the motion.
+        after: near pairs after it.
+        pairs: (k,) places among the collision pairs.
+        dip: metres by which a piece may be beyond the plane.
+    """
+    known = before.contacts
+    found: Mask = compiled_kernel().parted(
+        pairs, before.placements, after.placements, known.number, known.pair, known.normal, known.point_a,
+        known.point_b, table.points, table.first_point, table.radius, table.reach, dip,
+    )  # fmt: skip
+    return found
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
@@ -55,6 +75,11 @@ def compiled_kernel() -> Any:
     moved_pairs_kernel.far_moved(
         placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
     )
+    lines = np.zeros((0, 3))
+    moved_pairs_kernel.parted(
+        places, placements, placements, places, pairs, lines, lines, lines, lines, np.zeros(1, dtype=np.intp), none,
+        none, 0.0,
+    )  # fmt: skip
     return moved_pairs_kernel
 
 

@@ -1,10 +1,10 @@
-"""The pairs that moved by more than their distance, as compiled loops: see `moved_pairs`."""
+"""The pairs that moved by more than their distance, and planes between them, as compiled loops: see `moved_pairs`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 
@@ -77,6 +77,105 @@ def far_moved(
         found[kept] = p
         kept += 1
     return found[:kept]
+
+
+@compiled()
+def parted(
+    doubtful: Indices,
+    before: Array,
+    after: Array,
+    number: Indices,
+    pair: Indices,
+    normal: Array,
+    point_a: Array,
+    point_b: Array,
+    points: Array,
+    first_point: Indices,
+    radius: Array,
+    reach: Array,
+    dip: float,
+) -> Mask:
+    """Return whether the plane between the pieces of a pair before a motion, fixed to either, parts them after it (k,).
+
+    Args:
+        doubtful: (k,) pairs; those that were not near before are not parted.
+        before: (n, 4, 3) placements of the pieces before the motion.
+        after: the same after the motion.
+        number: (c,) pairs that were near before.
+        pair: (c, 2) their pieces.
+        normal: (c, 3) from the first piece to the second.
+        point_a: (c, 3) nearest point of the first.
+        point_b: (c, 3) and of the second.
+        points: (m, 3) swept points of all pieces, one piece after the other.
+        first_point: (n + 1,) where those of each piece begin.
+        radius: (n,) around the points.
+        reach: (n,) of the pieces from their origins.
+        dip: metres by which a piece may be beyond the plane.
+    """
+    found = np.zeros(len(doubtful), dtype=np.bool_)
+    for k in range(len(doubtful)):
+        for c in range(len(number)):
+            if number[c] == doubtful[k]:
+                a, b = pair[c, 0], pair[c, 1]
+                found[k] = _beyond(
+                    before, after, a, b, normal[c], 1.0, point_a[c], points[first_point[b] : first_point[b + 1]],
+                    radius[b], reach[b], dip,
+                ) or _beyond(
+                    before, after, b, a, normal[c], -1.0, point_b[c], points[first_point[a] : first_point[a + 1]],
+                    radius[a], reach[a], dip,
+                )  # fmt: skip
+                break
+    return found
+
+
+@compiled(inner=True)
+def _beyond(
+    before: Array,
+    after: Array,
+    carrier: int,
+    other: int,
+    normal: Array,
+    sign: float,
+    point: Array,
+    points: Array,
+    radius: float,
+    reach: float,
+    dip: float,
+) -> bool:
+    """Whether a piece stays beyond a plane that is fixed to another one, also on the arcs between both placements."""
+    if len(points) == 0:
+        return False
+    local_normal, height, apart = np.empty(3), 0.0, 0.0
+    for j in range(3):
+        along, place = 0.0, 0.0
+        for i in range(3):
+            along += sign * before[carrier, j, i] * normal[i]
+            place += before[carrier, j, i] * (point[i] - before[carrier, 3, i])
+        local_normal[j] = along
+        height += along * place
+        apart += (before[other, 3, j] - point[j]) ** 2
+    least, angle = np.inf, 0.0
+    for placed in (before, after):
+        world = np.zeros(3)  # the normal now
+        for i in range(3):
+            for j in range(3):
+                world[i] += placed[carrier, j, i] * local_normal[j]
+        for p in range(len(points)):
+            own = 0.0
+            for i in range(3):
+                at = placed[other, 3, i] - placed[carrier, 3, i]
+                for j in range(3):
+                    at += points[p, j] * placed[other, j, i]
+                own += world[i] * at
+            least = min(least, own - height - radius)
+    for piece in (carrier, other):
+        turned = 0.0
+        for j in range(3):
+            for i in range(3):
+                turned += (after[piece, j, i] - before[piece, j, i]) ** 2
+        angle += np.sqrt(0.5 * turned)
+    arc = 0.125 * angle * angle * (reach + np.sqrt(apart))
+    return bool(least - arc > -dip)
 
 
 @compiled(inner=True)

@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved
+from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved, parted
 from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
@@ -250,34 +250,7 @@ def _nearest(start: Array, end: Array) -> Array:
 
 def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indices) -> Indices:
     """The pairs that no plane separates before and after."""
-    listed = np.full(len(table.pairs), -1, dtype=np.intp)
-    listed[before.contacts.number] = np.arange(len(before.contacts.number))
-    return np.array([k for k in doubtful if not _parted(table, before, after, int(listed[k]))], dtype=np.intp)
-
-
-def _parted(table: PairTable, before: Placed, after: Placed, contact: int) -> bool:
-    """Whether the plane between two pieces before the motion, fixed to either, still separates them after it."""
-    if contact < 0:
-        return False
-    first, second = before.contacts.pair[contact]
-    normal = before.contacts.normal[contact]
-    for carrier, other, direction, point in (
-        (first, second, normal, before.contacts.point_a[contact]),
-        (second, first, -normal, before.contacts.point_b[contact]),
-    ):
-        swept = table.swept[other]
-        if not len(swept.points):
-            continue
-        local_normal = before.placements[carrier, :3] @ direction
-        local_point = before.placements[carrier, :3] @ (point - before.placements[carrier, 3])
-        heights = []
-        for placed in (before.placements, after.placements):
-            world = swept.points @ placed[other, :3] + placed[other, 3]
-            local = (world - placed[carrier, 3]) @ placed[carrier, :3].T
-            heights.append(float(((local - local_point) @ local_normal).min()) - swept.radius)
-        turned = after.placements[[carrier, other], :3] - before.placements[[carrier, other], :3]
-        angle = float(np.sqrt(0.5 * np.einsum("ijk,ijk->i", turned, turned)).sum())
-        arc = 0.125 * angle**2 * (swept.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
-        if min(heights) - arc > -DIP:
-            return True
-    return False
+    if not len(doubtful):
+        return doubtful
+    left: Indices = doubtful[~parted(table, before, after, doubtful, DIP)]
+    return left

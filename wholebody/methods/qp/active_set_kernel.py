@@ -88,6 +88,33 @@ def work_size(variables: int, soft: int, elastic: int) -> int:
     return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
 
 
+@compiled(inner=True)
+def _views(
+    work: Array, n: int, m: int, k: int
+) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array, Array]:
+    """Parts of `work` (see `work_size`) for n variables, m soft and k elastic rows.
+
+    They are the rows (m + k, n), room of the same size and of (m + k)^2; what rows are to be, their inverse weights and
+    multipliers (m + k,); room (k,) and three times (n,).
+    """
+    most = m + k
+    first, second, third = most * n, 2 * most * n, 2 * most * n + most * most
+    fourth = third + 3 * most
+    last = fourth + k
+    return (
+        work[:first].reshape((most, n)),
+        work[first:second].reshape((most, n)),
+        work[second:third],
+        work[third:][:most],
+        work[third + most :][:most],
+        work[third + 2 * most :][:most],
+        work[fourth:last],
+        work[last:][:n],
+        work[last + n :][:n],
+        work[last + 2 * n :][:n],
+    )
+
+
 @compiled(error_model="numpy")
 def primal_dual_active_set(
     diagonal: Array,
@@ -123,16 +150,7 @@ def primal_dual_active_set(
         Whether it is right: false after so many corrections, and where a set has no finite minimiser.
     """
     n, m, k = len(diagonal), len(target), len(places)
-    most = m + k
-    stacked = work[: most * n].reshape((most, n))
-    scaled = work[most * n : 2 * most * n].reshape((most, n))
-    begin = 2 * most * n
-    table = work[begin : begin + most * most]
-    begin += most * most
-    right, compliance, multiplier = work[begin:][:most], work[begin + most :][:most], work[begin + 2 * most :][:most]
-    begin += 3 * most
-    reached, begin = work[begin:][:k], begin + k
-    inverse, gradient, trial = work[begin:][:n], work[begin + n :][:n], work[begin + 2 * n :][:n]
+    stacked, scaled, table, right, compliance, multiplier, reached, inverse, gradient, trial = _views(work, n, m, k)
     for r in range(m):
         compliance[r] = 1.0 / weight[r]
         right[r] = target[r]
@@ -246,13 +264,7 @@ def minimise_without_gradient(
         Whether it is finite.
     """
     n, m, k = len(diagonal), len(target), len(least)
-    most = m + k
-    stacked, begin = work[: most * n].reshape((most, n)), most * n
-    scaled, begin = work[begin:][: most * n].reshape((most, n)), begin + most * n
-    table, begin = work[begin:][: most * most], begin + most * most
-    right, compliance, multiplier = work[begin:][:most], work[begin + most :][:most], work[begin + 2 * most :][:most]
-    begin += 3 * most + k
-    inverse, gradient, trial = work[begin:][:n], work[begin + n :][:n], work[begin + 2 * n :][:n]
+    stacked, scaled, table, right, compliance, multiplier, _, inverse, gradient, trial = _views(work, n, m, k)
     size = 0
     for r in range(m):
         stacked[size], right[size], compliance[size] = rows[r], target[r], 1.0 / weight[r]

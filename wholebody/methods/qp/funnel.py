@@ -50,7 +50,7 @@ class Funnel:
         """Judge a step.
 
         Args:
-            before: violation and measures before it.
+            before: violation and measures before it; near the goals the Lagrangian stands for the measures.
             after: and after it.
             predicted: what was foreseen.
             measures: whether the measures count.

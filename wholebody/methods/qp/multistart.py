@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, repeat
+from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
@@ -110,11 +110,12 @@ class Search:
         least = least_left(self.contradictions)
         if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
-        hooked = list(hooked_hands(self.problem, self.lineariser.state, start))
-        ends = (self._feasibility_first(q) for q in hooked)
-        for local, how in chain(self._relaxed_probes(iter(hooked)), zip(ends, repeat("from hooked hands"))):
-            if self._accept(local, how):
-                return
+        hooked = [*hooked_hands(self.problem, self.lineariser.state, start)]
+        ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
+        near = self.best.violation.left <= RELAXATION_DEPTH  # as far as limbs in the way keep goals off
+        again = self._relaxed_probes(iter([start] if near else []))
+        if any(self._accept(*found) for found in chain(self._relaxed_probes(iter(hooked)), ends, again)):
+            return
         if self._known_out_of_reach(self.best.q):
             return
         self._least = least
@@ -123,11 +124,10 @@ class Search:
         self._leave_cancelling()
         rng = np.random.default_rng(self.settings.seed)
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
-        few = self._moving() < FEW
-        if few:
+        if few := self._moving() < FEW:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
         others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
-        for local, how in self._relaxed_probes(chain([start], self._through, others)):
+        for local, how in self._relaxed_probes(chain([] if near else [start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
@@ -223,8 +223,8 @@ class Search:
 
     def _proven(self) -> bool:
         """Whether the best posture is known to be as near to the goals as any."""
-        left = self.best.violation.left
-        return bool(self._least) and _held(self.best, self.settings.tolerance) and left <= NEAREST * self._least
+        near = self.best.violation.left <= NEAREST * self._least
+        return near and bool(self._least) and _held(self.best, self.settings.tolerance)
 
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.

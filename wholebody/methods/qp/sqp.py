@@ -2,9 +2,9 @@
 
 Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it
 leads to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is
-far, a step must lessen the violation; near, it must lessen the measures and stay inside a funnel of violation that
-narrows. No penalty weight has to be guessed, and measures may improve along curved constraints in long steps. Steps
-that could have jumped over something are swept.
+far, a step must lessen the violation; near, it must lessen the measures, as the Lagrangian counts them, and stay inside
+a funnel of violation that narrows. No penalty weight has to be guessed, and measures may improve along curved
+constraints in long steps. Steps that could have jumped over something are swept.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
+from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
@@ -84,6 +85,7 @@ class Step(NamedTuple):
         flat: whether the tangential part saves less of the measures than counts.
         answer: (nv,) the program's answer.
         predicted: what the step is to bring.
+        multipliers: of the program; None as for the parts.
     """
 
     dq: Array
@@ -91,6 +93,7 @@ class Step(NamedTuple):
     flat: bool
     answer: Array
     predicted: PredictedReduction
+    multipliers: Multipliers | None
 
 
 @dataclass
@@ -215,16 +218,19 @@ class SQP:
 
     def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
-        x, parts, flat = answer.x, None, False
+        x, parts, flat, multipliers = answer.x, None, False, None
         if self._measures and here.violation.total <= WIDTH:
             parts = parts_of(program, answer, self._shift, self._working_set)
-        if parts is not None:
+        if parts is None:
+            saved = self.subproblem.saving(program, here.rows, x)
+        else:
             saved = self.subproblem.bending(program, here.rows, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
+            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
         violation = self.subproblem.violation(here.rows, x).total
-        predicted = PredictedReduction(here.violation.total - violation, self.subproblem.saving(program, here.rows, x))
-        return Step(x, parts, flat, answer.x, predicted)
+        predicted = PredictedReduction(here.violation.total - violation, saved)
+        return Step(x, parts, flat, answer.x, predicted, multipliers)
 
     def _settled(self, here: Iterate, step: Step) -> bool:
         """Whether nothing worth having is foreseen."""
@@ -248,14 +254,14 @@ class SQP:
         fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
         if fast is not None:
             leap = self._moved(here, fast)
-            acceptance = self._judge(here, leap, step.predicted)
+            acceptance = self._judge(here, leap, step)
             if acceptance.accepted and not self._jumps(here, leap):
                 self._record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
             self._ahead.refused()
         dq = step.dq
         there = self._moved(here, dq)
-        acceptance = self._judge(here, there, step.predicted)
+        acceptance = self._judge(here, there, step)
         promising = not acceptance.accepted and self._promises(here, there)
         if (acceptance.accepted or promising) and self._jumps(here, there):
             acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
@@ -331,16 +337,21 @@ class SQP:
             rows.soft_error[: rows.goals] -= self.offset
         return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within), longest)
 
-    def _judge(self, here: Iterate, there: Iterate, predicted: PredictedReduction) -> StepAcceptance:
+    def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
+        predicted = step.predicted
         if self._anchor is not None:
             predicted = with_values(
                 predicted, violation=max(0.1 * predicted.violation, 1e-3 * self._anchor.violation.total)
             )
         before = here if self._anchor is None else self._anchor
+        measures = [
+            one.at.measure if step.multipliers is None else step.multipliers.lagrangian(one.at.measure, one.rows)
+            for one in (before, there)
+        ]
         return self._funnel.judge(
-            (before.violation.total, before.at.measure),
-            (there.violation.total, there.at.measure),
+            (before.violation.total, measures[0]),
+            (there.violation.total, measures[1]),
             predicted,
             self._measures,
         )

@@ -117,8 +117,8 @@ class Subproblem:
             size = max(len(low), len(high))
             if size == 1:  # one bound may be that of many rows
                 size = np.size(constraint.value(state))
-            lower.append(np.broadcast_to(low, size))
-            upper.append(np.broadcast_to(high, size))
+            lower.append(low if len(low) == size else np.full(size, low[0]))
+            upper.append(high if len(high) == size else np.full(size, high[0]))
         for goal in problem.goals:
             weight.append(np.full(np.atleast_1d(goal.error(state)).shape, goal.weight))
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
@@ -265,6 +265,8 @@ def compiled_kernel() -> Any:
     subproblem_kernel.program(
         one, one, one, one, none, none, 0, none, none, True, True, number, np.ones((4, 1)), none, none
     )
+    subproblem_kernel.multipliers(rows, none, none, rows, none, none, np.zeros(0, dtype=bool), one, 1.0, none, none)
+    subproblem_kernel.work(none, none, index, none, index, none)
     one_joint = np.zeros(1, dtype=np.intp)
     subproblem_kernel.motion(
         one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one, np.zeros((1, 6))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 
 
@@ -186,6 +186,64 @@ def _middle(values: Array) -> float:
             back -= 1
         ordered[back + 1] = own
     return float(ordered[len(values) // 2])
+
+
+@compiled()
+def multipliers(
+    rows: Array,
+    target: Array,
+    weight: Array,
+    elastic: Array,
+    least: Array,
+    elastic_weight: Array,
+    pushing: Mask,
+    x: Array,
+    scale: float,
+    soft_multiplier: Array,
+    elastic_multiplier: Array,
+) -> None:
+    """Write the multipliers of a program's first soft rows and of its elastic ones, as `Multipliers` has them.
+
+    The arguments up to `elastic_weight` are the program's; `x` (n,) is its answer with the elastic rows that push (k,),
+    and `scale` what measures are multiplied by. The last two, (m,) and (k,), are written.
+    """
+    for r in range(len(soft_multiplier)):
+        residual = -target[r]
+        for i in range(len(x)):
+            residual += rows[r, i] * x[i]
+        soft_multiplier[r] = weight[r] * residual / scale
+    for j in range(len(elastic_multiplier)):
+        violated = 0.0
+        if pushing[j]:
+            violated = least[j]
+            for i in range(len(x)):
+                violated -= elastic[j, i] * x[i]
+        elastic_multiplier[j] = elastic_weight[j] * violated / scale
+
+
+@compiled()
+def work(
+    soft_multiplier: Array,
+    elastic_multiplier: Array,
+    key: Indices,
+    soft_error: Array,
+    key_there: Indices,
+    violated: Array,
+) -> float:
+    """Sum of the multipliers times the errors (m,) and the violations (k,) of a posture.
+
+    Elastic rows are those with the same keys; the ones that `key_there` (k,) has not add nothing.
+    """
+    total = 0.0
+    for r in range(len(soft_error)):
+        total += soft_multiplier[r] * soft_error[r]
+    for j in range(len(key)):
+        if elastic_multiplier[j] != 0.0:
+            for other in range(len(key_there)):
+                if key_there[other] == key[j]:
+                    total += elastic_multiplier[j] * violated[other]
+                    break
+    return total
 
 
 @compiled()

@@ -55,21 +55,28 @@ class Extrapolation:
         """Begin with nothing known."""
         self._memory = Anderson()
         self._longest = STRETCH  # plain tangential parts
+        self._as_plain = False  # whether the last proposal would have been the program's own step
 
     def propose(self, parts: Parts, program: QuadraticProgram) -> Array | None:
-        """The extrapolated step (n,) within the box of the program; None while too little is known."""
+        """The extrapolated step (n,) within the box of the program.
+
+        None while too little is known, and where it would be the program's own step.
+        """
         plain = parts.tangential
-        fast = self._memory.propose(plain, self._longest)
+        fast, self._as_plain = self._memory.propose(plain, self._longest), False
         if fast is None:
             return None
         if fast @ (program.diagonal * plain) <= 0.0:  # back to where the measures are flat and curve downwards
+            if self._longest <= 1.0:  # not looked at twice
+                self._as_plain = True
+                return None
             fast = min(ALONG, self._longest) * plain
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
     def went(self, parts: Parts, way: Array, extrapolated: bool) -> None:
         """Remember the way (n,) that was gone after the last proposal, and whether it was the proposed one."""
         self._memory.went(way - parts.normal)
-        if extrapolated:
+        if extrapolated or self._as_plain:
             self._longest = min(LONGER * self._longest, STRETCH)
 
     def refused(self) -> None:
