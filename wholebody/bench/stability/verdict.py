@@ -213,6 +213,11 @@ class Result:
         """How many of a method's verdicts are of one kind."""
         return sum(self.verdicts[case.name, method].kind == kind for case in self.cases)
 
+    @property
+    def minutes(self) -> float:
+        """How long all answers took together, by the clock."""
+        return sum(cell.answer.seconds for cell in self.cells.values()) / 60.0
+
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
         return sum(self.verdicts[case.name, method].acceptable for case in self.cases)
