@@ -50,6 +50,7 @@ def folder(asked: Settings, tmp_path_factory: pytest.TempPathFactory) -> Path:
     docs = place / "docs"
     docs.mkdir()
     (docs / "results.md").write_text("before\n<!-- bench:compare -->\nold\n<!-- /bench:compare -->\nafter\n")
+    (docs / "comparison.md").write_text("<!-- bench:compare-variants -->\n<!-- /bench:compare-variants -->\n")
     store = Store(place / "out", asked.described())
     for number in range(2):
         records = [record("solves", number, 10.0**-k, 0.01 * k, 10.0**-k / 2) for k in (2, 4, 6)]

@@ -12,7 +12,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench.compare.advice import choices, effort, error, reference, slowness, standings
+from wholebody.bench.compare.advice import choices, effort, error, percent, reference, slowness, standings
 from wholebody.bench.compare.charts import groups
 from wholebody.bench.compare.examples import Pair, fault, resisting
 from wholebody.bench.compare.paired import named
@@ -91,8 +91,8 @@ def write_pages(
         text = render(
             "compare_method.md", adapter=adapter, rows=[row for row in rows if row.method == adapter.name],
             titles={family.name: family.title for family in given.settings.sets}, standing=standing.get(adapter.name),
-            sentence=partial(_sentence, adapter.name), slowness=slowness, base=reference(results), good=GOOD,
-            sets=len(given.settings.sets), facts=given.facts, fault=fault,
+            sentence=partial(_sentence, adapter.name), slowness=slowness, percent=percent, base=reference(results),
+            good=GOOD, sets=len(given.settings.sets), facts=given.facts, fault=fault,
             pairs=[(one.title, pair) for one in given.settings.sets if any(pair := examples[one.name, adapter.name])],
         )  # fmt: skip
         path = folder / FOLDER / page_name("method", adapter.name)

@@ -8,7 +8,18 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings, targets
+from wholebody.bench.compare import variants
+from wholebody.bench.compare.advice import (
+    advice,
+    choices,
+    effort,
+    error,
+    percent,
+    reference,
+    slowness,
+    standings,
+    targets,
+)
 from wholebody.bench.compare.charts import draw_all, groups
 from wholebody.bench.compare.examples import pairs
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
@@ -62,6 +73,7 @@ def publish(
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
     write_rows(folder / "summary.csv", facts, given.rows)
+    write_rows(folder / "seeds.csv", facts, sensitivity(given.results))
     write_lock(folder / LOCK, locked(given))
     front = fronts(given.results)
     if front:
@@ -85,6 +97,7 @@ def publish(
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)
+        replace_section(docs / "comparison.md", "compare-variants", variants.report(given.results))
         write_lock(docs / "assets" / "bench" / f"compare-{LOCK}", locked(given))
         (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
         for svg, _ in (found for name, found in charts.items() if f"/{name}.svg" in short):
@@ -106,7 +119,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
         picked=choices(results, given.rows), targets=targets(given.rows, wall, dependable),
         plain=_plain,
         ranked=standings(results, given.rows), reference=reference(results), error=error, effort=effort,
-        slowness=slowness, rival=_rival, chart=_chart,
+        slowness=slowness, percent=percent, rival=_rival, chart=_chart,
         least=min(counts, default=0), most=max(counts, default=0), few=FEW,
         wall=wall, off=[rival for rival in wall if not rival.on_front], dependable=dependable,
         by_cpu=by_cpu, by_most=by_most, ours=OURS,
