@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import NamedTuple
 
 from wholebody.bench.compare.record import COARSE, Difficulty, Record
@@ -68,8 +69,8 @@ def pairs(results: Results, chunks: Sequence[Chunk]) -> dict[tuple[str, str], Pa
                 if (family, one.number) in known
             ]
             found[family, name] = Pair(
-                max((one for one in examples if one.solved), key=_hard, default=None),
-                min((one for one in examples if not one.solved), key=_hard, default=None),
+                max((one for one in examples if one.solved), key=attrgetter("difficulty"), default=None),
+                min((one for one in examples if not one.solved), key=attrgetter("difficulty"), default=None),
             )
     return found
 
@@ -100,7 +101,3 @@ def fault(record: Record) -> str:
 
 def _amount(value: float) -> str:
     return f"{1e3 * value:.2g} mm or mrad" if value < 0.1 else f"{value:.2g} m or rad"
-
-
-def _hard(example: Example) -> Difficulty:
-    return example.difficulty

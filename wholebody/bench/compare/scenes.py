@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import gzip
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from typing import NamedTuple
 
 from wholebody.bench.adapters.base import Adapter
@@ -42,26 +43,25 @@ class Scene(NamedTuple):
 
 
 def chosen(results: Results, found: Mapping[tuple[str, str], Pair]) -> list[Example]:
-    """The pairs that are drawn: of the methods of the first chart, in every set that has no moving goals."""
+    """Of every set that has no moving goals the hardest problem that is solved and the easiest that is failed.
+
+    Among the methods of the first chart; one that has no posture is not drawn.
+    """
     first = groups(results.adapters)[0] if results.adapters else ()
-    listed = [found[family, name] for family in results.sets if not results.moving(family) for name in first]
-    return [one for pair in listed for one in pair if one is not None and one.record.answered]
+    listed: list[Example | None] = []
+    for family in results.sets:
+        mine = [] if results.moving(family) else [found[family, name] for name in first]
+        solved = [pair.hardest for pair in mine if pair.hardest]
+        failed = [pair.easiest for pair in mine if pair.easiest and pair.easiest.record.answered]
+        listed.append(max(solved, key=attrgetter("difficulty"), default=None))
+        listed.append(min(failed, key=attrgetter("difficulty"), default=None))
+    return [one for one in listed if one is not None]
 
 
 def in_brief(scenes: Sequence[Scene]) -> list[Scene]:
-    """For a page of all sets: of each the hardest of the solved problems and the easiest of the failed ones."""
-    brief = []
-    for family in dict.fromkeys(scene.shown.record.set for scene in scenes):
-        mine = [scene for scene in scenes if scene.shown.record.set == family]
-        solved = [scene for scene in mine if scene.shown.solved]
-        failed = [scene for scene in mine if not scene.shown.solved]
-        brief += [max(solved, key=_hard)] if solved else []
-        brief += [min(failed, key=_hard)] if failed else []
-    return brief
-
-
-def _hard(scene: Scene) -> tuple[bool, float]:
-    return scene.shown.difficulty
+    """For a page of all sets: of each the problem that is failed, or the one that is solved where none is failed."""
+    last = {scene.shown.record.set: scene for scene in scenes}
+    return list(last.values())
 
 
 def draw(
