@@ -176,3 +176,13 @@ def test_seeds_that_differ_are_noticed_and_others_are_not() -> None:
     assert statistics.same_share([(20, 20), (20, 20)]) == 1.0
     expected = stats.chi2_contingency([[40, 20], [25, 35]], correction=False).pvalue
     assert statistics.same_share([(40, 60), (25, 60)]) == pytest.approx(expected, abs=0.02)
+
+
+@pytest.mark.parametrize(("more", "fewer", "expected"), [(0, 0, 1.0), (6, 0, 1 / 32), (0, 5, 1 / 16), (3, 1, 0.625)])
+def test_what_two_methods_solve_is_compared_by_the_problems_that_only_one_solves(
+    more: int, fewer: int, expected: float
+) -> None:
+    """By coin tosses: twice the probability of as few heads."""
+    one = {number: number < 10 + more for number in range(40)}
+    other = {number: number < 10 or 20 <= number < 20 + fewer for number in range(45)}
+    assert statistics.paired_difference(one, other) == pytest.approx(expected)

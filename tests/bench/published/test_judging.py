@@ -11,6 +11,7 @@ from published_helpers import answers
 
 from wholebody.bench.published.answers import read_answers
 from wholebody.bench.published.judging import TIMEOUT, as_json, judge
+from wholebody.bench.published.words import left_out
 from wholebody.cli import main
 from wholebody.errors import FileFormatError, InputError, WholebodyError
 
@@ -72,6 +73,16 @@ def test_the_effort_is_compared_with_the_best_known(folder: Path, tmp_path: Path
     assert one.effort_above == pytest.approx(own / best - 1.0, rel=1e-6)
 
 
+def test_postures_in_degrees_are_told(folder: Path, tmp_path: Path) -> None:
+    content = answers(folder, ["robot_arm/0000", "robot_arm/0001"])
+    right = judge(read_answers(written(tmp_path, content), folder), folder)
+    assert not any("radians" in line for line in left_out(right))
+    content["answers"][1]["posture"] = [180.0 / 3.141592653589793 * value for value in content["answers"][1]["posture"]]
+    told = left_out(judge(read_answers(written(tmp_path, content), folder), folder))
+    assert any(line.startswith("Far out of the joint limits: 1, robot_arm/0001 first") for line in told)
+    assert "Answered and not solved: 1; what is worst of each: joint limits 1." in told
+
+
 def mangled(content: dict[str, Any], **changes: Any) -> dict[str, Any]:
     item = {**content["answers"][0], **changes}
     return {**content, "answers": [{key: value for key, value in item.items() if value is not None}]}
@@ -87,11 +98,13 @@ def malformed(content: dict[str, Any]) -> list[tuple[Any, str]]:
         ({**content, "metod": "x"}, "no entry is called 'metod'; did you mean method"),
         ({**content, "method": ""}, "name your solver"),
         ({**content, "answers": {}}, "answers is an object; give a list"),
+        ({**content, "answers": []}, "answers is empty; give an object for each problem"),
         ({**content, "answers": [3]}, "answers[0] is a number"),
         ({**content, "answers": content["answers"] * 2}, "answers[1] answers free_reach/0000 from the near seed a"),
         (mangled(content, problem="free_reach/9"), "answers[0]: no problem is called 'free_reach/9'; did you mean"),
         (mangled(content, seed="mid"), "answers[0].seed is 'mid'; give 'near' or 'far'"),
         (mangled(content, posture=None), "answers[0] has no posture"),
+        (mangled(content, posture={"left_knee_flexion": 0.1}), "numbers, in the order of coordinates in bodies/human"),
         (mangled(content, posture=posture[1:]), f"answers[0].posture has {len(posture) - 1} numbers"),
         (mangled(content, posture=[*posture[:-1], "a"]), f"answers[0].posture[{len(posture) - 1}] is 'a'"),
         (mangled(content, posture=[*posture[:-1], 1e9]), "give finite radians"),

@@ -12,7 +12,7 @@ from published_helpers import answers
 from wholebody.bench.compare.statistics import NOTHING, share
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.published.judging import NONE, Judged, set_score
-from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences, styles
+from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences, styles, summary
 from wholebody.cli import main
 from wholebody.errors import InputError
 
@@ -75,3 +75,16 @@ def test_folders_without_answers_and_methods_of_one_name_are_refused(folder: Pat
         (tmp_path / f"{name}.json").write_text(json.dumps(answers(folder, ["robot_arm/0000"])))
     with pytest.raises(InputError, match="both have the method 'witness'"):
         judge_folder(tmp_path, folder)
+
+
+def test_nobody_leads_where_nothing_is_solved(folder: Path, tmp_path: Path, names: list[str]) -> None:
+    arms = [name for name in names if name.startswith("robot_arm")]
+    content = answers(folder, arms)
+    for item in content["answers"]:
+        item["posture"] = json.loads((folder / "problems" / f"{item['problem']}.json").read_text())["seeds"]["near"]
+    (tmp_path / "a.json").write_text(json.dumps(content))
+    verdicts = judge_folder(tmp_path, folder)
+    (board,) = boards(verdicts, ["robot_arm"])
+    assert board.leading == ()
+    assert summary([board]) == {"robot arm, near": "nobody"}
+    assert sentences(board, verdicts) == ["Nobody took every problem and solved one."]

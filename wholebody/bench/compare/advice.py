@@ -9,9 +9,9 @@ from typing import NamedTuple
 from wholebody.bench.compare import paired
 from wholebody.bench.compare.front import OURS, Rival
 from wholebody.bench.compare.paired import named
-from wholebody.bench.compare.record import FLOOR
+from wholebody.bench.compare.record import COARSE, FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
-from wholebody.bench.compare.statistics import NOTHING, Interval, ratio
+from wholebody.bench.compare.statistics import LEVEL, NOTHING, Interval, paired_difference, ratio
 from wholebody.bench.compare.summary import GOOD, Summary
 from wholebody.bench.report import upfirst, words
 
@@ -23,7 +23,8 @@ class Choice(NamedTuple):
         fastest: dependable methods with the least time; the median milliseconds of the first.
         exact: dependable methods with the least error at any of their budgets; the median error of the first.
         cheapest: dependable methods with the least effort; the median effort of the first above the best known.
-        leading: those that solve most, of the methods that were given all problems; their share.
+        leading: of the methods that were given all problems, the one that solves most, and those that do not solve
+            fewer by more than chance, of the same problems; the share of the first.
     """
 
     set: str
@@ -43,7 +44,7 @@ class Standing(NamedTuple):
     Attributes:
         taken: sets of which it takes every case.
         dependable: sets of which it solves at least 98 %.
-        worst_set, worst_share: where it solves least of what it takes.
+        worst_set, worst: where it solves least of what it takes.
         slowness: its time over that of the method that others are compared with, on the problems that both solve.
         false_claims: answers called solved that are off by more than 1 mm.
         deepest_mm: deepest overlap of all answers.
@@ -53,7 +54,7 @@ class Standing(NamedTuple):
     taken: int
     dependable: int
     worst_set: str
-    worst_share: float
+    worst: Interval
     slowness: Interval
     false_claims: int
     deepest_mm: float
@@ -67,13 +68,13 @@ def choices(results: Results, rows: Sequence[Summary]) -> list[Choice]:
 def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     good = [row.method for row in rows if row.dependable]
     given = max((row.cases for row in rows), default=0)  # others had easier or harder problems
-    shares = {
-        row.method: row.success * (row.cases - row.refused) / row.cases
+    solved = {
+        row.method: {one.number: one.success(COARSE) for one in results.default(family, row.method)}
         for row in rows
         if row.refused < row.cases == given
     }
-    most = max(shares.values(), default=0.0)
-    leading = tuple(name for name, share in shares.items() if share == most)
+    order = sorted(solved, key=lambda name: -sum(solved[name].values()))
+    leading = tuple(name for name in order if paired_difference(solved[order[0]], solved[name]) > 1.0 - LEVEL)
     fast = paired.best({name: paired.times(results, [family], name) for name in good})
     errors = {name: paired.errors(results, family, name) for name in good}
     exact = paired.best(errors)
@@ -84,7 +85,7 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
         fast, next((row.median_ms for row in rows if fast and row.method == fast[0]), nan),
         exact, middle(list(errors[exact[0]].values())) if exact else nan,
         cheap, middle(list(efforts[cheap[0]].values())) if cheap else nan,
-        leading, most,
+        leading, sum(solved[order[0]].values()) / given if order else 0.0,
     )  # fmt: skip
 
 
@@ -109,7 +110,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
                 sum(not row.refused for row in mine),
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
-                worst.success if worst else nan,
+                Interval(worst.success, worst.success_low, worst.success_high, worst.cases) if worst else NOTHING,
                 ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
@@ -133,12 +134,17 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
             solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
             said.append(
                 f"**{words(choice.set).capitalize()} is solved dependably by none;** "
-                f"{named(choice.leading)} {solve} most, {100 * choice.leading_share:.3g} %."
+                f"{named(choice.leading)} {solve} most, {100 * choice.leading_share:.3g} %{_alike(choice.leading)}."
             )
     for standing in ranked:
-        if standing.dependable == 0 and isfinite(standing.worst_share):
+        if standing.dependable == 0 and isfinite(standing.worst.value):
             said += _warning(standing, rows)
     return said
+
+
+def _alike(leading: Sequence[str]) -> str:
+    """What to add to the share of the first of several methods that cannot be told apart."""
+    return " by the first, and not apart from it by more than chance" if len(leading) > 1 else ""
 
 
 def _by_method(found: Iterable[tuple[Sequence[str], str]]) -> str:
@@ -177,7 +183,8 @@ def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
     return [
         f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
-        f"({words(best.set)}) and in {words(standing.worst_set)} {100 * standing.worst_share:.0f} %{deep}."
+        f"[{100 * best.success_low:.0f}, {100 * best.success_high:.0f}] ({words(best.set)}) and in "
+        f"{words(standing.worst_set)} {percent(standing.worst)}{deep}."
     ]
 
 
@@ -235,6 +242,11 @@ def error(value: float) -> str:
 def effort(value: float) -> str:
     """An effort above the best known, in the same way."""
     return f"at most +{100 * EFFORT_FLOOR:.2g} %" if value <= EFFORT_FLOOR else f"+{100 * value:.2g} %"
+
+
+def percent(found: Interval) -> str:
+    """A share with its interval; empty where there is none."""
+    return f"{100 * found.value:.0f} % [{100 * found.low:.0f}, {100 * found.high:.0f}]" if isfinite(found.value) else ""
 
 
 def slowness(found: Interval) -> str:

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 
 from wholebody.batches import own_child
 from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
-from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
+from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
 from wholebody.bench.compare.reference_kernel import kernel_seconds
-from wholebody.bench.compare.solving import BUILDING, Which, built, solved, warmed
+from wholebody.bench.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.runner import Child, EndedError
@@ -45,6 +45,7 @@ def work(task: Task) -> Chunk:
     began = time.perf_counter()
     try:
         fault = child.call(built, which, seconds=BUILDING)
+        hard: Difficulty | None = None if fault else child.call(difficulty, which, seconds=BUILDING)
     except EndedError as error:
         fault = str(error)
     building = time.perf_counter() - began
@@ -65,7 +66,7 @@ def work(task: Task) -> Chunk:
         if ladder and spent[adapter.name] * len(ladder) <= task.most:
             records += _sweep(child, adapter, ladder, task, first, ended)
             swept[adapter.name] = time.perf_counter() - between
-    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel)
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel, hard)
 
 
 def _sweep(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from math import inf
 from typing import NamedTuple
 
@@ -10,7 +11,6 @@ from wholebody.bench.compare.record import COARSE
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import SEEDS
 from wholebody.bench.compare.statistics import LEAST, LEVEL, Ranking, ranking, same_share
-from wholebody.records import with_values
 
 
 class SetRanking(NamedTuple):
@@ -48,7 +48,8 @@ def _ranked(results: Results, family: str) -> SetRanking:
     return SetRanking(family, found, left_out)
 
 
-class SeedShares(NamedTuple):
+@dataclass(frozen=True)
+class SeedShares:
     """A method in a set, by the seed that problems were made from.
 
     Attributes:
@@ -63,6 +64,16 @@ class SeedShares(NamedTuple):
     p_value: float
     differs: bool
 
+    @property
+    def spread(self) -> float:
+        """Greatest difference between the shares of two seeds; 0 where a seed has too few problems to tell."""
+        known = [won / of for won, of in self.shares if of >= LEAST]
+        return max(known) - min(known) if len(known) == len(self.shares) else 0.0
+
+    def in_words(self, title: str) -> str:
+        """The shares of each seed."""
+        return f"`{self.method}` in {title} ({', '.join(f'{won} of {of}' for won, of in self.shares)})"
+
 
 def sensitivity(results: Results) -> list[SeedShares]:
     """Whether what a method solves depends on the seed, for every method in every set of which it took something."""
@@ -76,7 +87,7 @@ def sensitivity(results: Results) -> list[SeedShares]:
             shares = tuple((sum(record.success(COARSE) for record in group), len(group)) for group in groups)
             found.append(SeedShares(family, adapter, shares, same_share(shares), False))
     differing = _holm([row.p_value for row in found])
-    return [with_values(row, differs=differs) for row, differs in zip(found, differing, strict=True)]
+    return [replace(row, differs=differs) for row, differs in zip(found, differing, strict=True)]
 
 
 def _holm(p_values: Sequence[float]) -> list[bool]:
@@ -102,14 +113,13 @@ def in_words(found: Ranking) -> str:
 
 def seeds_in_words(rows: Sequence[SeedShares], titles: Mapping[str, str]) -> str:
     """Whether the seeds matter, in one or two sentences."""
-    differing = [row for row in rows if row.differs]
-    if not differing:
-        return (
-            f"Every set is made from {SEEDS} seeds in turn. No method's share of solved problems differs between the "
-            "seeds by more than chance."
-        )
-    listed = "; ".join(
-        f"`{row.method}` in {titles.get(row.set, row.set)} ({', '.join(f'{won} of {of}' for won, of in row.shares)})"
-        for row in differing
-    )
-    return f"Every set is made from {SEEDS} seeds in turn. What is solved depends on the seed for {listed}."
+    said = [f"Every set is made from {SEEDS} seeds in turn."]
+    differing = [row.in_words(titles.get(row.set, row.set)) for row in rows if row.differs]
+    if differing:
+        said.append(f"What is solved depends on the seed for {'; '.join(differing)}.")
+    else:
+        said.append("No method's share of solved problems differs between the seeds by more than chance.")
+    widest = max(rows, key=lambda row: row.spread, default=None)
+    if widest and widest.spread > 0.0:
+        said.append(f"The widest spread is that of {widest.in_words(titles.get(widest.set, widest.set))}.")
+    return " ".join(said)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
+from typing import NamedTuple
 
 from wholebody.bench.adapters.base import Budget
 
@@ -105,6 +106,18 @@ class Record:
     def false_claim(self) -> bool:
         """Whether the method calls solved what is judged to be off by more than it was asked for, and than 1 mm."""
         return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
+
+
+class Difficulty(NamedTuple):
+    """How hard a problem is. The greater one is of the harder problem: the descent counts before the distance.
+
+    Attributes:
+        resists: whether a plain Gauss-Newton descent from the start does not solve the problem.
+        distance: from the start to the witness: root of the sum of squares over the joints [rad].
+    """
+
+    resists: bool
+    distance: float
 
 
 def frame_cap(cap: float, frames: float) -> float:

@@ -2,26 +2,35 @@
 
 from __future__ import annotations
 
-import base64
-import gzip
-import json
 import re
 import shutil
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from wholebody.bench.compare.advice import advice, choices, effort, error, reference, slowness, standings, targets
+from wholebody.bench.compare import variants
+from wholebody.bench.compare.advice import (
+    advice,
+    choices,
+    effort,
+    error,
+    percent,
+    reference,
+    slowness,
+    standings,
+    targets,
+)
 from wholebody.bench.compare.charts import draw_all, groups
+from wholebody.bench.compare.examples import pairs
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.lock import NAME as LOCK
 from wholebody.bench.compare.lock import locked, write_lock
-from wholebody.bench.compare.pages import Material, drawn_within, write_pages
+from wholebody.bench.compare.pages import Material, drawn_within, scene_values, with_long_cells, write_pages
 from wholebody.bench.compare.paired import algorithms
 from wholebody.bench.compare.rankings import in_words, rankings, seeds_in_words, sensitivity
 from wholebody.bench.compare.record import COARSE, DEFAULT
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.scenes import OPENING, Scene, chosen, draw
+from wholebody.bench.compare.scenes import Scene, chosen, draw, in_brief
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.compare.summary import GOOD, exclusions, kernel_of, summaries
@@ -30,7 +39,6 @@ from wholebody.bench.tables import replace_section, write_rows, write_text
 
 PAGE = "report.html"
 FEW = 10  # problems below which a share is no share
-LONG = 35  # letters of a table's cell that is a text and no figure
 KERNEL = "60 products of matrices of 64 rows and 1,000 distances between boxes and capsules by coal"
 PICTURE = re.compile(r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>')
 
@@ -65,15 +73,17 @@ def publish(
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)
     write_rows(folder / "summary.csv", facts, given.rows)
+    write_rows(folder / "seeds.csv", facts, sensitivity(given.results))
     write_lock(folder / LOCK, locked(given))
     front = fronts(given.results)
     if front:
         write_rows(folder / "front.csv", facts, front)
     say("charts and scenes")
+    examples = pairs(given.results, given.chunks)
     families = {family.name: family for family in settings.sets}
     methods = {adapter.name: adapter for adapter in settings.adapters}
     with ThreadPoolExecutor(1) as pool:  # scenes are drawn in a process of their own, charts in this one
-        drawn = pool.submit(draw, chosen(given.results), families, methods, settings.seed, settings.cap)
+        drawn = pool.submit(draw, chosen(given.results, examples), families, methods, settings.seed, settings.cap)
         titles = [(family.name, family.title) for family in settings.sets]
         charts = draw_all(given.results, given.rows, titles, folder / "charts")
         scenes = drawn.result()
@@ -81,12 +91,13 @@ def publish(
     subtitle = f"{len(settings.sets)} problem sets, {len(settings.adapters)} methods, {len(store.records)} solves. " + (
         f"Measured {facts.get('date', '')} with wholebody {facts.get('wholebody', '')} on {facts.get('processor', '')}."
     )
-    write_pages(given, charts, folder)
-    write_text(folder / PAGE, as_page(given, charts, scenes, subtitle) + "\n")
+    write_pages(given, charts, examples, scenes, folder)
+    write_text(folder / PAGE, as_page(given, charts, in_brief(scenes), subtitle) + "\n")
     short = as_markdown(given, False, "assets/bench")
     write_text(folder / "compare.md", short + "\n")
     if docs is not None:
         replace_section(docs / "results.md", "compare", short)
+        replace_section(docs / "comparison.md", "compare-variants", variants.report(given.results))
         write_lock(docs / "assets" / "bench" / f"compare-{LOCK}", locked(given))
         (docs / "assets" / "bench").mkdir(parents=True, exist_ok=True)
         for svg, _ in (found for name, found in charts.items() if f"/{name}.svg" in short):
@@ -108,7 +119,7 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
         picked=choices(results, given.rows), targets=targets(given.rows, wall, dependable),
         plain=_plain,
         ranked=standings(results, given.rows), reference=reference(results), error=error, effort=effort,
-        slowness=slowness, rival=_rival, ratio=_ratio, chart=_chart,
+        slowness=slowness, percent=percent, rival=_rival, ratio=_ratio, chart=_chart,
         least=min(counts, default=0), most=max(counts, default=0), few=FEW,
         wall=wall, off=[rival for rival in wall if not rival.on_front], dependable=dependable,
         by_cpu=by_cpu, by_most=by_most, ours=OURS,
@@ -129,17 +140,16 @@ def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Se
     """
     text = html(as_markdown(given, True, "charts"))
     text = text.replace("<ul>", '<ul class="advice">', 1)
-    text = re.sub(rf"<td[^>]*>([^<]{{{LONG},}})</td>", r'<td class="text">\1</td>', text)
+    text = with_long_cells(text)
     text = PICTURE.sub(lambda found: drawn_within(charts[found[1]][0], found[1], found[2]), text)
     titles = re.findall(r"<h2>(.*?)</h2>", text)
     text = re.sub(
         r"<h([23])>(.*?)</h\1>", lambda found: f'<h{found[1]} id="{_anchor(found[2])}">{found[2]}</h{found[1]}>', text
     )
     before, after = text.split("<p>&lt;!-- scenes --&gt;</p>")
-    shell = base64.b64encode(gzip.compress(scenes[0].shell.encode("utf-8"), mtime=0)).decode("ascii") if scenes else ""
     return render(
         "compare.html", subtitle=subtitle, titles=[(_anchor(title), title) for title in titles], before=before,
-        after=after, scenes=scenes, shell=shell, opening=json.dumps(OPENING).replace("<", "\\u003c"),
+        after=after, **scene_values(scenes),
     )  # fmt: skip
 
 

@@ -18,8 +18,9 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.adapters.base import Adapter, Budget
-from wholebody.bench.compare.record import ANSWERED, DEFAULT, FAILED, REFUSED, Record, frame_cap
+from wholebody.bench.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, REFUSED, Difficulty, Record, frame_cap
 from wholebody.bench.problem_sets.case import Case, ProblemSet
+from wholebody.bench.problem_sets.difficulty import away, descended
 from wholebody.bench.tables import programs_text
 from wholebody.compiled import compile_all
 from wholebody.errors import WholebodyError
@@ -74,6 +75,21 @@ def built(which: Which) -> str | None:
     except Exception as error:
         return f"{type(error).__name__}: {sentence(error)}"
     return None
+
+
+def difficulty(which: Which) -> Difficulty:
+    """How hard a case is; one whose goals move by its first frame, and by how far it goes from there."""
+    case = case_of(which).case
+    problem = copy.copy(case.problem)
+    if case.frames:
+        problem.retarget(case.frames[0])
+    found = descended(case, case.problem.start)
+    solved = found is not None and _worst(assess(problem, found)) <= COARSE
+    return Difficulty(not solved, float(np.linalg.norm(away(case))))
+
+
+def _worst(judgement: Assessment) -> float:
+    return max(float(getattr(judgement, name)) for name in JUDGED[:6])
 
 
 def warmed(which: Which, adapter: Adapter, cap: float) -> float:

@@ -102,6 +102,19 @@ def ratio(one: Mapping[tuple[str, int], float], other: Mapping[tuple[str, int], 
     return Interval(exp(float(logs.mean())), *_ends(drawn), len(logs))
 
 
+def paired_difference(one: Mapping[int, bool], other: Mapping[int, bool]) -> float:
+    """p-value that two methods solve as many of the problems that both were given: McNemar's test (1947), exact.
+
+    Only problems that one of the two solves and the other does not tell anything.
+    """
+    from scipy.stats import binomtest
+
+    both = one.keys() & other.keys()
+    more = sum(one[key] and not other[key] for key in both)
+    fewer = sum(other[key] and not one[key] for key in both)
+    return float(binomtest(more, more + fewer).pvalue) if more + fewer else 1.0
+
+
 def quantile_ratio(one: Array, other: Array, part: float) -> Interval:
     """A quantile of one tool's steps over that of another's in the same run: the median of the runs.
 

@@ -13,7 +13,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench.compare.record import Record
+from wholebody.bench.compare.record import Difficulty, Record
 from wholebody.errors import FileFormatError, InputError
 
 NAME = "chunks.jsonl"
@@ -31,6 +31,7 @@ class Chunk:
         building: seconds to build the case.
         cold: seconds of the first solve of each method in its process, what it imports and compiles included; of the
             methods for which the process was new.
+        difficulty: how hard the case is; None where it was not measured.
         kernel: seconds of the reference kernel in the process, before the case was solved.
         fault: why the case could not be built; empty where it was.
     """
@@ -43,6 +44,7 @@ class Chunk:
     building: float = 0.0
     cold: Mapping[str, float] = field(default_factory=dict)
     kernel: float = 0.0
+    difficulty: Difficulty | None = None
     fault: str = ""
 
 
@@ -107,7 +109,8 @@ class Store:
 
 def _chunk(value: dict[str, Any]) -> Chunk:
     records = tuple(Record(**inner) for inner in value.pop("records"))
-    return Chunk(records=records, **value)
+    difficulty = value.pop("difficulty", None)
+    return Chunk(records=records, difficulty=difficulty and Difficulty(*difficulty), **value)
 
 
 def _short(value: Any) -> str:

@@ -86,8 +86,9 @@ def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) 
     values = {}
     for name in figure.groups["upper_body"]:
         place = model.joints[figure.joint_id(name)].idx_q
-        reach = share * (model.upperPositionLimit[place] - model.lowerPositionLimit[place])
-        values[name] = q[place] + float(rng.uniform(-reach, reach))
+        low, high = model.lowerPositionLimit[place], model.upperPositionLimit[place]
+        reach = share * (high - low)
+        values[name] = float(np.clip(q[place] + float(rng.uniform(-reach, reach)), low, high))
     return figure.clamp(figure.with_joints(q, values))
 
 

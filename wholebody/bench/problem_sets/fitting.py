@@ -39,6 +39,27 @@ class MassAbove(wb.Goal):
         return state.center_of_mass_jacobian()[:2]
 
 
+class Held(wb.Goal):
+    """A constraint without slack as an equality."""
+
+    def __init__(self, hold: wb.Hold) -> None:
+        """Keep a hold that is resolved."""
+        self.hold = hold
+
+    def error(self, state: State) -> Array:
+        """(m,) difference from where it is held [m, rad]."""
+        return self.hold.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Rows of the hold."""
+        return self.hold.jacobian(state)
+
+
+def held(problem: wb.Problem) -> list[wb.Goal]:
+    """The holds of a problem as equalities."""
+    return [Held(term) for term in problem.constraints if isinstance(term, wb.Hold)]
+
+
 def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices) -> Array | None:
     """Return the posture (nq,) that Newton's method finds from q, or None where it finds none within the limits.
 

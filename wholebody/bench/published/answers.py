@@ -79,6 +79,8 @@ def read_answers(path: Path, folder: Path) -> Answers:
     listed = content.get("answers")
     if not isinstance(listed, list):
         raise FileFormatError(f"{path}: answers is {_kind(listed)}; give a list of objects, one a problem")
+    if not listed:
+        raise FileFormatError(f"{path}: answers is empty; give an object for each problem, or refuse it with a reason")
     texts = {key: _text(content, key, str(path)) for key in ("method", "about", "machine")}
     if not texts["method"].strip() or len(texts["method"]) > LONGEST:
         raise FileFormatError(f"{path}: method has no name, or one of more than {LONGEST} letters; name your solver")
@@ -135,7 +137,8 @@ class _Reader:
 def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
     name, body, count = problem.content["name"], problem.content["body"], problem.model.nq
     if not isinstance(row, list):
-        raise FileFormatError(f"{where} is {_kind(row)}; give a list of {count} numbers")
+        order = f"in the order of coordinates in {body}"
+        raise FileFormatError(f"{where} is {_kind(row)}; give a list of {count} numbers, {order}")
     if len(row) != count:
         raise FileFormatError(f"{where} has {len(row)} numbers; {name} takes {count}, one a coordinate of {body}")
     for place, value in enumerate(row):

@@ -107,9 +107,9 @@ def boards(verdicts: Sequence[Verdict], sets: Sequence[str]) -> list[Board]:
 
 
 def _leading(rows: Sequence[tuple[str, SetScore]]) -> tuple[str, ...]:
-    """Those whose interval reaches the lower end of the best one's, or higher."""
+    """Those whose interval reaches the lower end of the best one's, or higher; nobody where nothing is solved."""
     whole = [(name, row) for name, row in rows if not row.refused and row.share.cases]
-    if not whole:
+    if not any(row.solved for _, row in whole):
         return ()
     low = max(row.share.low for _, row in whole)
     return tuple(name for name, row in whole if row.share.high >= low)
@@ -130,7 +130,7 @@ def _ranked(verdicts: Sequence[Verdict], name: str, seed: str) -> Ranking | None
 def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     """What follows from a board, in plain English."""
     if not board.leading:
-        return ["Nobody took every problem."]
+        return ["Nobody took every problem and solved one."]
     first, *others = board.leading
     best = dict(board.rows)[first].share
     said = [f"**{first}** solves {100 * best.value:.0f} % [{100 * best.low:.0f}, {100 * best.high:.0f}]."]

@@ -10,31 +10,9 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array, Indices
 from wholebody.bench.problem_sets.case import Case
-from wholebody.bench.problem_sets.fitting import fitted
-from wholebody.figures.state import State, Wrench
+from wholebody.bench.problem_sets.fitting import Held, fitted, held
 
 DRAWS = 60  # random postures that are tried for one in which nothing overlaps
-
-
-class Held(wb.Goal):
-    """A constraint without slack as an equality."""
-
-    def __init__(self, hold: wb.Hold) -> None:
-        """Keep a hold that is resolved."""
-        self.hold = hold
-
-    def error(self, state: State) -> Array:
-        """(m,) difference from where it is held [m, rad]."""
-        return self.hold.value(state)
-
-    def jacobian(self, state: State) -> Wrench:
-        """Rows of the hold."""
-        return self.hold.jacobian(state)
-
-
-def held(problem: wb.Problem) -> list[wb.Goal]:
-    """The holds of a problem as equalities."""
-    return [Held(term) for term in problem.constraints if isinstance(term, wb.Hold)]
 
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:

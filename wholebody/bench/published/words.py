@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from math import isfinite
 
 from wholebody.bench.compare.statistics import Interval
-from wholebody.bench.published.judging import REFUSED, UNANSWERED, SetScore, Verdict
+from wholebody.bench.published.judging import ANSWERED, REFUSED, UNANSWERED, SetScore, Verdict
+from wholebody.bench.published.rebuilt import Score
 from wholebody.bench.report import formatted, words
+
+TURN = 6.3  # rad, m: a joint that is more than a turn out of its limits was hardly meant
+CRITERIA = {
+    "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
+    "limits": "joint limits", "holds": "holds and balance",
+}  # fmt: skip
 
 COLUMNS = (
     "problems", "seed", "asked", "refused", "unanswered", "solved %", "to 1e-4 %", "worst error", "overlap mm",
@@ -41,7 +49,7 @@ def spanned(found: Interval, spec: str, scale: float = 1.0) -> str:
 
 
 def left_out(verdict: Verdict) -> list[str]:
-    """Sentences on refusals and on problems without an answer."""
+    """Sentences on refusals, on problems without an answer, and on why answers are none."""
     said = []
     reasons: dict[str, list[str]] = {}
     for one in verdict.judged:
@@ -52,7 +60,20 @@ def left_out(verdict: Verdict) -> list[str]:
     silent = [one.problem for one in verdict.judged if one.outcome == UNANSWERED]
     if silent:
         said.append(f"Without an answer, and so not solved: {len(silent)}, {silent[0]} first.")
+    failed = Counter(_worst(one.score) for one in verdict.judged if one.outcome == ANSWERED and not one.solved)
+    if failed:
+        listed = ", ".join(f"{name} {count}" for name, count in failed.most_common())
+        said.append(f"Answered and not solved: {failed.total()}; what is worst of each: {listed}.")
+    far = [one for one in verdict.judged if one.outcome == ANSWERED and one.score.limits > TURN]
+    if far:
+        how = f"{len(far)}, {far[0].problem} first, by {far[0].score.limits:.3g}"
+        said.append(f"Far out of the joint limits: {how}; a posture is in radians and metres, in the body's order.")
     timed = [row for row in verdict.sets if isfinite(row.seconds.value)]
     if timed:
         said.append("The mean time is the shifted geometric mean; a problem that is not solved counts 10 s.")
     return said
+
+
+def _worst(score: Score) -> str:
+    """What an answer misses most, in words."""
+    return CRITERIA[max(CRITERIA, key=lambda name: float(getattr(score, name)))]

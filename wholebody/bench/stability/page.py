@@ -14,6 +14,8 @@ from wholebody.bench.stability.pictures import Drawn
 from wholebody.bench.stability.verdict import SYMBOLS, WORDS, Result, Verdict
 
 CHART = "stability.svg"
+METHODS = ("qp", "qp/osqp", "newton/slack", "newton/barrier", "ccd", "dls", "placo", "pink", "mink")
+"""One or two of each algorithm, for a chart that can be read; others are asked by name."""
 
 
 def report(result: Result, facts: Mapping[str, str]) -> str:

@@ -105,7 +105,7 @@ def _missed(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
     if judged.penetration > INSIDE and not doubts:
         return f"{deep} inside{_said(answer)}", deep
     if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
-        return f"a constraint missed by {missed}{_said(answer)}", missed
+        return f"a constraint missed by {missed} (or mrad){_said(answer)}", missed
     if judged.speed_excess > FAST:
         return f"{1.0 + judged.speed_excess:.1f} times too fast", f"{1.0 + judged.speed_excess:.0f} × speed"
     if answer.status == "solved" and judged.goal_error > case.tolerance:
@@ -212,6 +212,11 @@ class Result:
     def count(self, method: str, kind: Kind) -> int:
         """How many of a method's verdicts are of one kind."""
         return sum(self.verdicts[case.name, method].kind == kind for case in self.cases)
+
+    @property
+    def minutes(self) -> float:
+        """How long all answers took together, by the clock."""
+        return sum(cell.answer.seconds for cell in self.cells.values()) / 60.0
 
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""

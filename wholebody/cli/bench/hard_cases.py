@@ -34,17 +34,17 @@ INTERRUPTED = 130  # exit code after Ctrl-C
     "hard cases by methods: where each fails, and how",
     "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
     "honest best effort, a clear refusal, or WRONG.",
-    listed("--methods", "methods, such as qp, newton or qp/daqp (default: all)"),
+    listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page)"),
     listed("--cases", "cases (default: all; with --quick a few)"),
     count("--jobs", 1, "processes at a time"),
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.adapters.registry import ALL, adapters
+    from wholebody.bench.adapters.registry import adapters
     from wholebody.bench.stability import catalogue, page
 
     _check_page(arguments)
-    asked = adapters(arguments.methods or [ALL])
+    asked = adapters(arguments.methods or page.METHODS)
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts = machine()
     result = _asked(chosen, asked, arguments.jobs)

@@ -1,0 +1,36 @@
+"""Figures of the first page are those of the tables, and their intervals exclude the opposite of what is said."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+SPAN = r"([\d.]+) \[([\d.]+), ([\d.]+)\]"
+
+
+@pytest.fixture(scope="module")
+def readme() -> str:
+    return " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+
+
+@pytest.fixture(scope="module")
+def measured() -> dict[str, tuple[float, ...]]:
+    """Return our step over placo's in the median by reach, with its interval."""
+    text = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    found = re.findall(rf"^- wholebody, (\w+): median {SPAN} of placo's", text, re.MULTILINE)
+    return {reach: tuple(map(float, figures)) for reach, *figures in found}
+
+
+def test_the_step_is_as_fast_as_the_first_page_says(readme: str, measured: dict[str, tuple[float, ...]]) -> None:
+    said = re.search(rf"Among 20 objects a step takes {SPAN} of placo's time in the median, in contact {SPAN}", readme)
+    assert said is not None
+    figures = [float(figure) for figure in said.groups()]
+    assert figures == [round(figure, 2) for reach in ("free", "contact") for figure in measured[reach]]
+
+
+def test_less_than_a_tenth_is_outside_the_interval(readme: str, measured: dict[str, tuple[float, ...]]) -> None:
+    assert "less than a tenth of the time of placo for a person among 20 objects" in readme
+    assert max(measured["free"][2], measured["contact"][2]) < 0.1
