@@ -76,15 +76,18 @@ def test_an_unknown_solver_is_refused() -> None:
         wb.Trajectory(solver=3)  # type: ignore[arg-type]
 
 
-def brought_back(x: np.ndarray, slowest: float, fastest: float, radius: float) -> np.ndarray:
-    """Deviations (n, 1) after the step of a program that has nothing but limits of the changes from frame to frame."""
+def brought_back(
+    x: np.ndarray, slowest: float, fastest: float, radius: float, least: np.ndarray | None = None
+) -> np.ndarray:
+    """Deviations (n, 1) after the step of a program that has limits of the changes, and of deviations, and no more."""
     frames, wide = len(x), np.full((len(x), 1), np.inf)
     bounds = np.full((frames - 1, 1), slowest), np.full((frames - 1, 1), fastest)
     none = np.zeros((0, 1))
     rows = [Rows(Node(k), np.zeros(0), (none,), np.zeros(0, dtype=np.intp), np.zeros(0), none) for k in range(frames)]
     layout = lay_out(
         Objective(frames, np.ones(1), 0.0, DT, (False, False)), rows, x, np.zeros(1, dtype=np.intp),
-        Limits(-wide, wide, *bounds), radius, 1.0, [np.zeros(0)] * frames, 1.0, [np.zeros(0, dtype=bool)] * frames,
+        Limits(-wide if least is None else least, wide, *bounds), radius,
+        1.0, [np.zeros(0)] * frames, 1.0, [np.zeros(0, dtype=bool)] * frames,
     )  # fmt: skip
     return layout.deviations(banded_solver("osqp")[1](layout.program).z, x)
 
@@ -102,7 +105,8 @@ def test_a_speed_that_much_exceeds_is_brought_back_by_as_much_as_a_step_can() ->
     assert np.diff(after, axis=0).max() <= 0.2 - 0.1 / 6.0 + 1e-6
 
 
-def test_a_speed_at_its_limit_stays_there_where_the_original_has_reached_it() -> None:
-    x = np.array([[0.3], [0.299], [0.1], [0.0]])  # the second frame is 1 mrad before a bound of zero
-    after = brought_back(x, -0.5, 0.0, 0.2)
+def test_a_speed_whose_bound_is_zero_is_kept_to_from_a_little_before_it() -> None:
+    """As the first frame comes back, the second one must not be left behind."""
+    x, least = np.array([[0.21], [0.2], [0.2]]), np.array([[-1.0], [0.2], [-1.0]])
+    after = brought_back(x, -0.5, 0.0, 0.2, least)
     assert np.diff(after, axis=0).max() <= 1e-6

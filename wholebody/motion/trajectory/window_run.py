@@ -21,7 +21,7 @@ from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import ONE_STEP, Limits
-from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, WindowProgram
+from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, Found, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
@@ -39,7 +39,7 @@ TIME = 0.1  # s: smoothness of the first answer; where it is shorter, more attem
 ROUGHER, SMOOTHER = 0.4, 1.5  # of that time, in the second answer
 JERK = 1.2  # of the original's: an answer with more is made smoother
 SMOOTH_SHARE = 0.03  # of the squared deviation: acceleration that costs less leaves little to gain
-WORTH = 0.03  # of the objective: less smoothness whose first step brings less is not gone on with
+WORTH = 0.05  # of the objective: less smoothness whose first step brings less is not gone on with
 REACH = 3  # frames on each side of a window whose jerk it changes
 
 
@@ -70,9 +70,10 @@ class Freed(NamedTuple):
 
 
 class _Way(Enum):
-    """How an attempt goes: from deviations that are free but for dips, to its end, or with others left to try."""
+    """How an attempt goes: from what is free but for dips, from an answer, to its end, or with others left to try."""
 
     CAREFUL = "careful"
+    SECOND = "second"
     USUAL = "usual"
     EARLY_EXIT = "early exit"
 
@@ -227,22 +228,27 @@ class ClipRun:
         time = TIME * (SMOOTHER if rough else ROUGHER)
         seams = window.first > 0, window.end < len(self._reference)
         objective = Objective(len(window), self._weights, time, self.dt, seams)
-        if not rough and self._step(found, looking, objective, limits) > (1.0 - WORTH) * objective.value(found.x):
-            return found
-        other = self._attempt(found, chart, looking, objective, limits, always, cancel, _Way.CAREFUL)
+        begun = found
+        if not rough:
+            first = self._step(found, looking, objective, limits)
+            little = first.objective > (1.0 - WORTH) * objective.value(found.x)
+            if little or self._jerk(window, chart, first.x) > JERK:
+                return found
+            begun = found._replace(x=first.x)
+        other = self._attempt(begun, chart, looking, objective, limits, always, cancel, _Way.SECOND)
         if other is None or other.worst > MET or other.dipping:
             return found
         now = self._jerk(window, chart, other.x)
         better = now < jerk if rough else now <= JERK and (other.x**2).sum() < 2.0 * square
         return other if better else found
 
-    def _step(self, begun: _Attempt, looking: Looking, objective: Objective, limits: Limits) -> float:
-        """The objective after one step from an answer."""
+    def _step(self, begun: _Attempt, looking: Looking, objective: Objective, limits: Limits) -> Found:
+        """One step from an answer."""
         program = WindowProgram(looking, objective, limits, self._solve, 1)
         program.add(begun.between)
         found = program.run(begun.x, lambda number, worst: False, NEARLY, NEARLY)
         self._programs += found.programs
-        return found.objective
+        return found
 
     def _jerk(self, window: Window, chart: Chart, x: Array) -> float:
         """Of the frames that deviations (n, nv) of a window change the jerk of, in parts of the original's."""
@@ -278,8 +284,8 @@ class ClipRun:
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
         program.add(begun.between)
         x = begun.x
-        careful = way is _Way.CAREFUL
-        found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
+        found, radius = None, NEARLY if way in (_Way.CAREFUL, _Way.SECOND) else RADIUS
+        largest = NEARLY if way is _Way.CAREFUL else LARGEST
         most, dipped = self._settings.iterations, set[int]()
 
         def told(count: int, worst: float) -> bool:
