@@ -94,9 +94,9 @@ class _Attempt(NamedTuple):
         return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
 
 
-def _begun(x: Array) -> _Attempt:
-    """An attempt that has not begun, at deviations (n, nv)."""
-    return _Attempt(x, np.inf, 0, np.inf)
+def _begun(x: Array, between: tuple[Node, ...] = ()) -> _Attempt:
+    """An attempt that has not begun, at deviations (n, nv), with places between frames."""
+    return _Attempt(x, np.inf, 0, np.inf, between=between)
 
 
 class ClipRun:
@@ -234,7 +234,7 @@ class ClipRun:
             little = first.objective > (1.0 - WORTH) * objective.value(found.x)
             if little or self._jerk(window, chart, first.x) > JERK:
                 return found
-            begun = found._replace(x=first.x)
+            begun = _begun(first.x, found.between)
         other = self._attempt(begun, chart, looking, objective, limits, always, cancel, _Way.SECOND)
         if other is None or other.worst > MET or other.dipping:
             return found
