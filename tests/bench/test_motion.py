@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.motion import cases, figures, measuring, report
 from wholebody.bench.motion.loads import WAYS, LoadRow
-from wholebody.bench.motion.measuring import CHECKED, MotionRow
+from wholebody.bench.motion.measuring import CHECKED, NEAREST, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 from wholebody.motion import avoidance
@@ -125,6 +125,25 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000
+
+
+def test_the_nearest_frames_stand_beside_what_deviates_by_more_than_is_asked() -> None:
+    bisection, trajectory, *others = rows()
+    far = dataclasses.replace(trajectory, angle=0.08)
+    near = dataclasses.replace(trajectory, method=NEAREST, outcome="left", angle=0.075)
+    text = report.report([bisection, far, near, *others], {"wholebody": "0"})
+    assert "| walk | pack | 0.800 | 0.750 |" in text
+    assert "| nearest | 1 of 1" not in text  # it is no method
+    assert "| 0.750 |" not in report.report([bisection, trajectory, near, *others], {"wholebody": "0"})
+    assert not report.bounds([bisection, far, *others])
+
+
+def test_the_nearest_frames_of_a_clip_that_is_free_are_its_own(tmp_path: Path) -> None:
+    figure = wb.load("human")
+    path = tmp_path / "still.npz"
+    wb.Clip(figure, np.array([figure.posture("standing")] * 8), 1 / 30, "still").write(path)
+    row = measuring.measured(MotionRow("still", "nothing", NEAREST), str(path), 600.0)
+    assert (row.outcome, row.angle) == ("free", 0.0)
 
 
 def test_an_unknown_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -72,12 +72,13 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
     frames = 20
     wave = np.sin(np.pi * np.arange(frames) / (frames - 1))
     q = np.stack([-1.0 + 0.56 * wave, np.full(frames, 0.7)], axis=1)  # into the ball from the side, and back
-    clip, method = wb.Clip(figure, q, DT), wb.Trajectory(margin=10.0)
+    time = 0.1
+    clip, method = wb.Clip(figure, q, DT), wb.Trajectory(margin=10.0, time=time)
     assert min(map(gap, q)) < -0.02
 
     def objective(flat: np.ndarray) -> float:
         x = flat.reshape(frames, 2)
-        acceleration = np.diff(x, n=2, axis=0) * (method.time / DT) ** 2
+        acceleration = np.diff(x, n=2, axis=0) * (time / DT) ** 2
         return 0.5 * float((x**2).sum() + (acceleration**2).sum())
 
     def gaps(flat: np.ndarray) -> np.ndarray:

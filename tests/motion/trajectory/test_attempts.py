@@ -12,6 +12,7 @@ import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.dips import dips
 from wholebody.motion.frame_terms import frame_terms
+from wholebody.motion.trajectory import window_run
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
@@ -150,3 +151,69 @@ def test_attempts_that_end_early_are_begun_again(
     assert len(ended) >= 2
     assert freed.report.message.startswith("nothing collides")
     assert wb.check(freed.clip, scene).free
+
+
+class Missed(Asked):
+    """Looks at frames of which nothing can be moved: a contact and something held are missed by so much."""
+
+    def __init__(self, contact: float, held: float) -> None:
+        self.contact, self.held = contact, held
+
+    def at(self, node: Node, x: np.ndarray, within: float) -> Rows:
+        still = np.zeros((1, 1))
+        return Rows(node, np.array([-self.contact]), (still,), np.zeros(1, dtype=np.intp), np.array([self.held]), still)
+
+
+@pytest.mark.parametrize(
+    ("contact", "held", "met"), [(0.0, 0.9e-4, True), (0.0, 1.1e-4, False), (0.9e-4, 0.0, False), (1e-5, 0.0, True)]
+)
+def test_what_is_held_is_met_to_a_tenth_of_a_millimetre(contact: float, held: float, met: bool) -> None:
+    """A check allows 1 mm of what is held, and 0.1 mm of an overlap: a contact is met to a fifth of that."""
+    none, free = np.zeros((3, 1)), np.full((2, 1), np.inf)
+    looking: Any = Missed(contact, held)
+    objective = Objective(3, np.ones(1), 0.0, 1.0, (False, False))
+    program = WindowProgram(looking, objective, Limits(none, none, -free, free), banded_solver(None)[1], 3)
+    assert program.run(none, lambda number, worst: False).met is met
+
+
+def runs_of_a_window(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, frames: int, passed: float
+) -> list[tuple[np.ndarray, bool, bool, np.ndarray]]:
+    """Runs of a clip that is one window, with how deep motions between frames are said to pass something at first.
+
+    Returns:
+        Deviations of the beginning, whether it may end early, whether it is rough, and deviations of the end.
+    """
+    figure = planar_arm((0.5, 0.5))
+    clip = wb.Clip(figure, np.stack([np.linspace(-0.3, 0.3, frames), np.full(frames, 0.5)], axis=1), 1 / 30)
+    scene = wb.Scene(figure)
+    scene.add(wb.Sphere(0.1), name="ball", at=(0.8, 0.1, 0.0))
+    run, runs, said = WindowProgram.run, [], [passed]
+
+    def told(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
+        found = run(self, x, *given)
+        early, rough = (given[3] is not None, given[4]) if len(given) > 4 else (False, False)
+        runs.append((x, early, rough, found.x))
+        return found
+
+    monkeypatch.setattr(WindowProgram, "run", told)
+    monkeypatch.setattr(window_run, "depths_between", lambda *given: {0: said.pop() if said else 0.0})
+    freed = wb.avoid(clip, scene, method=wb.Trajectory(margin=10.0, time=0.1))
+    assert freed.report.solved, freed.report.message
+    return runs
+
+
+@pytest.mark.parametrize(("frames", "rough"), [(40, False), (41, True)])
+def test_windows_of_more_than_forty_frames_are_looked_at_before_their_optimum(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, frames: int, rough: bool
+) -> None:
+    assert runs_of_a_window(planar_arm, monkeypatch, frames, 0.0)[0][2] is rough
+
+
+@pytest.mark.parametrize(("passed", "ends"), [(0.029, False), (0.031, True)])
+def test_what_passes_a_thing_by_more_than_a_step_asks_for_ends_an_attempt(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch, passed: float, ends: bool
+) -> None:
+    first, second, *_ = runs_of_a_window(planar_arm, monkeypatch, 60, passed)
+    assert not first[0].any()
+    assert np.array_equal(second[0], first[3]) is not ends

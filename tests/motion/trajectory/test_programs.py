@@ -12,7 +12,9 @@ import scipy.sparse as sp
 import wholebody as wb
 from wholebody.motion.trajectory import banded_qp
 from wholebody.motion.trajectory.banded_qp import SOLVERS, BandedQP, banded_solver, warn_of_osqp
+from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.program import Limits, lay_out
 
 TIME, DT = 0.1, 0.05
 
@@ -72,3 +74,39 @@ def test_an_unknown_solver_is_refused() -> None:
         wb.Trajectory(solver="osq")
     with pytest.raises(wb.InputError, match="solver"):
         wb.Trajectory(solver=3)  # type: ignore[arg-type]
+
+
+def brought_back(
+    x: np.ndarray, slowest: float, fastest: float, radius: float, least: np.ndarray | None = None
+) -> np.ndarray:
+    """Deviations (n, 1) after the step of a program that has limits of the changes, and of deviations, and no more."""
+    frames, wide = len(x), np.full((len(x), 1), np.inf)
+    bounds = np.full((frames - 1, 1), slowest), np.full((frames - 1, 1), fastest)
+    none = np.zeros((0, 1))
+    rows = [Rows(Node(k), np.zeros(0), (none,), np.zeros(0, dtype=np.intp), np.zeros(0), none) for k in range(frames)]
+    layout = lay_out(
+        Objective(frames, np.ones(1), 0.0, DT, (False, False)), rows, x, np.zeros(1, dtype=np.intp),
+        Limits(-wide if least is None else least, wide, *bounds), radius,
+        1.0, [np.zeros(0)] * frames, 1.0, [np.zeros(0, dtype=bool)] * frames,
+    )  # fmt: skip
+    return layout.deviations(banded_solver("osqp")[1](layout.program).z, x)
+
+
+def test_a_speed_that_little_exceeds_is_brought_back_by_one_short_step() -> None:
+    x = np.array([[0.5], [0.5], [0.504], [0.504]])  # far from the original, 3 mrad too fast once
+    after = brought_back(x, -0.01, 0.001, 0.009)
+    assert np.diff(after, axis=0).max() <= 0.001 + 1e-6
+    assert np.abs(after - x).max() <= 0.009 + 1e-6
+
+
+def test_a_speed_that_much_exceeds_is_brought_back_by_as_much_as_a_step_can() -> None:
+    x = np.array([[0.0], [0.2], [0.4], [0.6]])
+    after = brought_back(x, -1.0, 0.1, 0.05)  # 0.3 rad too fast in all; a step may shift frames by 0.05 rad
+    assert np.diff(after, axis=0).max() <= 0.2 - 0.1 / 6.0 + 1e-6
+
+
+def test_a_speed_whose_bound_is_zero_is_kept_to_from_a_little_before_it() -> None:
+    """As the first frame comes back, the second one must not be left behind."""
+    x, least = np.array([[0.21], [0.2], [0.2]]), np.array([[-1.0], [0.2], [-1.0]])
+    after = brought_back(x, -0.5, 0.0, 0.2, least)
+    assert np.diff(after, axis=0).max() <= 1e-6

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 FIGURE = "human"
 CHECKED = "check"  # in place of a method: the clip as it is
+NEAREST = "nearest"  # in place of a method: each frame for itself, as near to the original as can be
+NEAREST_OF = ("trajectory", "bisection", "frames")
+"""Methods from whose answers the nearest frames are looked for."""
 MAKING = 600.0  # s: to read a clip and bring it onto the figure
 START = 120.0  # s of the processor that a case has beside those for its length: imports, compilation
 SLOWEST = 60.0  # s of the processor for a second of motion, after which a method is ended
@@ -34,7 +37,9 @@ HELD = 1e-3  # m, rad: by which what is held may be missed
 
 @dataclass(frozen=True)
 class MotionRow:
-    """One clip with one piece of equipment by one method; the method `check` leaves the clip as it is.
+    """One clip with one piece of equipment by one method.
+
+    The method `check` leaves the clip as it is; `nearest` brings each frame for itself as near to it as can be.
 
     Attributes:
         clip, equipment, method: what was asked.
@@ -156,19 +161,16 @@ def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     )  # fmt: skip
     if row.method == CHECKED:
         return _judged(row, clip, clip, found)
+    if row.method == NEAREST:
+        return _nearest(row, clip, scene)
     return _freed(row, clip, found, scene)
 
 
 def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRow:
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.checking import check
-    from wholebody.motion.stance import StanceFeet
-    from wholebody.tasks import Hold
 
-    constraints: list[Any] = [StanceFeet()]
-    if row.clip in WEAPON:
-        hand, other = WEAPON[row.clip]
-        constraints.append(Hold(other, relative_to=hand))
+    constraints = _held(row)
     avoid(_colliding(clip, found), scene, method=row.method, constraints=constraints)  # compiles what is needed
     began = time.process_time()
     try:
@@ -184,6 +186,33 @@ def _freed(row: MotionRow, clip: Clip, found: ClipCheck, scene: Any) -> MotionRo
     row = replace(row, check_ms=1e3 * (time.process_time() - began) / len(clip))
     row = replace(row, beside_mm=1e3 * report.beside)
     return _judged(row, clip, freed.clip, found, report.missed)
+
+
+def _nearest(row: MotionRow, clip: Clip, scene: Any) -> MotionRow:
+    from wholebody.bench.motion.nearest import nearest
+    from wholebody.motion.avoidance import avoid
+    from wholebody.motion.checking import check
+
+    constraints = _held(row)
+    answers = [avoid(clip, scene, method=method, constraints=constraints).clip for method in NEAREST_OF]
+    began = time.process_time()
+    found = nearest(clip, scene, constraints, answers)
+    row = replace(row, seconds=time.process_time() - began)
+    if found is None:
+        return replace(row, outcome="none", said="no answer leads to frames that are free")
+    return _judged(row, clip, found, check(found, scene))
+
+
+def _held(row: MotionRow) -> list[Any]:
+    """What is held in a case."""
+    from wholebody.motion.stance import StanceFeet
+    from wholebody.tasks import Hold
+
+    constraints: list[Any] = [StanceFeet()]
+    if row.clip in WEAPON:
+        hand, other = WEAPON[row.clip]
+        constraints.append(Hold(other, relative_to=hand))
+    return constraints
 
 
 def _colliding(clip: Clip, found: ClipCheck) -> Clip:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
 from wholebody.bench import plot_style
-from wholebody.bench.motion.measuring import CHECKED, MotionRow
+from wholebody.bench.motion.measuring import CHECKED, NEAREST, MotionRow
 from wholebody.bench.report import render
 
 DEEP = 0.1  # mm: what may remain, in frames and in between
@@ -22,6 +23,9 @@ NAMED = 3
 
 REAL_TIME = {"check": 0.1, "bisection": 1.0, "frames": 1.0, "trajectory": 2.0}
 """Seconds for each second of motion that are asked of a method."""
+
+BESIDE = (CHECKED, NEAREST)
+"""What stands in place of a method."""
 
 LOOKS = {"trajectory": ("#0072b2", "o"), "bisection": ("#d55e00", "s"), "frames": ("#009e73", "^"),
          "fade": ("#8c8c8c", "X"), "check": ("#000000", ".")}  # fmt: skip
@@ -115,7 +119,7 @@ def lines(rows: Sequence[MotionRow]) -> list[Line]:
     """Everything that is asked, line by line, of each method that was measured."""
     bisected = {row.key[:2]: row.angle for row in rows if row.method == "bisection" and row.outcome == "free"}
     asked: list[tuple[str, str, str, float, Callable[[MotionRow], float | None]]] = []
-    for method in (each.method for each in standings(rows) if each.method != CHECKED):
+    for method in (each.method for each in standings(rows) if each.method not in BESIDE):
         asked += [
             (method, f"no frame deeper than {DEEP} mm", " frames", 0.0, lambda row: row.after),
             (method, f"no dip deeper than {DEEP} mm between frames", " mm", DEEP, lambda row: row.between_mm),
@@ -145,11 +149,36 @@ def lines(rows: Sequence[MotionRow]) -> list[Line]:
     return found
 
 
+class Bound(NamedTuple):
+    """A case in which the trajectory deviates by more of bisection's deviation than is asked.
+
+    Attributes:
+        row: of the trajectory.
+        share: its deviation in parts of bisection's.
+        least: that of frames each for itself.
+    """
+
+    row: MotionRow
+    share: float
+    least: float
+
+
+def bounds(rows: Sequence[MotionRow]) -> list[Bound]:
+    """Cases in which the trajectory deviates by more than is asked, where the nearest frames are known; worst first."""
+    angles = {row.key: row.angle for row in rows if row.outcome == "free" or (row.method == NEAREST and row.measured)}
+    found = []
+    for row in rows:
+        other, least = (angles.get((*row.key[:2], method), 0.0) for method in ("bisection", NEAREST))
+        if row.method == "trajectory" and row.key in angles and other and least and row.angle > OF_BISECTION * other:
+            found.append(Bound(row, row.angle / other, least / other))
+    return sorted(found, key=lambda each: -each.share)
+
+
 def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
     """The tables as Markdown."""
     return render(
         "motion.md",
-        standings=[each for each in standings(rows) if each.method != CHECKED],
+        standings=[each for each in standings(rows) if each.method not in BESIDE],
         checks=[row for row in rows if row.method == CHECKED and row.measured],
         rows=[row for row in rows if row.method != CHECKED and row.measured],
         missing=[row for row in rows if not row.measured],
@@ -157,6 +186,8 @@ def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
         asked=ASKED,
         deep=DEEP,
         lines=lines(rows),
+        bounds=bounds(rows),
+        of_bisection=OF_BISECTION,
         facts=facts,
     )
 
@@ -165,7 +196,7 @@ def chart(rows: Sequence[MotionRow], path: Path) -> tuple[Path, Path]:
     """Deviation, jerk and sliding against seconds for each second of motion; a point a clip, hollow where not free."""
     drawn, axes = plot_style.figure(1, len(DRAWN), (10.5, 3.6))
     for axis, (name, title, asked) in zip(axes[0], DRAWN, strict=True):
-        for each in standings([row for row in rows if row.method != CHECKED]):
+        for each in standings([row for row in rows if row.method not in BESIDE]):
             color, marker = LOOKS.get(each.method, ("#882255", "p"))
             for outcome, face in (("free", color), ("left", "none")):
                 own = [row for row in each.rows if row.outcome == outcome]

@@ -39,7 +39,7 @@ def _clips(arguments: argparse.Namespace, clips: int | None) -> dict[str, Path |
     "a process of its own. A run that was ended goes on where its folder holds what was measured.",
     *CLIPS,
     listed("--equipment", "what is worn (default: all)"),
-    listed("--methods", "methods, and check (default: all)"),
+    listed("--methods", "methods, check and nearest (default: all but nearest)"),
     count("--jobs", 1, "cases at a time"),
     option(
         "--figures", action="store_true", help="redraw figures 4.1 to 4.7 of Degenhardt's thesis instead; needs --clips"
@@ -55,11 +55,12 @@ def motion(arguments: argparse.Namespace) -> None:
     few = 2 if arguments.quick else None
     clips = _clips(arguments, few)
     worn = cases.chosen(arguments.equipment, cases.EQUIPMENT, "--equipment")[:few]
-    ways = cases.chosen(arguments.methods, (measuring.CHECKED, *METHODS), "--methods")
+    wanted = (measuring.CHECKED, *METHODS) if arguments.methods is None else arguments.methods
+    ways = cases.chosen(wanted, (measuring.CHECKED, *METHODS, measuring.NEAREST), "--methods")
     facts = machine()
     rows = measuring.run(clips, worn, ways, arguments.out, facts, arguments.jobs, _tell)
     charts = {}
-    if any(row.measured and row.method != measuring.CHECKED for row in rows):
+    if any(row.measured and row.method not in report.BESIDE for row in rows):
         charts["motion"] = Chart(partial(report.chart, rows), CAPTION)
     if any(row.measured for row in rows):
         charts["motion-check"] = Chart(partial(report.check_chart, rows), CAPTION_OF_CHECKS)

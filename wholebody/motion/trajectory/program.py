@@ -22,7 +22,6 @@ SOFT = 1e3  # 1/m, of loads that are beyond their bounds: large, so that they ar
 LITTLE = 0.1  # share of a load's greatest derivative: what moves the load by less does not join the program for it
 SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
-SMALL_EXCESS = 0.1  # of the radius: speeds that exceed their bound by less are brought back by one step
 NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
 CLOSE, NEAR_SHARE = 3e-3, 0.3  # m, and m for each rad of the radius: rows nearer than the larger begin a program
 TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
@@ -232,15 +231,35 @@ def _speed_part(
     """Rows that bound the change of a deviation from a frame to the next, where it is near the bound."""
     change = np.diff(x[:, dofs], axis=0)
     slowest, fastest = limits.slowest[:, dofs], limits.fastest[:, dofs]
-    frame, dof = np.nonzero((change > NEAR_SPEED * fastest) | (change < NEAR_SPEED * slowest))
-    now = change[frame, dof]
-    # what is passed already is to be passed by less: by a share that the trust region allows
-    share = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
-    low, high = slowest[frame, dof], fastest[frame, dof]
-    little = SMALL_EXCESS * radius  # is taken back at once
-    low = np.where(now < low - little, now + share * (low - now), low)
-    high = np.where(now > high + little, now + share * (high - now), high)
+    # a bound may be zero, where the original is as fast as the limit: a little before it counts as near too
+    near = NEAR_SHARE * radius
+    high_near, low_near = (
+        np.minimum(NEAR_SPEED * fastest, fastest - near),
+        np.maximum(NEAR_SPEED * slowest, slowest + near),
+    )
+    frame, dof = np.nonzero((change > high_near) | (change < low_near))
+    now, low, high = change[frame, dof], slowest[frame, dof], fastest[frame, dof]
+    share = _brought_back(x[:, dofs], change - np.clip(change, slowest, fastest), radius)[dof]
+    low = np.where(now < low, now + share * (low - now), low)
+    high = np.where(now > high, now + share * (high - now), high)
     index = np.arange(len(frame))
     values = np.concatenate([np.ones(len(index)), -np.ones(len(index))])
     columns = np.concatenate([place[frame + 1, dof], place[frame, dof]])
     return sp.csc_matrix((values, (np.tile(index, 2), columns)), shape=(len(index), size)), low, high
+
+
+def _brought_back(x: Array, past: Array, radius: float) -> Array:
+    """(a,) share of what changes pass their bounds by that a step within the trust region can take back.
+
+    It can shift all later frames by what is passed in all, or take a share of every deviation away, for the original
+    keeps to the bounds.
+
+    Args:
+        x: (n, a) deviations.
+        past: (n - 1, a) by how much their changes pass the bounds.
+        radius: of the trust region.
+    """
+    shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
+    shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
+    found: Array = np.maximum(shifted, shrunk)
+    return found

@@ -10,16 +10,18 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Mask
+from wholebody.motion.clip import Clip
 from wholebody.motion.dips import FEW, depths_between, dipping, dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import PASSED
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Looking, Node
 from wholebody.motion.trajectory.objective import Objective
-from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, WindowProgram
+from wholebody.motion.trajectory.program import ONE_STEP, Limits
+from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, Found, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
@@ -33,6 +35,12 @@ SHORTEST = 5e-4  # rad, m: but none is asked for shorter ones than these; larger
 GROWN = 2.0  # of the objective: what grows by more in a later round is on the wrong side of what it passes
 BRIEF = 40  # frames: shorter windows are looked at between frames at their optimum only; fewer = more wrong sides
 NOTHING = 1e-9  # rad, m: a deviation no larger is none
+TIME = 0.1  # s: smoothness of the first answer; where it is shorter, more attempts end on a wrong side
+ROUGHER, SMOOTHER = 0.4, 1.5  # of that time, in the second answer
+JERK = 1.2  # of the original's: an answer with more is made smoother
+SMOOTH_SHARE = 0.03  # of the squared deviation: acceleration that costs less leaves little to gain
+WORTH = 0.05  # of the objective: less smoothness whose first step brings less is not gone on with
+REACH = 3  # frames on each side of a window whose jerk it changes
 
 
 class WindowSettings(NamedTuple):
@@ -40,12 +48,12 @@ class WindowSettings(NamedTuple):
 
     Attributes:
         clearance: least distance of every pair, metres.
-        time: seconds that a push spreads over.
+        time: seconds that a push spreads over; None for what the jerk of the answer asks for.
         iterations: most steps of one run.
     """
 
     clearance: float
-    time: float
+    time: float | None
     iterations: int
 
 
@@ -62,9 +70,10 @@ class Freed(NamedTuple):
 
 
 class _Way(Enum):
-    """How an attempt goes: from deviations that are free but for dips, to its end, or with others left to try."""
+    """How an attempt goes: from what is free but for dips, from an answer, to its end, or with others left to try."""
 
     CAREFUL = "careful"
+    SECOND = "second"
     USUAL = "usual"
     EARLY_EXIT = "early exit"
 
@@ -85,9 +94,9 @@ class _Attempt(NamedTuple):
         return self.worst > MET, self.dipping > 0, self.objective if self.worst <= MET else self.worst
 
 
-def _begun(x: Array) -> _Attempt:
-    """An attempt that has not begun, at deviations (n, nv)."""
-    return _Attempt(x, np.inf, 0, np.inf)
+def _begun(x: Array, between: tuple[Node, ...] = ()) -> _Attempt:
+    """An attempt that has not begun, at deviations (n, nv), with places between frames."""
+    return _Attempt(x, np.inf, 0, np.inf, between=between)
 
 
 class ClipRun:
@@ -167,7 +176,8 @@ class ClipRun:
         terms = self._terms
         chart = Chart(self._workspace.model, np.array(self._reference[window.first : window.end]))
         seams = window.first > 0, window.end < len(terms.q)
-        objective = Objective(len(window), self._weights, self._settings.time, terms.dt, seams)
+        time = TIME if self._settings.time is None else self._settings.time
+        objective = Objective(len(window), self._weights, time, terms.dt, seams)
         limits = self._limits(window, chart, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
@@ -194,10 +204,59 @@ class ClipRun:
         if best.worst > MET or best.dipping:
             dipping = f", and {best.dipping} motions between frames dip" if best.dipping else ""
             missed = f"{1e3 * best.worst:.3g} mm or mrad are missed{dipping}"
+        elif self._settings.time is None and self._loads is None:  # torques come of accelerations: these stay least
+            best = self._again(best, window, chart, looking, limits, always, cancel)
         changed = np.abs(best.x).max(axis=1) > NOTHING
         q = chart.original.copy()
         q[changed] = chart.postures(best.x)[changed]
         return Freed(q, missed)
+
+    def _again(
+        self, found: _Attempt, window: Window, chart: Chart, looking: Looking, limits: Limits, always: set[int],
+        cancel: Callable[[float], bool],
+    ) -> _Attempt:  # fmt: skip
+        """An answer once more, as smooth as its jerk asks for.
+
+        With more jerk than `JERK` it is made smoother. With less it is made less smooth and so nearer to the original,
+        where smoothness costs deviation; that is kept where its jerk is no more than `JERK`. So jerk is a bound, and
+        the deviation what is minimised.
+        """
+        jerk, square = self._jerk(window, chart, found.x), 0.5 * float((found.x**2).sum())
+        rough = jerk > JERK
+        if not rough and found.objective < (1.0 + SMOOTH_SHARE) * square:
+            return found
+        time = TIME * (SMOOTHER if rough else ROUGHER)
+        seams = window.first > 0, window.end < len(self._reference)
+        objective = Objective(len(window), self._weights, time, self.dt, seams)
+        begun = found
+        if not rough:
+            first = self._step(found, looking, objective, limits)
+            little = first.objective > (1.0 - WORTH) * objective.value(found.x)
+            if little or self._jerk(window, chart, first.x) > JERK:
+                return found
+            begun = _begun(first.x, found.between)
+        other = self._attempt(begun, chart, looking, objective, limits, always, cancel, _Way.SECOND)
+        if other is None or other.worst > MET or other.dipping:
+            return found
+        now = self._jerk(window, chart, other.x)
+        better = now < jerk if rough else now <= JERK and (other.x**2).sum() < 2.0 * square
+        return other if better else found
+
+    def _step(self, begun: _Attempt, looking: Looking, objective: Objective, limits: Limits) -> Found:
+        """One step from an answer."""
+        program = WindowProgram(looking, objective, limits, self._solve, 1)
+        program.add(begun.between)
+        found = program.run(begun.x, lambda number, worst: False, NEARLY, NEARLY)
+        self._programs += found.programs
+        return found
+
+    def _jerk(self, window: Window, chart: Chart, x: Array) -> float:
+        """Of the frames that deviations (n, nv) of a window change the jerk of, in parts of the original's."""
+        first, end = max(0, window.first - REACH), min(len(self._reference), window.end + REACH)
+        before, after = self._reference[first:end], self._reference[first:end].copy()
+        after[window.first - first : window.end - first] = chart.postures(x)
+        figure = self._terms.scene.figure
+        return jerk_ratio(Clip(figure, before, self.dt), Clip(figure, after, self.dt))
 
     def _starts(self, window: Window, chart: Chart, limits: Limits, depths: Array, always: set[int]) -> Iterable[Array]:
         """Deviations (n, nv) to begin with.
@@ -225,8 +284,8 @@ class ClipRun:
         program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
         program.add(begun.between)
         x = begun.x
-        careful = way is _Way.CAREFUL
-        found, radius, largest = None, NEARLY if careful else RADIUS, NEARLY if careful else LARGEST
+        found, radius = None, NEARLY if way in (_Way.CAREFUL, _Way.SECOND) else RADIUS
+        largest = NEARLY if way is _Way.CAREFUL else LARGEST
         most, dipped = self._settings.iterations, set[int]()
 
         def told(count: int, worst: float) -> bool:
@@ -241,9 +300,13 @@ class ClipRun:
             rough = way is _Way.EARLY_EXIT and not number and len(x) > BRIEF
             found = program.run(x, told, radius, largest, ends, rough)
             self._programs += found.programs
-            if found.roughly and not self._passing(chart, found.x, always):
-                found = program.run(found.x, told, radius, largest, ends)
-                self._programs += found.programs
+            if found.roughly:
+                passed = self._passed(chart, found.x, always)
+                if passed > ONE_STEP:  # rows there would push it on
+                    return _Attempt(found.x, found.worst, 0, found.objective, True, program.between)
+                if passed <= PASSED:
+                    found = program.run(found.x, told, radius, largest, ends)
+                    self._programs += found.programs
             radius = NEARLY
             if number:  # what is free already is to stay where it is, or it dips elsewhere
                 largest = max(SHORTER * min(largest, NEARLY), SHORTEST)
@@ -262,7 +325,8 @@ class ClipRun:
             if near and met:
                 near += sampled_dips(self._workspace, q, gaps)
             if not near or not met:
-                return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
+                left = len({gap for gap, _ in near})
+                return _Attempt(x, found.worst, left, found.objective, between=program.between)
             before = len(program.nodes)
             program.add([Node(gap, float(np.clip(share, NEAREST, 1.0 - NEAREST))) for gap, share in near])
             if len(program.nodes) == before:
@@ -270,9 +334,9 @@ class ClipRun:
         assert found is not None
         return _Attempt(x, found.worst, len({gap for gap, _ in near}), found.objective)
 
-    def _passing(self, chart: Chart, x: Array, always: set[int]) -> bool:
-        """Whether motions between frames with deviations (n, nv) pass through something."""
-        return max(depths_between(self._workspace, chart.postures(x), _moved(x, always)).values(), default=0.0) > PASSED
+    def _passed(self, chart: Chart, x: Array, always: set[int]) -> float:
+        """How deep motions between frames with deviations (n, nv) pass through something, metres."""
+        return max(depths_between(self._workspace, chart.postures(x), _moved(x, always)).values(), default=0.0)
 
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
