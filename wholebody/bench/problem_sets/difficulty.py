@@ -16,9 +16,10 @@ from wholebody.bench.problem_sets.fitting import fitted, held
 
 
 def away(case: Case) -> Array:
-    """Way (n,) of all joints but a free root from the start to the witness [rad, m]; to the last one if goals move."""
+    """Way (n,) of all joints but a free root from the start to the end of its path [rad, m], or to the witness."""
     figure = case.problem.scene.figure
-    found = pin.difference(figure.model, case.problem.start, case.path[-1] if case.frames else case.witness)
+    end = case.path[-1] if len(case.path) else case.witness
+    found = pin.difference(figure.model, case.problem.start, end)
     return np.asarray(found[6:] if figure.root == "free" else found)
 
 
