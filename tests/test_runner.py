@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from wholebody import runner
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, run_jobs, tell
+from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, allow_processor, processor_time, run_jobs, tell
 
 
 @pytest.fixture(params=[False, True], ids=["new", "forked"])
@@ -140,3 +140,20 @@ def test_a_process_that_is_full_is_replaced_before_its_next_job(
     finally:
         child.close()
     assert len(seen) == processes
+
+
+def processor_ticks() -> list[float]:
+    """Processor's time of half a millisecond of work, ten times, with a deadline of the processor's time."""
+    allow_processor(30.0)
+    found = []
+    for _ in range(10):
+        before, end = processor_time(), time.thread_time() + 5e-4
+        while time.thread_time() < end:
+            pass
+        found.append(processor_time() - before)
+    return found
+
+
+def test_the_processors_time_goes_by_no_ticks(child: Child) -> None:
+    for seconds in child.call(processor_ticks, seconds=60.0):
+        assert 4e-4 < seconds < 5e-3, "of half a millisecond"

@@ -334,3 +334,36 @@ def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step)
     assert found_any > 50
     if step == 3e-4:
         assert np.mean(asked[1:4]) < 0.95 * asked[0]  # what is far away was not asked again
+
+
+class Interrupted:
+    """The compiled loops, with a Ctrl-C after the pairs are marked and before Pinocchio is told of them."""
+
+    def __init__(self, kernel):
+        self._kernel = kernel
+
+    def __getattr__(self, name):
+        return getattr(self._kernel, name)
+
+    def look(self, *arguments):
+        self._kernel.look(*arguments)
+        raise KeyboardInterrupt
+
+
+def test_a_query_that_is_interrupted_hides_no_pair(monkeypatch):
+    """Pairs are told by what comes and goes: what was not told before Ctrl-C is told after it."""
+    rng = np.random.default_rng(5)
+    scene = among_things("capsules", rng)
+    workspace, found_any = scene.workspace(), 0
+    for _ in range(25):
+        q = random_posture(scene.figure, rng)
+        with monkeypatch.context() as patch:
+            patch.setattr(workspace.proximity, "_kernel", Interrupted(workspace.proximity._kernel))
+            with pytest.raises(KeyboardInterrupt):
+                workspace.near(q, 0.04)
+        found, wanted = workspace.near(q, 0.04), asked_one_by_one(scene, q)
+        pairs = [*map(tuple, found.pair.tolist())]
+        assert {pair for pair, row in wanted.items() if row[0] < 0.04 - 1e-5} <= {*pairs}
+        np.testing.assert_allclose(found.distance, [wanted[pair][0] for pair in pairs], atol=3e-6)
+        found_any += len(pairs)
+    assert found_any > 50

@@ -197,6 +197,7 @@ class Proximity:
     def reset(self) -> None:
         """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
         self._guesses.reset()
+        self._ask_nothing()
         self._travelled[:] = 0.0
         self._bound[:] = -np.inf
 
@@ -210,7 +211,6 @@ class Proximity:
         pin.computeDistances(self.geometry, self.results)
         self._distances = result_view(self.results.distanceResults)
         self._placements = placement_view(self.results.oMg)
-        self.results.deactivateAllCollisionPairs()
         self.reset()
 
     def placements(self, state: Kinematics) -> Array:
@@ -255,25 +255,33 @@ class Proximity:
         """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
         table, kernel = self.table, self._kernel
         results = self.results
-        count, gone, came = kernel.look(
-            placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound, self._extent,
-            within, most, self._index, self._marked, self._count, self._changed,
-        )  # fmt: skip
-        self._count = count
-        self.asked += count
-        if self._singly:
-            for number in self._index[:count].tolist():
-                pin.computeDistance(self.geometry, results, number)
-            return self._index[:count]
-        if gone or came:
-            changed = self._changed[: gone + came].tolist()
-            for number in changed[:gone]:
-                results.deactivateCollisionPair(number)
-            for number in changed[gone:]:
-                results.activateCollisionPair(number)
-        if count:
-            pin.computeDistances(self.geometry, results)
+        try:
+            count, gone, came = kernel.look(
+                placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound,
+                self._extent, within, most, self._index, self._marked, self._count, self._changed,
+            )  # fmt: skip
+            self._count = count
+            self.asked += count
+            if self._singly:
+                for number in self._index[:count].tolist():
+                    pin.computeDistance(self.geometry, results, number)
+                return self._index[:count]
+            if gone or came:
+                changed = self._changed[: gone + came].tolist()
+                for number in changed[:gone]:
+                    results.deactivateCollisionPair(number)
+                for number in changed[gone:]:
+                    results.activateCollisionPair(number)
+            if count:
+                pin.computeDistances(self.geometry, results)
+        except BaseException:  # Ctrl-C between what is noted and what Pinocchio is told: begin again from no pairs
+            self._ask_nothing()
+            raise
         return self._index[:count]
+
+    def _ask_nothing(self) -> None:
+        self.results.deactivateAllCollisionPairs()
+        self._count = 0
 
     def _gather(self, room: _Room, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
         results, known = self._distances, self.table

@@ -9,6 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from wholebody.bench.adapters import registry
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import page
 from wholebody.bench.stability.asking import run
@@ -41,6 +42,15 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert all(word in texts for word in ("Out of reach by 1 mm", "Edge on edge", "qp", "ccd", "●", "–"))
     assert "3 of 3" in capsys.readouterr().out
     assert "| out-by-1-mm |" in (tmp_path / "stability.md").read_text()
+
+
+def test_without_names_those_methods_of_the_page_are_asked_that_are_installed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(registry, "installed", METHODS.__contains__)
+    assert bench("--cases", "not-a-number", "--out", str(tmp_path)) == 0
+    _, rows = read_rows(tmp_path / "stability.csv", StabilityRow)
+    assert {row.method for row in rows} == {*METHODS}
 
 
 def test_a_page_is_whole_or_not_begun(tmp_path: Path) -> None:

@@ -185,3 +185,26 @@ def test_every_step_is_told_and_counted(arm):
     with_measures = wb.QP().solve(problem)
     assert with_measures.assessment.measure <= solution.assessment.measure + 1e-9
     assert found(problem, most=2) is None, "no more steps than the method's iterations"
+
+
+def test_a_solve_that_ends_early_answers_with_what_was_met(arm):
+    """The descent for the measures leaves the goals by the square of its steps; what it began with is met already."""
+    rng, early = np.random.default_rng(17), 0
+    for _ in range(6):
+        problem = wb.Problem(wb.Scene(arm), START, goals=[random_goal(arm, "tip", rng, False)])
+        whole = wb.solve(problem)
+        first = sum(entry.note == "unobstructed" for entry in whole.trace)
+        for most in range(first + 1, len(whole.trace) + 1) if first else ():
+            told = iter(range(1, 1000))
+            ended = wb.solve(problem, progress=lambda entry, told=told, most=most: next(told) >= most)
+            assert ended.solved, ended.message
+            early += 1
+    assert early > 10
+
+
+def test_progress_that_ends_is_not_called_again(arm):
+    problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", place_of(arm, START + 0.1, "tip").translation)])
+    told = []
+    solution = wb.solve(problem, wb.QP(measures=False), progress=lambda entry: told.append(entry) or True)
+    assert len(told) == 1
+    assert solution.solved

@@ -25,6 +25,7 @@ from wholebody.methods.control import Progress
 from wholebody.methods.differential import FIRM
 from wholebody.methods.starts import SPREADS, restarts
 from wholebody.problem import Problem
+from wholebody.runner import processor_time
 from wholebody.solution import Solution
 from wholebody.workspace import Workspace
 
@@ -73,11 +74,11 @@ class Restarted:
         Raises:
             InputError: the method cannot express the problem.
         """
-        began, worked = time.perf_counter(), time.thread_time()
+        began, worked = time.perf_counter(), processor_time()
         best: Solution = self.method.solve(problem, progress)
         tried, judging = 1, best.assessment.seconds
         further = starts(problem)
-        while not best.solved and time.thread_time() - worked < self.seconds:
+        while not best.solved and processor_time() - worked < self.seconds:
             start = next(further, None)
             if start is None:
                 break

@@ -45,12 +45,12 @@ def work(task: Task) -> Chunk:
     began = time.perf_counter()
     try:
         fault = child.call(built, which, seconds=BUILDING)
-        hard: Difficulty | None = None if fault else child.call(difficulty, which, seconds=BUILDING)
     except EndedError as error:
         fault = str(error)
     building = time.perf_counter() - began
     if fault:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
+    hard = _difficulty(child, which)
     records: list[Record] = []
     spent, swept, cold = {}, {}, {}
     kernel = child.call(kernel_seconds, seconds=BUILDING)
@@ -67,6 +67,15 @@ def work(task: Task) -> Chunk:
             records += _sweep(child, adapter, ladder, task, first, ended)
             swept[adapter.name] = time.perf_counter() - between
     return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel, hard)
+
+
+def _difficulty(child: Child, which: Which) -> Difficulty | None:
+    """How hard the case is; None where that ended the process, which no method has to answer for."""
+    try:
+        found: Difficulty = child.call(difficulty, which, seconds=BUILDING)
+    except EndedError:
+        return None
+    return found
 
 
 def _sweep(

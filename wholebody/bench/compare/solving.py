@@ -10,7 +10,6 @@ import copy
 import gc
 import time
 from dataclasses import dataclass, replace
-from time import thread_time  # while a deadline of the processor's time runs, process_time goes by ticks of 4 ms
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -28,7 +27,7 @@ from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.methods.differential import TOOL
 from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
-from wholebody.runner import allow, allow_processor
+from wholebody.runner import allow, allow_processor, processor_time
 
 BUILDING = 300.0  # s: to build a case and what belongs to its scene; compiling once included
 LEAST = 1e-6  # s: no call of a solver is faster; differences of two clock readings may be
@@ -173,16 +172,16 @@ def sentence(error: BaseException) -> str:
 
 
 def _once(method: Any, problem: Problem, empty: Record) -> Record:
-    of_tool, worked, began = TOOL.seconds, thread_time(), time.perf_counter()
+    of_tool, worked, began = TOOL.seconds, processor_time(), time.perf_counter()
     solution = method.solve(problem)
     spent = time.perf_counter() - began - solution.assessment.seconds
-    worked = thread_time() - worked
+    worked = processor_time() - worked
     q = np.asarray(solution.q, dtype=float)
     if not np.isfinite(q).all():
         return replace(empty, said="the answer is not finite", seconds=spent, status=solution.status)
-    judging = thread_time()
+    judging = processor_time()
     judgement = assess(problem, q)
-    worked -= min(thread_time() - judging, solution.assessment.seconds)  # the one within the call took as much
+    worked -= min(processor_time() - judging, solution.assessment.seconds)  # the one within the call took as much
     filled = replace(
         empty,
         outcome=ANSWERED,
@@ -221,17 +220,17 @@ def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Recor
     tracker: Tracker = method.tracker(problem, case.dt)
     for goals in case.frames:
         problem.retarget(goals)
-        worked, began = thread_time(), time.perf_counter()
+        worked, began = processor_time(), time.perf_counter()
         step = tracker.frame(q, method.tolerance)
         q, iterations = step.q, step.iterations
         judging = step.judging if isinstance(step, SolvedStep) else 0.0
         seconds = time.perf_counter() - began - judging
-        worked = thread_time() - worked
+        worked = processor_time() - worked
         if not np.isfinite(q).all():
             return replace(empty, said=f"frame {len(frames)}: the posture is not finite")
-        again = thread_time()
+        again = processor_time()
         judgement = assess(problem, q)
-        worked -= min(thread_time() - again, judging)  # the judgement within the call, if any, took as much
+        worked -= min(processor_time() - again, judging)  # the judgement within the call, if any, took as much
         frames.append(_Frame(q, max(seconds, LEAST), max(worked, LEAST), iterations, judgement))
     return _summary(frames, case, empty)
 

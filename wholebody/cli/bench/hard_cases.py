@@ -40,11 +40,12 @@ INTERRUPTED = 130  # exit code after Ctrl-C
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.adapters.registry import adapters
+    from wholebody.bench.adapters.registry import adapters, installed
     from wholebody.bench.stability import catalogue, page
 
     _check_page(arguments)
-    asked = adapters(arguments.methods or page.METHODS)
+    usual = page.METHODS if arguments.update_docs else filter(installed, page.METHODS)
+    asked = adapters(arguments.methods or tuple(usual))
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts = machine()
     result = _asked(chosen, asked, arguments.jobs)

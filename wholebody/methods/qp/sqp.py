@@ -146,6 +146,7 @@ class SQP:
         self._funnel = Funnel(here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
+        self._keep(here)  # a start that fits is an answer, should the descent end early
         history: list[float] = []
         count, converged, renewals = 0, False, RENEWALS
         while count < self.iterations and not self.control.over:

@@ -127,6 +127,8 @@ def unobstructed(problem: Problem, workspace: Workspace, tolerance: float, most:
     if (at.gap < at.clearance).any():
         return None
     for entry in entries:
+        if control.over:
+            break
         control.tell(entry)
     return Met(q, entries)
 

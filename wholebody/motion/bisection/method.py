@@ -16,7 +16,7 @@ from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.bisection.interpolation import Kind, key_frames
 from wholebody.motion.bisection.prediction import ANKLES, ELBOWS, Predictor
-from wholebody.motion.bisection.recursion import Recursion, Stays, changed_frames, hold_between
+from wholebody.motion.bisection.recursion import SHORT, Recursion, Stays, changed_frames, hold_between
 from wholebody.motion.clip import Clip
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
@@ -62,7 +62,8 @@ class Bisection:
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`. "qp" is
-            `wb.QP(restarts=0, iterations=50)`: what a frame needs more for is freed with its neighbours.
+            `wb.QP(restarts=0, iterations=50)`, ended after 25 programs where another start or way is left: a free
+            root too is let go where no start frees a frame in so many.
     """
 
     evaluation: tuple[int, ...] | None = None
@@ -135,8 +136,9 @@ class Bisection:
                 stays = Stays(scene, original, terms, frozen)
                 predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
                 recursion = Recursion(
-                    scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch
-                )
+                    scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch,
+                    SHORT if self.method == "qp" else None,
+                )  # fmt: skip
                 recursion.run(self._points(figure, original, frozen), whole=frozen == ways[-1])
                 if frozen == ways[-1] or watch.ended or not recursion.stuck:
                     break

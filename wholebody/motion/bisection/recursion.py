@@ -27,8 +27,9 @@ FAR = 0.3
 
 
 SHORT = 25
-"""Programs after which a prediction is ended, as another start has others: nine in ten take at most 20. Where none of
-the starts leads to a free posture in so many, the search goes on from the nearest of the postures that they found."""
+"""Programs of "qp" after which a prediction is ended, as another start has others: nine in ten take at most 20. Where
+none of the starts leads to a free posture in so many, the search goes on from the nearest of the postures that they
+found, in the last of the ways: before, more is let go."""
 
 
 class Stays:
@@ -77,6 +78,7 @@ class Recursion:
         stuck: frames whose prediction failed, and what overlaps there.
         predictions: number of postures that were solved for.
         programs: number of quadratic programs of these.
+        short: iterations after which a prediction is ended where others may be tried; None for no such end.
     """
 
     def __init__(
@@ -89,8 +91,10 @@ class Recursion:
         least: int,
         kind: Kind,
         watch: Watch,
+        short: int | None = SHORT,
     ) -> None:
         """Take the settings; `joints` are the frames with plane constraints."""
+        self.short = short
         self._scene, self._predictor, self._stays, self.joints = scene, predictor, stays, tuple(joints)
         self._share, self._least, self._kind, self._watch = share, least, kind, watch
         self._state, self._whole = State(scene.model), True
@@ -155,13 +159,13 @@ class Recursion:
         """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
-        planes = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state)
-        found = [self._predicted(frame, self.q[frame], planes, SHORT)]
+        planes, short = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state), self.short
+        found = [self._predicted(frame, self.q[frame], planes, short)]
         if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
-            found += [self._predicted(frame, start, [], SHORT) for start in self._beside(frame)]
+            found += [self._predicted(frame, start, [], short) for start in self._beside(frame)]
             if planes and not any(prediction.good for prediction in found):
-                found.append(self._predicted(frame, self.q[frame], [], SHORT))
-            if self._whole and not any(prediction.good for prediction in found):
+                found.append(self._predicted(frame, self.q[frame], [], short))
+            if short is not None and self._whole and not any(prediction.good for prediction in found):
                 nearest = min(found, key=lambda prediction: self._predictor.depth(prediction.q))
                 found.append(self._predicted(frame, nearest.q, []))
         good = [prediction for prediction in found if prediction.good]
@@ -241,9 +245,12 @@ def hold_between(
         if predictor.good(frame, nearest):
             recursion.q[frame] = nearest
             continue
-        found = predictor.predict(frame, q, effort_from=q, most=SHORT)
-        recursion.predictions += 1
-        recursion.programs += found.programs
+        for most in dict.fromkeys((recursion.short, None)):
+            found = predictor.predict(frame, q, effort_from=q, most=most)
+            recursion.predictions += 1
+            recursion.programs += found.programs
+            if found.good:
+                break
         if found.good:
             recursion.q[frame] = found.q
         else:

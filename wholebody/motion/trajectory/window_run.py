@@ -218,7 +218,7 @@ class ClipRun:
         """An answer once more, as smooth as its jerk asks for.
 
         With more jerk than `JERK` it is made smoother. With less it is made less smooth and so nearer to the original,
-        where smoothness costs deviation; that is kept where its jerk is no more than `JERK`. So jerk is a bound, and
+        where smoothness costs deviation. Either is kept where its jerk is no more than `JERK`. So jerk is a bound, and
         the deviation what is minimised.
         """
         jerk, square = self._jerk(window, chart, found.x), 0.5 * float((found.x**2).sum())
@@ -239,7 +239,7 @@ class ClipRun:
         if other is None or other.worst > MET or other.dipping:
             return found
         now = self._jerk(window, chart, other.x)
-        better = now < jerk if rough else now <= JERK and (other.x**2).sum() < 2.0 * square
+        better = now <= JERK and (rough or (other.x**2).sum() < 2.0 * square)
         return other if better else found
 
     def _step(self, begun: _Attempt, looking: Looking, objective: Objective, limits: Limits) -> Found:
