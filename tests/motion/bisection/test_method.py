@@ -292,7 +292,6 @@ def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: p
     monkeypatch.setattr(method_module, "QP", Endless)
     asked = Bisection(method=Endless(restarts=0) if own else "qp")
     assert not asked.avoid(swing, dressed(swing.figure, "torus"), (), None).message
-    assert lengths
     assert max(lengths) < SHORT if not own else min(lengths) == 10 * SHORT
 
 
