@@ -181,10 +181,10 @@ def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
         return []
     best = max(mine, key=lambda row: row.success)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
+    worst = "" if standing.worst_set == best.set else f" and in {words(standing.worst_set)} {percent(standing.worst)}"
     return [
         f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
-        f"[{100 * best.success_low:.0f}, {100 * best.success_high:.0f}] ({words(best.set)}) and in "
-        f"{words(standing.worst_set)} {percent(standing.worst)}{deep}."
+        f"[{100 * best.success_low:.0f}, {100 * best.success_high:.0f}] ({words(best.set)}){worst}{deep}."
     ]
 
 
