@@ -13,7 +13,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
@@ -46,22 +46,14 @@ def nearest(clip: Clip, scene: Scene, constraints: Iterable[Given], answers: Ite
         weights = np.ones(workspace.model.nv)
         weights[: 6 if clip.figure.root == "free" else 0] = ROOT
         objective = Objective(len(clip), weights, 0.0, clip.dt, (False, False))
-        limits = _limits(terms, chart)
+        bounds = chart.bounds(clip.figure.limits)
+        fast: Array = np.full((len(clip) - 1, workspace.model.nv), np.inf)  # speeds have no limits
+        limits = Limits(*bounds, -fast, fast)
         for answer in answers:
             program = WindowProgram(looking, objective, limits, banded_solver(None)[1], STEPS)
             x = np.array([chart.deviation(frame, q) for frame, q in enumerate(answer.q)])
-            x = np.clip(x, limits.lower, limits.upper)
+            x = np.clip(x, *bounds)
             ended = program.run(x, lambda number, worst: False, RADIUS, LARGEST)
             if ended.worst <= 5.0 * MET:
                 found.append(clip.with_q(chart.postures(ended.x)))
     return min(found, key=lambda each: deviation(clip, each).angle, default=None)
-
-
-def _limits(terms: FrameTerms, chart: Chart) -> Limits:
-    """Limits of joints; speeds have none."""
-    lower, upper = (np.full((len(chart), chart.model.nv), bound) for bound in (-np.inf, np.inf))
-    limits = terms.scene.figure.limits
-    lower[:, limits.idx_v] = limits.lower - chart.original[:, limits.idx_q]
-    upper[:, limits.idx_v] = limits.upper - chart.original[:, limits.idx_q]
-    none: Array = np.full((len(chart) - 1, chart.model.nv), np.inf)
-    return Limits(lower, upper, -none, none)

@@ -13,14 +13,15 @@ from typing import Any
 import numpy as np
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.problem_sets.bodies import human
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
+from wholebody.bench.problem_sets.difficulty import away, descended
 from wholebody.bench.published.bodies import BodyFiles, body_files
-from wholebody.bench.published.difficulty import difficulty
 from wholebody.bench.published.problems import problem_content, problem_name, witness_content
 from wholebody.bench.published.reading import INDEX, VERSION, dumped
-from wholebody.bench.published.rebuilt import EXACT, Rebuilt, Score, read_body, worst_of
+from wholebody.bench.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
 from wholebody.bench.published.seeds import far_seed
 from wholebody.errors import InputError, WholebodyError
 from wholebody.files import make_folder, read_text, write
@@ -125,7 +126,7 @@ def _written_set(
         rebuilt = Rebuilt(done.folder, name)
         witnesses[name] = witness_content(case, body)
         proof = _confirmed(rebuilt, witnesses[name])
-        measured[name] = _rounded(difficulty(case, body, rebuilt, far))
+        measured[name] = _rounded(_difficulty(case, body, rebuilt, far))
         best[name] = None if family.moving else _rounded(_best(case, body, rebuilt, proof))
         say(name)
     heading = {"version": VERSION, "set": family.name}
@@ -196,3 +197,24 @@ def _rounded(value: Any) -> Any:
     if isinstance(value, float):
         return float(f"{value:.{DIGITS}g}")
     return {name: _rounded(item) for name, item in value.items()} if isinstance(value, dict) else value
+
+
+def _difficulty(case: Case, body: BodyFiles, rebuilt: Rebuilt, far: Array) -> dict[str, Any]:
+    """How hard a case is, as it stands in `difficulty.json`; the judge of the files says what a descent has solved.
+
+    A case whose goals move is described by its first frame, and by how far it goes from there.
+    """
+    way = away(case)
+    return {
+        "witness_distance": float(np.linalg.norm(way)),
+        "witness_largest": float(np.abs(way).max(initial=0.0)),
+        "gauss_newton": {
+            "near": _solves(case, body, rebuilt, case.problem.start),
+            "far": _solves(case, body, rebuilt, far),
+        },
+    }
+
+
+def _solves(case: Case, body: BodyFiles, rebuilt: Rebuilt, seed: Array) -> bool:
+    found = descended(case, seed)
+    return found is not None and bool(rebuilt.score(np.array(body.posture(found))).worst <= SOLVED)

@@ -79,13 +79,8 @@ class PlainChain:
         seen = self._descend(plan, q, tolerance, min(most, STEPS), np.empty((plan.goal_rows, len(q))))
         return q, self.trace[:seen]
 
-    def rows(self, plan: TermPlan, q: Array) -> Array:
-        """Derivatives (rows, nv) of the errors of goals at a posture (nq,); see `reach`."""
-        rows = np.empty((plan.goal_rows, len(q)))
-        self._descend(plan, q.copy(), 0.0, 1, rows)
-        return rows
-
     def _descend(self, plan: TermPlan, q: Array, tolerance: float, most: int, rows: Array) -> int:
+        """Move q; `rows` (rows, nv) get the derivatives of the errors of goals where the last step began."""
         first, count, width, first_integer, _, integers = plan.layout[RESIDUAL].tolist()
         seen: int = compiled_kernel().reach(
             self.parents, self.places, self.turns, self.slides, plan.support,

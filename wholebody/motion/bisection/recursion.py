@@ -78,7 +78,6 @@ class Recursion:
         stuck: frames whose prediction failed, and what overlaps there.
         predictions: number of postures that were solved for.
         programs: number of quadratic programs of these.
-        short: iterations after which a prediction is ended where others may be tried; None for no such end.
     """
 
     def __init__(
@@ -91,10 +90,13 @@ class Recursion:
         least: int,
         kind: Kind,
         watch: Watch,
-        short: int | None = SHORT,
+        short: int | None,
     ) -> None:
-        """Take the settings; `joints` are the frames with plane constraints."""
-        self.short = short
+        """Take the settings; `joints` are the frames with plane constraints.
+
+        `short` is the number of iterations after which a prediction is ended where others may be tried; None for none.
+        """
+        self._short = short
         self._scene, self._predictor, self._stays, self.joints = scene, predictor, stays, tuple(joints)
         self._share, self._least, self._kind, self._watch = share, least, kind, watch
         self._state, self._whole = State(scene.model), True
@@ -159,7 +161,7 @@ class Recursion:
         """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
         if self._watch.tell(self.share_done(), f"frame {frame}"):
             return False
-        planes, short = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state), self.short
+        planes, short = path_planes(self._scene.figure, self.q, frame, self._swinging(frame), self._state), self._short
         found = [self._predicted(frame, self.q[frame], planes, short)]
         if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
             found += [self._predicted(frame, start, [], short) for start in self._beside(frame)]
@@ -245,12 +247,9 @@ def hold_between(
         if predictor.good(frame, nearest):
             recursion.q[frame] = nearest
             continue
-        for most in dict.fromkeys((recursion.short, None)):
-            found = predictor.predict(frame, q, effort_from=q, most=most)
-            recursion.predictions += 1
-            recursion.programs += found.programs
-            if found.good:
-                break
+        found = predictor.predict(frame, q, effort_from=q)
+        recursion.predictions += 1
+        recursion.programs += found.programs
         if found.good:
             recursion.q[frame] = found.q
         else:

@@ -341,10 +341,7 @@ class ClipRun:
     def _limits(self, window: Window, chart: Chart, seams: tuple[bool, bool]) -> Limits:
         """Bounds on deviations and on their changes; at a seam nothing moves."""
         count, nv = len(chart), chart.model.nv
-        lower, upper = np.full((count, nv), -np.inf), np.full((count, nv), np.inf)
-        limits = self._terms.scene.figure.limits
-        lower[:, limits.idx_v] = limits.lower - chart.original[:, limits.idx_q]
-        upper[:, limits.idx_v] = limits.upper - chart.original[:, limits.idx_q]
+        lower, upper = chart.bounds(self._terms.scene.figure.limits)
         steps, slowest, fastest = chart.steps, np.zeros((count - 1, nv)), np.zeros((count - 1, nv))
         for frame in range(count):
             bounds = self._terms.bounds(window.first + frame, self._workspace.state)
