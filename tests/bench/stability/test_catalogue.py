@@ -76,8 +76,8 @@ def test_best_answers_that_are_known_are_possible() -> None:
 
 
 def test_qp_is_never_wrong() -> None:
-    qp = adapters(["qp/osqp"])
+    (qp,) = adapters(["qp/osqp"])
     chosen = cases(FAST)
-    found = result(chosen, ["qp/osqp"], list(run(chosen, qp)))
+    found = result(chosen, ["qp/osqp"], run((case, qp) for case in chosen))
     wrong = {key: verdict.figure for key, verdict in found.verdicts.items() if verdict.kind == "wrong"}
     assert not wrong

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import argparse
+import sys
+from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,7 +18,7 @@ from wholebody.bench.stability import page
 from wholebody.bench.stability.asking import run
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.verdict import Result, StabilityRow, result
-from wholebody.bench.tables import read_rows
+from wholebody.bench.tables import read_rows, write_rows
 from wholebody.cli.bench import stability
 from wholebody.errors import InputError
 
@@ -44,6 +47,44 @@ def test_a_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "| out-by-1-mm |" in (tmp_path / "stability.md").read_text()
 
 
+def test_an_earlier_run_is_told_again_and_nothing_is_asked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The rows are written by hand; the verdicts of the file count, and its figures are shortened for the chart."""
+    row = StabilityRow(
+        "edge-on-edge", "qp", "honest", True, "best known", "unreachable", 0.05, 0.05, 0, 0, 0, 1, 60.0, ""
+    )
+    told = ("hangs: no answer in 20 s of the processor", "34 mm inside, says unreachable", "claims solved, 1 mm left")
+    told += ("12 mm inside on the way: tip and plate, frame 3", "ValueError: nothing", "3.1 times too fast")
+    methods = ("dls", "ccd", "newton/slack", "newton/kkt", "qp/daqp", "qp/osqp")
+    rows = [
+        replace(row, method=name, verdict="wrong", figure=told, acceptable=False)
+        for name, told in zip(methods, told, strict=True)
+    ]
+    write_rows(tmp_path / "earlier.csv", {"processor": "another one"}, [row, *rows])
+    monkeypatch.setattr("wholebody.bench.stability.asking.run", None)
+    words = ("--from", str(tmp_path / "earlier.csv"), "--cases", "edge-on-edge", "--out", str(tmp_path / "out"))
+    assert bench("--methods", "qp", *methods, *words) == 0
+    text = (tmp_path / "out" / "stability.md").read_text()
+    assert (
+        "| edge-on-edge | ● best known | ✗ hangs | ✗ 34 mm | ✗ claims 1 mm | ✗ 12 mm way | ✗ error | ✗ 3.1 × speed |"
+        in text
+    )
+    assert "its answers took 7 minutes by the clock" in text
+    assert "processor another one" in text
+    with pytest.raises(InputError, match="no answer of mink to edge-on-edge"):
+        bench("--methods", "mink", *words)
+
+
+def test_pictures_of_an_earlier_run_show_what_it_found(found: Result, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The drawn answers alone are asked for, and one of which something else comes now is not drawn."""
+    hard_cases, drawn = sys.modules["wholebody.cli.bench.hard_cases"], []
+    rows = {key: replace(row, verdict="solved") if row.case == CASES[0] else row for key, row in found.rows.items()}
+    monkeypatch.setattr("wholebody.bench.stability.pictures.draw", lambda result, cells, *rest: drawn.extend(cells))
+    hard_cases._drawn(Result(found.cases, found.methods, rows), adapters(METHODS), Path("nowhere"), 1)
+    assert drawn == [(CASES[1], "qp")]
+
+
 def test_without_names_those_methods_of_the_page_are_asked_that_are_installed(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -63,7 +104,7 @@ def test_a_page_is_whole_or_not_begun(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def found() -> Result:
     chosen, asked = cases(CASES[:2]), adapters(METHODS)
-    return result(chosen, METHODS, list(run(chosen, asked)))
+    return result(chosen, METHODS, run(product(chosen, asked)))
 
 
 def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) -> None:
@@ -85,7 +126,7 @@ def test_pictures_of_a_case(found: Result, tmp_path: Path) -> None:
     if find_chromium() is None:
         pytest.skip("there is no Chromium")
     image = pytest.importorskip("PIL.Image")
-    drawn = draw(found, tmp_path)
+    drawn = draw(found, found.cells, tmp_path)
     assert [path.name for path, _ in drawn["edge-on-edge"]] == ["edge-on-edge.jpg"]
     with image.open(tmp_path / "edge-on-edge.jpg") as picture:
         assert picture.size == (560, 420)

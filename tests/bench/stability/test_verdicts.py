@@ -25,7 +25,7 @@ Fakes = Callable[..., Adapter]
 
 def verdict(name: str, adapter: Adapter, cap: float = 20.0) -> Verdict:
     chosen = cases([name])
-    return result(chosen, [adapter.name], list(run(chosen, [adapter], cap=cap))).verdicts[name, adapter.name]
+    return result(chosen, [adapter.name], run([(chosen[0], adapter)], cap=cap)).verdicts[name, adapter.name]
 
 
 def at(*values: float) -> Callable[[Problem], np.ndarray]:
@@ -197,12 +197,12 @@ def test_lengths(metres: float, words: str) -> None:
 
 
 def test_what_is_our_adapters_fault_is_not_called_wrong_of_the_tool() -> None:
-    wrong = Verdict("wrong", "69.1 mm inside", "69.1 mm", False)
+    wrong = Verdict("wrong", "69.1 mm inside", False)
     theirs = audited("narrow-passage", "pink", wrong)
     assert (theirs.kind, theirs.acceptable) == ("adapter", False)
     assert theirs.figure.startswith("69.1 mm inside; alone, pink")
     assert audited("narrow-passage", "dls", wrong) == wrong
-    solved = Verdict("solved", "", "", True)
+    solved = Verdict("solved", "", True)
     assert audited("narrow-passage", "pink", solved) == solved
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -31,17 +31,13 @@ class Cell:
     judged: Judged
 
 
-def run(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
-    """Every case by every method, as they end, in `jobs` processes.
+def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
+    """Cases, each by a method, as they end, in `jobs` processes.
 
     `cap` is seconds of the processor for an answer, or for a frame.
     """
     _warm()
-    left = (
-        Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap)
-        for case in cases
-        for adapter in adapters
-    )
+    left = (Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap) for case, adapter in asked)
     for outcome in run_jobs(lambda: next(left, None), [Child(forked=True) for _ in range(jobs)]):
         case, method = outcome.job.name
         answer = outcome.notes[0] if outcome.notes else Answer(NOTHING)

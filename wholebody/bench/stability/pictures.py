@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Stream
 from wholebody.bench.stability.verdict import Result
 from wholebody.files import Scratch
@@ -30,8 +31,19 @@ Drawn = dict[str, list[tuple[Path, str]]]
 """Paths and captions of pictures, by the case's name."""
 
 
-def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: None) -> Drawn:
+def shown(result: Result) -> list[tuple[HardCase, str]]:
+    """Cases, each with a method whose answer is drawn: the first of the best kind, and those that fail."""
+    return [
+        (case, method) for case in result.cases for method in (_best(case, result), *_failing(case, result)) if method
+    ]
+
+
+def draw(
+    result: Result, cells: Mapping[tuple[str, str], Cell], folder: Path, progress: Callable[[], None] = lambda: None
+) -> Drawn:
     """Draw a picture of each case into a folder, and of answers that fail; a case's own picture comes first.
+
+    Answers that are not among the cells are not drawn.
 
     Raises:
         MissingPackageError: there is no Chromium.
@@ -43,25 +55,30 @@ def draw(result: Result, folder: Path, progress: Callable[[], None] = lambda: No
     drawn: Drawn = {}
     try:
         for case in result.cases:
-            drawn[case.name] = _case(case, result, folder, screenshots)
+            drawn[case.name] = _case(case, result, cells, folder, screenshots)
             progress()
     finally:
         screenshots.close()
     return drawn
 
 
-def _case(case: HardCase, result: Result, folder: Path, screenshots: Screenshots) -> list[tuple[Path, str]]:
+def _case(
+    case: HardCase, result: Result, cells: Mapping[tuple[str, str], Cell], folder: Path, screenshots: Screenshots
+) -> list[tuple[Path, str]]:
+    found = []
     best = _best(case, result)
-    answer = result.cells[case.name, best].answer if best is not None else None
-    before = "the frame before" if isinstance(case.question(), Stream) else "the start"
-    caption = f"The answer of {best}; transparent, {before}." if best is not None else "As it begins."
-    found = [(_picture(case, answer, None, folder / f"{case.name}.jpg", screenshots), caption)]
-    for number, method in enumerate(_failing(case, result)[:MOST_FAILURES], start=1):
-        cell, verdict = result.cells[case.name, method], result.verdicts[case.name, method]
-        path = folder / f"{case.name}-wrong-{number}.jpg"
-        found.append(
-            (_picture(case, cell.answer, cell.judged.worst, path, screenshots), f"{method}: {verdict.figure}.")
-        )
+    if best is None:
+        found.append((_picture(case, None, None, folder / f"{case.name}.jpg", screenshots), "As it begins."))
+    elif (case.name, best) in cells:
+        before = "the frame before" if isinstance(case.question(), Stream) else "the start"
+        path, answer = folder / f"{case.name}.jpg", cells[case.name, best].answer
+        caption = f"The answer of {best}; transparent, {before}."
+        found.append((_picture(case, answer, None, path, screenshots), caption))
+    for number, method in enumerate(_failing(case, result), start=1):
+        if (case.name, method) in cells:
+            cell, path = cells[case.name, method], folder / f"{case.name}-wrong-{number}.jpg"
+            caption = f"{method}: {result.verdicts[case.name, method].figure}."
+            found.append((_picture(case, cell.answer, cell.judged.worst, path, screenshots), caption))
     return found
 
 
@@ -69,21 +86,20 @@ def _best(case: HardCase, result: Result) -> str | None:
     """The first method with the best kind of answer that has a posture."""
     for kind in ("solved", "honest"):
         for method in result.methods:
-            verdict = result.verdicts[case.name, method]
-            if verdict.kind == kind and len(result.cells[case.name, method].answer.postures):
+            row = result.rows[case.name, method]
+            if row.verdict == kind and row.frames:
                 return method
     return None
 
 
 def _failing(case: HardCase, result: Result) -> list[str]:
-    """Methods with a wrong answer that can be drawn, one of each family."""
+    """Methods with a wrong answer that can be drawn, one of each family, as many as are drawn."""
     found: dict[str, str] = {}
     for method in result.methods:
-        cell = result.cells[case.name, method]
-        drawable = len(cell.answer.postures) and cell.judged.finite
-        if result.verdicts[case.name, method].kind == "wrong" and drawable:
+        row = result.rows[case.name, method]
+        if row.verdict == "wrong" and row.frames and np.isfinite(row.goal_error):
             found.setdefault(method.partition("/")[0], method)
-    return list(found.values())
+    return list(found.values())[:MOST_FAILURES]
 
 
 def _picture(case: HardCase, answer: Answer | None, index: int | None, path: Path, screenshots: Screenshots) -> Path:

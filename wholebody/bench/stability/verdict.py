@@ -6,14 +6,18 @@ All verdicts together are a result, of which everything is drawn and written.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import NamedTuple
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple, cast
 
 from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE, Judged
-from wholebody.bench.tables import filled
+from wholebody.bench.tables import filled, read_rows
+from wholebody.errors import InputError
 from wholebody.records import with_values
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
@@ -33,19 +37,34 @@ WORDS: dict[Kind, str] = {
 }
 
 
+BRIEF = {
+    r"(hangs|crashes): .*": r"\1",
+    r"takes .*": "takes it",
+    r"refuses with .* only": "unclear",
+    r"answers|NaN": r"\g<0>",
+    r"(.*) out of limits": r"\1",
+    r"(.*) inside on the way: .*": r"\1 way",
+    r"(.*) inside, not deeper": r"\1 in",
+    r"(.*) inside(, says \w+)?": r"\1",
+    r"a constraint missed by (.*) \(or mrad\).*": r"\1",
+    r"(.*) times too fast": r"\1 × speed",
+    r"claims solved, (.*) left": r"claims \1",
+    r"misreports .*": "misreports",
+}
+"""How figures are shortened for the cell of a table; any other wrong answer is an error."""
+
+
 class Verdict(NamedTuple):
     """What one method's answer to one case is worth.
 
     Attributes:
         kind: of the five; "adapter" is given by the audit alone, to what would be wrong.
         figure: the worst figure, in a few words; "" where there is nothing to add.
-        brief: the same for the cell of a table.
         acceptable: whether the case accepts it.
     """
 
     kind: Kind
     figure: str
-    brief: str
     acceptable: bool
 
     @property
@@ -53,66 +72,68 @@ class Verdict(NamedTuple):
         """One sign: an honest answer that is as good as can be is a full circle."""
         return "●" if self.kind == "honest" and self.acceptable else SYMBOLS[self.kind]
 
+    @property
+    def brief(self) -> str:
+        """The figure for the cell of a table."""
+        words = self.figure.partition("; alone")[0]
+        for pattern, short in BRIEF.items():
+            if found := re.fullmatch(pattern, words):
+                return found.expand(short)
+        return "error" if self.kind in ("wrong", "adapter") else words
+
 
 def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
     """The verdict on an answer and what it measures.
 
     `best` is the goal error of the best answer that any method found, for a case that knows none itself [m, rad].
     """
-    wrong, brief = _wrong(case, answer, judged)
+    wrong = _wrong(case, answer, judged)
     if wrong:
-        return Verdict("wrong", wrong, brief, False)
+        return Verdict("wrong", wrong, False)
     if answer.refusal:
-        return Verdict("refusal", "", "", case.accepts("refusal", math.inf))
+        return Verdict("refusal", "", case.accepts("refusal", math.inf))
     known = case.best if case.best is not None else best
     miss = judged.goal_error - (known or 0.0)
     held = max(judged.penetration - INSIDE, judged.constraint_violation - BROKEN) <= 0.0
     if held and judged.goal_error <= case.tolerance:
-        return Verdict("solved", "", "", case.accepts("solved", miss))
-    figure = _short(judged, known, miss)
-    accepted = (held or not case.can_hold) and case.accepts("honest", miss)
-    return Verdict("honest", figure, figure.replace(" inside, not deeper", " in"), accepted)
+        return Verdict("solved", "", case.accepts("solved", miss))
+    return Verdict("honest", _short(judged, known, miss), (held or not case.can_hold) and case.accepts("honest", miss))
 
 
-def _wrong(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
-    """What is wrong with an answer, the worst first, in words and in brief; empty for nothing."""
+def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
+    """What is wrong with an answer, the worst first; empty for nothing."""
     if answer.failure:
-        kind = answer.failure.partition(":")[0]
-        return answer.failure, kind if kind in ("hangs", "crashes") else "error"
+        return answer.failure
     if answer.taken:
-        return "takes " + ", ".join(answer.taken), "takes it"
+        return "takes " + ", ".join(answer.taken)
     if answer.refusal:
-        clear = len(answer.refusal) >= LEAST_SENTENCE
-        return ("", "") if clear else (f"refuses with {answer.refusal!r} only", "unclear")
+        return "" if len(answer.refusal) >= LEAST_SENTENCE else f"refuses with {answer.refusal!r} only"
     if case.expected == "refusal":
-        return "answers", "answers"
+        return "answers"
     if not judged.finite:
-        return "NaN", "NaN"
+        return "NaN"
     if judged.limit_violation > BEYOND:
-        return f"{judged.limit_violation:.2g} rad out of limits", f"{judged.limit_violation:.2g} rad"
+        return f"{judged.limit_violation:.2g} rad out of limits"
     if judged.passed:
-        deep = length(judged.dip)
-        return f"{deep} inside on the way: {judged.passed}", f"{deep} way"
+        return f"{length(judged.dip)} inside on the way: {judged.passed}"
     return _missed(case, answer, judged)
 
 
-def _missed(case: HardCase, answer: Answer, judged: Judged) -> tuple[str, str]:
+def _missed(case: HardCase, answer: Answer, judged: Judged) -> str:
     """What lengths tell: overlap, constraints, speed, and what the method says of them."""
-    deep, missed, left = length(judged.penetration), length(judged.constraint_violation), length(judged.goal_error)
     doubts = answer.status in NOT_HELD
-    if judged.penetration > max(INSIDE, judged.start_penetration + INSIDE):
-        return f"{deep} inside{_said(answer)}", deep
-    if judged.penetration > INSIDE and not doubts:
-        return f"{deep} inside{_said(answer)}", deep
+    allowed = judged.start_penetration + INSIDE if doubts else INSIDE
+    if judged.penetration > allowed:
+        return f"{length(judged.penetration)} inside{_said(answer)}"
     if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
-        return f"a constraint missed by {missed} (or mrad){_said(answer)}", missed
+        return f"a constraint missed by {length(judged.constraint_violation)} (or mrad){_said(answer)}"
     if judged.speed_excess > FAST:
-        return f"{1.0 + judged.speed_excess:.1f} times too fast", f"{1.0 + judged.speed_excess:.0f} × speed"
+        return f"{1.0 + judged.speed_excess:.1f} times too fast"
     if answer.status == "solved" and judged.goal_error > case.tolerance:
-        return f"claims solved, {left} left", f"claims {left}"
+        return f"claims solved, {length(judged.goal_error)} left"
     if judged.misreported > case.tolerance:
-        return f"misreports what is left by {length(judged.misreported)}", "misreports"
-    return "", ""
+        return f"misreports what is left by {length(judged.misreported)}"
+    return ""
 
 
 def _said(answer: Answer) -> str:
@@ -198,16 +219,19 @@ class Result:
     Attributes:
         cases: in the order of reports.
         methods: in the order in which they were asked.
-        cells: by case's name and method.
-        verdicts: the same.
-        best: least goal error known, by case's name [m, rad].
+        rows: by case's name and method.
+        cells: the same; none where the rows were read from a file.
     """
 
     cases: tuple[HardCase, ...]
     methods: tuple[str, ...]
-    cells: dict[tuple[str, str], Cell]
-    verdicts: dict[tuple[str, str], Verdict]
-    best: dict[str, float]
+    rows: Mapping[tuple[str, str], StabilityRow]
+    cells: Mapping[tuple[str, str], Cell] = field(default_factory=dict)
+
+    @cached_property
+    def verdicts(self) -> dict[tuple[str, str], Verdict]:
+        """By case's name and method."""
+        return {key: Verdict(cast(Kind, row.verdict), row.figure, row.acceptable) for key, row in self.rows.items()}
 
     def count(self, method: str, kind: Kind) -> int:
         """How many of a method's verdicts are of one kind."""
@@ -216,7 +240,7 @@ class Result:
     @property
     def minutes(self) -> float:
         """How long all answers took together, by the clock."""
-        return sum(cell.answer.seconds for cell in self.cells.values()) / 60.0
+        return sum(row.seconds for row in self.rows.values()) / 60.0
 
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
@@ -236,33 +260,47 @@ class Result:
             found.setdefault(words, []).append(method)
         return list(found.items())
 
-    def rows(self) -> list[StabilityRow]:
-        """One a cell, case by case."""
-        return [self._row(case, method) for case in self.cases for method in self.methods]
 
-    def _row(self, case: HardCase, method: str) -> StabilityRow:
-        cell, verdict = self.cells[case.name, method], self.verdicts[case.name, method]
-        answer = cell.answer
-        return filled(
-            StabilityRow, verdict, answer, cell.judged, case=case.name, method=method, verdict=verdict.kind,
-            best=self.best.get(case.name, math.nan), frames=len(answer.postures),
-            sentence=answer.refusal or answer.message,
-        )  # fmt: skip
-
-
-def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Sequence[Cell]) -> Result:
+def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Iterable[Cell]) -> Result:
     """Decide all cells: each is compared with the best answer of all."""
-    best = _known(cells)
-    best |= {case.name: case.best for case in cases if case.best is not None}
     placed = {(cell.case.name, cell.method): cell for cell in cells}
-    verdicts = {
-        key: audited(*key, decide(cell.case, cell.answer, cell.judged, best.get(cell.case.name)))
-        for key, cell in placed.items()
-    }
-    return Result(tuple(cases), tuple(methods), placed, verdicts, best)
+    best = _known(placed.values()) | {case.name: case.best for case in cases if case.best is not None}
+    keys = [(case.name, method) for case in cases for method in methods]
+    return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys}, placed)
 
 
-def _known(cells: Sequence[Cell]) -> dict[str, float]:
+def read_result(path: Path, cases: Sequence[HardCase], methods: Sequence[str]) -> tuple[Result, dict[str, str]]:
+    """Some cells of an earlier run, from the file of its rows; and the facts of the machine that it ran on.
+
+    Raises:
+        FileFormatError: the file is none of such rows.
+        InputError: it lacks a cell.
+    """
+    facts, read = read_rows(path, StabilityRow)
+    rows = {(row.case, row.method): row for row in read}
+    keys = [(case.name, method) for case in cases for method in methods]
+    for case, method in keys:
+        if (case, method) not in rows:
+            raise InputError(f"{path}: has no answer of {method} to {case}; ask for others, or run it")
+    return Result(tuple(cases), tuple(methods), {key: rows[key] for key in keys}), facts
+
+
+def _row(cell: Cell, best: float | None) -> StabilityRow:
+    case, answer = cell.case, cell.answer
+    verdict = judged_verdict(cell, best)
+    return filled(
+        StabilityRow, verdict, answer, cell.judged, case=case.name, method=cell.method, verdict=verdict.kind,
+        best=math.nan if best is None else best, frames=len(answer.postures),
+        sentence=answer.refusal or answer.message,
+    )  # fmt: skip
+
+
+def judged_verdict(cell: Cell, best: float | None) -> Verdict:
+    """The verdict on a cell as the audit leaves it; `best` is as for `decide`."""
+    return audited(cell.case.name, cell.method, decide(cell.case, cell.answer, cell.judged, best))
+
+
+def _known(cells: Iterable[Cell]) -> dict[str, float]:
     """Least goal error of each case's answers with which nothing is wrong, by the case's name [m, rad]."""
     found: dict[str, float] = {}
     for cell in cells:

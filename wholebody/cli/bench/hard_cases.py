@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from wholebody.bench.adapters.base import Adapter
     from wholebody.bench.attack.case import Case
     from wholebody.bench.attack.report import Row
+    from wholebody.bench.stability.asking import Cell
     from wholebody.bench.stability.case import HardCase
     from wholebody.bench.stability.pictures import Drawn
     from wholebody.bench.stability.verdict import Result
@@ -33,32 +34,43 @@ INTERRUPTED = 130  # exit code after Ctrl-C
     "stability",
     "hard cases by methods: where each fails, and how",
     "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
-    "honest best effort, a clear refusal, or WRONG.",
+    "honest best effort, a clear refusal, or WRONG. With --from an earlier run is told again: its table, its "
+    "chart, and with --update-docs the page, for whose pictures a few answers are asked for anew.",
     listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page)"),
     listed("--cases", "cases (default: all; with --quick a few)"),
+    option(
+        "--from", dest="earlier", type=Path, metavar="CSV", help="stability.csv of an earlier run, instead of asking"
+    ),
     count("--jobs", 1, "processes at a time"),
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
     from wholebody.bench.adapters.registry import adapters, installed
     from wholebody.bench.stability import catalogue, page
+    from wholebody.bench.stability.verdict import read_result, result
 
     _check_page(arguments)
-    usual = page.METHODS if arguments.update_docs else filter(installed, page.METHODS)
+    usual = page.METHODS if arguments.update_docs or arguments.earlier else filter(installed, page.METHODS)
     asked = adapters(arguments.methods or tuple(usual))
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
-    facts = machine()
-    result = _asked(chosen, asked, arguments.jobs)
-    write_rows(arguments.out / "stability.csv", facts, result.rows())
-    report = page.report(result, facts)
+    methods = [adapter.name for adapter in asked]
+    if arguments.earlier is not None:
+        found, facts = read_result(arguments.earlier, chosen, methods)
+    else:
+        facts = machine()
+        found = result(
+            chosen, methods, _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
+        )
+        write_rows(arguments.out / "stability.csv", facts, list(found.rows.values()))
+    report = page.report(found, facts)
     write_text(arguments.out / "stability.md", report + "\n")
-    svg, _ = page.matrix(result, arguments.out / "stability.svg")
-    _print(result)
+    svg, _ = page.matrix(found, arguments.out / "stability.svg")
+    _print(found)
     print(f"wrote {arguments.out}")
     if arguments.update_docs is not None:
-        pictures = _drawn(result, arguments.update_docs)
+        pictures = _drawn(found, asked, arguments.update_docs, arguments.jobs)
         shutil.copyfile(svg, arguments.update_docs / ASSETS / page.CHART)
-        text = page.page(result, asked, facts, pictures, ASSETS)
+        text = page.page(found, asked, facts, pictures, ASSETS)
         replace_section(arguments.update_docs / PAGE, "stability", text)
         print(f"wrote {arguments.update_docs / PAGE}")
 
@@ -74,27 +86,34 @@ def _check_page(arguments: argparse.Namespace) -> None:
         raise InputError(f"{docs / PAGE}: there is no such page; give the folder of the documentation")
 
 
-def _asked(cases: Sequence[HardCase], adapters: Sequence[Adapter], jobs: int) -> Result:
-    from wholebody.bench.stability.asking import run as ask_all
-    from wholebody.bench.stability.verdict import result
+def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
+    from wholebody.bench.stability.asking import run
     from wholebody.cli.tables import progress_bar
 
     cells = []
     with progress_bar(thread=False) as bar:
-        work = bar.add_task("asking", total=len(cases) * len(adapters))
-        for cell in ask_all(cases, adapters, jobs):
+        work = bar.add_task("asking", total=len(pairs))
+        for cell in run(pairs, jobs):
             cells.append(cell)
             bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
-    return result(cases, [adapter.name for adapter in adapters], cells)
+    return cells
 
 
-def _drawn(result: Result, docs: Path) -> Drawn:
-    from wholebody.bench.stability.pictures import draw
+def _drawn(found: Result, asked: Sequence[Adapter], docs: Path, jobs: int) -> Drawn:
+    """Draw answers; those of an earlier run are asked for again, and drawn where the verdict is of the same kind."""
+    from wholebody.bench.stability.pictures import draw, shown
+    from wholebody.bench.stability.verdict import judged_verdict
     from wholebody.cli.tables import progress_bar
 
+    cells, known = dict(found.cells), {adapter.name: adapter for adapter in asked}
+    if not cells:
+        for cell in _asked([(case, known[method]) for case, method in shown(found)], jobs):
+            key = cell.case.name, cell.method
+            if judged_verdict(cell, None).kind == found.rows[key].verdict:
+                cells[key] = cell
     with progress_bar(thread=False) as bar:
-        work = bar.add_task("drawing", total=len(result.cases))
-        return draw(result, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
+        work = bar.add_task("drawing", total=len(found.cases))
+        return draw(found, cells, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
 
 
 def _print(result: Result) -> None:
