@@ -307,7 +307,7 @@ def test_what_takes_long_is_told_on_stderr_once_and_the_cache_is_cleared(
     assert first.stdout == again.stdout
     assert "more volume" in first.stdout
     cleared = subprocess.run([*command, "doctor", "--clear-cache"], capture_output=True, text=True, check=True)
-    assert "threw away 1 meshes" in cleared.stdout
+    assert "removed 1 meshes" in cleared.stdout
     assert not list(tmp_path.iterdir())
 
 

@@ -1,11 +1,18 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from pathlib import Path
 
 import pytest
 
-from wholebody.doctor.packages import MODULES, Conflict, Distribution, conflicts, installed, shadow
+from wholebody.doctor.packages import EXTRAS, MODULES, Conflict, Distribution, conflicts, installed, shadow
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 PLACO = Distribution("0.10.2", ("cmeel", "pin==3.8.0", "cmeel-urdfdom==4.0.1", "meshcat", "extra-one==1; extra == 'x'"))
 URDFDOM = Distribution("4.0.1")
@@ -43,6 +50,21 @@ def test_a_module_from_elsewhere_is_noticed(tmp_path: Path) -> None:
 def test_what_is_needed_in_an_exact_version_is_looked_up_too() -> None:
     assert {"placo", "pin", "libpinocchio", "cmeel-urdfdom"} <= set(installed(["placo"]))
     assert conflicts(installed(MODULES)) == []
+
+
+def test_the_examined_packages_are_those_of_the_project() -> None:
+    """Read from the project's own file; what tests, builds and documentation need is no part of an installation."""
+    text = (Path(__file__).parents[2] / "pyproject.toml").read_text()
+    project = tomllib.loads(text)["project"]
+
+    def names(requirements: list[str]) -> set[str]:
+        return {re.split(r"[<>=!~;\[ ]", each)[0] for each in requirements if "python_version" not in each}
+
+    assert names(project["dependencies"]) == {*MODULES}
+    of_users = {name: each for name, each in project["optional-dependencies"].items()
+                if name not in ("test", "build", "docs")}  # fmt: skip
+    assert set().union(*map(names, of_users.values())) - {"pin"} == {*EXTRAS}
+    assert all(name in names(of_users[extra]) for name, extra in EXTRAS.items())
 
 
 @pytest.mark.parametrize("name", MODULES)

@@ -12,6 +12,7 @@ import pytest
 import wholebody as wb
 from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
+from wholebody.studies.study_file import read_study
 from wholebody.studies.task_files import TaskFile
 
 pytestmark = pytest.mark.usefixtures("one_process")
@@ -113,6 +114,14 @@ def test_people_of_a_study_have_proportions_of_their_own(folder: Path) -> None:
     assert near.goal_error > far.goal_error + 0.02
     with pytest.raises(wb.UnknownNameError, match="no dimension is called 'spam'"):
         wb.study(folder / "task.toml", people=[{"proportions": {"spam": 1.75}}])
+
+
+def test_a_study_file_says_of_a_person_what_a_task_file_can_say(folder: Path) -> None:
+    person = 'percentile = 5\nage = 60\nproportions = { span = 1.6 }'
+    (folder / "study.toml").write_text(STUDY.replace("stature = 1.55", person, 1))
+    people = read_study(folder / "study.toml").people
+    assert people is not None
+    assert {"sex": "female", "percentile": 5.0, "age": 60.0, "proportions": {"span": 1.6}} in people.values()
 
 
 @pytest.mark.parametrize(

@@ -62,5 +62,5 @@ def _clear_cache() -> int:
     from wholebody.geometry.mesh_cache import clear_cache
 
     state = clear_cache()
-    print(f"threw away {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
+    print(f"removed {state.entries} meshes, {state.size / 2**20:.1f} MB, in {state.folder}")
     return 0

@@ -27,6 +27,8 @@ MODULES = {
     "pycollada": "collada",
     "platformdirs": "platformdirs",
     "rich": "rich",
+    "jinja2": "jinja2",
+    "markdown-it-py": "markdown_it",
 }
 """Required packages: distribution -> its module."""
 
@@ -35,9 +37,17 @@ EXTRAS = {
     "quadprog": "solvers",
     "proxsuite": "solvers",
     "piqp": "solvers",
+    "distributed": "cluster",
+    "viser": "drag",
+    "shtab": "completion",
+    "pybvh": "motion",
     "pin-pink": "compare",
     "mink": "compare",
     "mujoco": "compare",
+    "rapier3d": "compare",
+    "drake": "drake",
+    "optik-py": "optik",
+    "embodik": "embodik",
 }
 """Optional packages: distribution -> the extra that installs it."""
 

@@ -59,11 +59,7 @@ class Case:
 
 @dataclass(frozen=True)
 class Running:
-    """How cases are run; see `solve_many`.
-
-    Raises:
-        InputError: a value of the wrong kind or range.
-    """
+    """How cases are run; see `solve_many`."""
 
     method: Method
     jobs: int = 1

@@ -1,18 +1,16 @@
-"""Places that a frame provably cannot reach: by the lengths of its limbs from what is held, or inside of things."""
+"""Places that a frame provably cannot reach: by the lengths of its limbs from what is held."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.methods.contradictions import contradictions
 from wholebody.problem import Problem
 from wholebody.simplification.pairs import held_balls
 from wholebody.simplification.reach import Balls, Reach
-from wholebody.workspace import Workspace
 
-SLACK = 1e-6  # m: for rounding
+SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
 
 
 def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Array]:
@@ -44,22 +42,9 @@ def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Arr
     return center[bounded], radius[bounded]
 
 
-def beyond(places: Array, center: Array, radius: Array) -> Mask:
-    """Which places (n, 3) are outside of a ball, and so out of reach."""
-    outside = np.zeros(len(places), dtype=bool)
-    for middle, size in zip(center, radius, strict=True):
-        outside |= np.linalg.norm(places - middle, axis=1) > size + SLACK
-    return outside
-
-
 def distance_beyond(places: Array, center: Array, radius: Array) -> Array:
     """By how much (n,) places are at least out of reach, metres."""
     least = np.zeros(len(places))
     for middle, size in zip(center, radius, strict=True):
         least = np.maximum(least, np.linalg.norm(places - middle, axis=1) - size)
     return least
-
-
-def contradicted(problem: Problem, workspace: Workspace) -> bool:
-    """Whether what a problem asks contradicts itself, such as a goal inside of a thing."""
-    return bool(contradictions(problem, workspace))

@@ -19,7 +19,7 @@ from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.runner import packed
 from wholebody.studies.many import MOST_JOBS
-from wholebody.studies.reach_bounds import beyond, distance_beyond, reach_balls
+from wholebody.studies.reach_bounds import SLACK, distance_beyond, reach_balls
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
 from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
 from wholebody.tasks import inputs
@@ -111,8 +111,9 @@ class _Search:
         self._asked, self._grid, self._jobs, self._cluster, self._progress = asked, grid, jobs, cluster, progress
         count = len(grid.places)
         center, radius = reach_balls(asked.problem, asked.frame, asked.offset)
-        self._verdict = np.where(beyond(grid.places, center, radius), BEYOND, NOT_TRIED).astype(np.int8)
-        self._left = np.where(self._verdict == BEYOND, distance_beyond(grid.places, center, radius), 0.0)
+        least = distance_beyond(grid.places, center, radius)
+        self._verdict = np.where(least > SLACK, BEYOND, NOT_TRIED).astype(np.int8)
+        self._left = np.where(least > SLACK, least, 0.0)
         self._measure = np.zeros(count)
         self._q: dict[int, Array] = {}
         self._tried: set[tuple[int, int]] = set()

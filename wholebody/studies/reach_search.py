@@ -11,8 +11,8 @@ import numpy as np
 
 from wholebody.arrays import Array, Mask
 from wholebody.methods.base import Method
+from wholebody.methods.contradictions import contradictions
 from wholebody.problem import Problem
-from wholebody.studies.reach_bounds import contradicted
 from wholebody.tasks import Point
 
 SURE = 0.95  # share of what is left of a place within which no place is searched: 1 trusts descents to the last digit
@@ -150,7 +150,7 @@ class Brick:
 
     def _contradiction(self, problem: Problem, place: int) -> Try | None:
         with problem.borrow() as workspace:
-            if contradicted(problem, workspace):
+            if contradictions(problem, workspace):
                 return Try(place, False, True, 0.0, False, 0.0, problem.start)
         return None
 

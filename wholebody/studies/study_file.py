@@ -10,8 +10,9 @@ from wholebody.checks import shown
 from wholebody.errors import UnknownNameError
 from wholebody.files import is_file
 from wholebody.methods import METHODS
-from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Kind, Number, Text
+from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Kind, Text
 from wholebody.taskfile.reading import read_toml
+from wholebody.taskfile.things import FIGURES
 from wholebody.taskfile.where import Where
 
 
@@ -37,11 +38,7 @@ class StudyFile:
 
 
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
-_PERSON: dict[str, Kind] = {
-    "sex": Choice(("male", "female")),
-    "stature": Number(1.3, 2.2, "m"),
-    "mass": Number(25.0, 250.0, "kg"),
-}
+_PERSON: dict[str, Kind] = {key.name: key.kind for key in FIGURES["human"].keys}
 _TOP: dict[str, Kind] = {"task": Text(), "method": Choice(METHODS), "warm_start": Flag()}
 _TABLES = ("person", "target", "layout")
 
