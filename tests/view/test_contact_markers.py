@@ -10,6 +10,7 @@ from wholebody.dynamics.overlaps import overlaps
 from wholebody.errors import InputError
 from wholebody.view import Viewer
 from wholebody.view.contact_markers import mark_overlaps
+from wholebody.view.legend import legend
 from wholebody.view.scene_graph import Keyframe
 
 
@@ -28,6 +29,9 @@ def test_each_of_two_that_may_move_gets_its_half_of_the_depth(planar_arm) -> Non
     assert ways[0] / np.linalg.norm(ways[0]) == pytest.approx(-ways[1] / np.linalg.norm(ways[1]))
     assert arrows[f"/contacts/overlap {ball}/first"][:3, 3] == pytest.approx(found[ball].point)
     assert any("mm" in marker.text for marker, _ in keyframe.markers.values() if marker.kind == "label")
+    only_second = Keyframe()
+    mark_overlaps(only_second, [one._replace(moves_first=np.zeros(3)) for one in found if one.second == "ball"])
+    assert [meaning for meaning, _ in legend([only_second])] == ["way out of an overlap"]
     with Viewer(scene) as viewer:
         viewer.show(q, overlaps=found)
         viewer.play([q, q], overlaps=[found, ()])

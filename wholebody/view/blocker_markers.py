@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.view import style
+from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
@@ -34,16 +34,11 @@ def mark_blockers(
         place = _place(scene, state, contacts, blocker)
         if place is None:
             continue
-        matrix = np.eye(4)
-        matrix[:3, 3] = place
         root = f"{style.BLOCKER_NODE}/{number}"
-        keyframe.markers[f"{root}/ball"] = (_BALL, matrix)
-        above = matrix.copy()
-        above[2, 3] += 2.0 * style.BLOCKER_RADIUS
-        keyframe.markers[f"{root}/text"] = (
-            Marker("label", style.BLOCKER_LABEL, style.LABEL_SIZE, f"in the way: {blocker}"),
-            above,
-        )
+        keyframe.markers[f"{root}/ball"] = (_BALL, drawing.point_placement(place))
+        label = Marker("label", style.BLOCKER_LABEL, style.LABEL_SIZE, f"in the way: {blocker}")
+        above = drawing.point_placement(place + [0.0, 0.0, 2.0 * style.BLOCKER_RADIUS])
+        keyframe.markers[f"{root}/text"] = (label, above)
 
 
 def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:

@@ -221,7 +221,7 @@ class Bodies:
                 keyframe.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
 
     def corners(self, data: Any, *, things: bool) -> Array:
-        """Corners (n, 3) in the world of the boxes around the figure's pieces, or the things'; no plates, no glass."""
+        """Corners (n, 3) in the world of boxes around the figure's pieces, or solid things that are no plates."""
         solid = [
             index
             for index, body in enumerate(self.all)
@@ -244,7 +244,7 @@ class Bodies:
             tops[f"{style.NAME_NODE}/{node(name)}"] = (name, np.array([*(low + high)[:2] / 2, high[2]]))
         return tops
 
-    def dye(self, keyframe: Keyframe, colors: Mapping[str, Color]) -> None:
+    def color_segments(self, keyframe: Keyframe, colors: Mapping[str, Color]) -> None:
         """Give the pieces and the surface of segments their colours (segment -> colour)."""
         for index, body in enumerate(self.all):
             owner = self.scene.piece_owner[index] if body.thing is None and colors else ""

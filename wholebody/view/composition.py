@@ -13,7 +13,7 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.view import style
+from wholebody.view import drawing, style
 from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
@@ -47,7 +47,7 @@ class Composition:
         self._goals: Goals | None = None
         self._frames: tuple[str, ...] = ()
         self._axes = style.AXES_LENGTH
-        self.dyed: dict[str, style.Color] = {}
+        self.segment_colors: dict[str, style.Color] = {}
 
     @property
     def figure(self) -> Figure:
@@ -57,7 +57,7 @@ class Composition:
             InputError: there is none: the scene is of parts alone.
         """
         if self.scene.figure is None:
-            raise InputError("the scene has no figure, so it has no frames to show")
+            raise InputError("the scene has no figure, so it has no frames to show and no segments to color")
         figure: Figure = self.scene.figure
         return figure
 
@@ -88,7 +88,7 @@ class Composition:
         """The keyframe of a posture, with the goals of a problem if there is one, the blockers, and overlaps."""
         bodies, state, keyframe = self.bodies, self._state.update(q), Keyframe()
         bodies.pose(keyframe, state.data)
-        bodies.dye(keyframe, self.dyed)
+        bodies.color_segments(keyframe, self.segment_colors)
         contacts = self.scene.contacts(q, within=self._contact_distance)
         color_contacts(keyframe, bodies, contacts)
         mark_contacts(keyframe, bodies, contacts)
@@ -107,9 +107,8 @@ class Composition:
         mark_frames(keyframe, self.scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
-                matrix = np.eye(4)
-                matrix[:3, 3] = top
-                keyframe.markers[path] = (Marker("label", style.LABEL, style.LABEL_SIZE, name), matrix)
+                label = Marker("label", style.LABEL, style.LABEL_SIZE, name)
+                keyframe.markers[path] = (label, drawing.point_placement(top))
         return keyframe
 
     def ghosts(self, postures: Iterable[Array], color: style.Color) -> None:

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from wholebody import checks
-from wholebody.arrays import Array
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import drawing, style
@@ -47,7 +46,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
         for name, point in (("a", start), ("b", end)):
-            keyframe.markers[f"{root}/{name}"] = (_WITNESS, _at(point))
+            keyframe.markers[f"{root}/{name}"] = (_WITNESS, drawing.point_placement(point))
         if distance >= -PENETRATION:
             place = drawing.arrow_placement(start, normal, style.NORMAL_LENGTH)
             keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
@@ -60,7 +59,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
         keyframe.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
         if row < LABELLED:
             text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
-            keyframe.markers[f"{root}/text"] = (text, _at(origin + out * length))
+            keyframe.markers[f"{root}/text"] = (text, drawing.point_placement(origin + out * length))
 
 
 def checked_overlaps(given: object, what: str) -> list[Overlap]:
@@ -73,13 +72,6 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
 
-def _at(point: Array) -> Array:
-    placement = np.eye(4)
-    placement[:3, 3] = point
-    return placement
-
-
-_MOVE = Marker("arrow", style.DEPTH, 1.3)
 LEAST = 1e-9  # m: shorter moves are none
 
 
@@ -95,8 +87,7 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
             if length > LEAST:
                 shown = max(length, style.SHORTEST_DEPTH)
                 place = drawing.arrow_placement(one.point, move / length, shown)
-                keyframe.markers[f"{root}/{name}"] = (_MOVE, place)
-        matrix = np.eye(4)
-        matrix[:3, 3] = one.point
+                keyframe.markers[f"{root}/{name}"] = (_DEPTH, place)
         text = f"{one.first} and {one.second}: {1e3 * float(np.linalg.norm(one.depth)):.1f} mm"
-        keyframe.markers[f"{root}/text"] = (Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, text), matrix)
+        label = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, text)
+        keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))

@@ -84,9 +84,8 @@ _ALONG_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 
 
 def plate_placement(normal: Array, offset: float) -> Array:
     """Placement (4, 4) of the plate that represents the half-space n.x <= d: its upper face is in the plane."""
-    placement = np.eye(4)
+    placement = point_placement(normal * (offset - style.PLATE[2] / 2))
     placement[:3, :3] = _turned_to(normal)
-    placement[:3, 3] = normal * (offset - style.PLATE[2] / 2)
     return placement
 
 
@@ -105,10 +104,16 @@ def _turned_to(direction: Array) -> Array:
 
 def arrow_placement(start: Array, direction: Array, length: float) -> Array:
     """Placement (4, 4), with scale, of the unit arrow from `start` along `direction`; long arrows keep their width."""
-    placement = np.eye(4)
     width = min(length, style.WIDEST_ARROW)
+    placement = point_placement(start)
     placement[:3, :3] = _turned_to(direction) * (width, width, length)
-    placement[:3, 3] = start
+    return placement
+
+
+def point_placement(point: Array) -> Array:
+    """Placement (4, 4) at a point (3,), not turned."""
+    placement = np.eye(4)
+    placement[:3, 3] = point
     return placement
 
 
@@ -118,9 +123,8 @@ def rod_placement(start: Array, end: Array, radius: float) -> Array | None:
     length = float(np.linalg.norm(span))
     if length < 1e-6:
         return None
-    placement = np.eye(4)
+    placement = point_placement(start)
     placement[:3, :3] = _turned_to(span) * (radius, radius, length)
-    placement[:3, 3] = start
     return placement
 
 

@@ -18,7 +18,7 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedScene
 
 _TARGET = Marker("ball", style.TARGET, style.TARGET_RADIUS)
-_MISS = Marker("rod", style.MISS)
+_TO_TARGET = Marker("rod", style.TARGET)
 FARTHEST_LOOK = 1.0
 """Metres: what an axis is turned to is not drawn, and not kept in the picture, if it is farther from the frame."""
 
@@ -49,17 +49,17 @@ class Goals:
             if not _far(goal, here) and (
                 np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis"))
             ):
-                keyframe.markers[f"{root}/target"] = (_TARGET, _at(target.translation))
+                keyframe.markers[f"{root}/target"] = (_TARGET, drawing.point_placement(target.translation))
             line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
             if line is not None:
-                keyframe.markers[f"{root}/line"] = (_MISS, line)
+                keyframe.markers[f"{root}/line"] = (_TO_TARGET, line)
             if directed:
                 mark_axes(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
                 mark_axes(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
             self._point(keyframe, root, goal, here)
             text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
             label = Marker("label", style.GOAL_LABEL, style.LABEL_SIZE, text)
-            keyframe.markers[f"{root}/text"] = (label, _at(target.translation))
+            keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(target.translation))
 
     def targets(self, state: State) -> Array:
         """Positions (n, 3) that should be in the picture; on the way to what is looked at from afar."""
@@ -145,12 +145,6 @@ def left(goal: Any, state: State) -> str:
     return "  ".join(part for part in parts if part)
 
 
-def _at(point: Array) -> Array:
-    matrix = np.eye(4)
-    matrix[:3, 3] = point
-    return matrix
-
-
 def mark_axes(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
     """Draw the three axes of a placement in the world, `length` metres long."""
     for name, color, direction in zip("xyz", style.AXES, place.rotation.T, strict=True):
@@ -163,9 +157,5 @@ def mark_frames(keyframe: Keyframe, scene: ViewedScene, state: State, names: Ite
     for name in names:
         place = state.frame(scene.figure.frame_id(name))
         mark_axes(keyframe, f"{style.FRAME_NODE}/{name}", place, length)
-        matrix = np.eye(4)
-        matrix[:3, 3] = place.translation
-        keyframe.markers[f"{style.FRAME_NODE}/{name}/name"] = (
-            Marker("label", style.LABEL, style.LABEL_SIZE, name),
-            matrix,
-        )
+        label = Marker("label", style.LABEL, style.LABEL_SIZE, name)
+        keyframe.markers[f"{style.FRAME_NODE}/{name}/name"] = (label, drawing.point_placement(place.translation))

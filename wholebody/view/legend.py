@@ -23,6 +23,7 @@ _MARKED = (
     ("/normal", style.CONTACT_NODE, style.NORMAL, "normal of a contact"),
     ("/depth", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
     ("/first", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
+    ("/second", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
     ("/target", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
     ("/wanted", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
     ("/ball", style.BLOCKER_NODE, style.BLOCKER, "in the way"),

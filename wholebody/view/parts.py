@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -18,6 +17,7 @@ from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.shapes import Shape
 from wholebody.records import with_values
 from wholebody.view.style import Color
+from wholebody.view.viewed_scene import Colored
 
 
 class Part(NamedTuple):
@@ -32,11 +32,6 @@ class Part(NamedTuple):
     shape: Shape
     at: PlacementLike = (0.0, 0.0, 0.0)
     color: Color | None = None
-
-
-@dataclass(frozen=True)
-class _Colored:
-    color: Color | None
 
 
 class _Nothing(NamedTuple):
@@ -93,7 +88,7 @@ class Parts:
                     made = pin.GeometryObject(f"{key}:{count}", joint, 0, base * piece.placement, piece.geometry)
                     self.geometry.addGeometryObject(made)
                     owners.append(key)
-                objects[key] = _Colored(part.color)
+                objects[key] = Colored(part.color)
         self.names = tuple(parts)
         self.piece_owner = tuple(owners)
         self.objects = MappingProxyType(objects)

@@ -25,7 +25,9 @@ from wholebody.workspace import Workspace
 
 
 @dataclass(frozen=True)
-class _Colored:
+class Colored:
+    """A thing as the viewer knows it: its color, or None for the viewer's choice."""
+
     color: Color | None
 
 
@@ -48,7 +50,7 @@ class ViewedAssembly:
         self.model, self.geometry = self._scene.model, self._scene.geometry
         self.piece_owner = self._scene.piece_owner
         self.figures = {name: (figure, assembly.colors.get(name)) for name, figure in assembly.figures.items()}
-        self.objects = MappingProxyType({name: _Colored(_color(assembly, name)) for name in self.piece_owner})
+        self.objects = MappingProxyType({name: Colored(_color(assembly, name)) for name in self.piece_owner})
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
         """Pairs nearer than `within` metres at the posture q (nq,), nearest first."""

@@ -102,7 +102,7 @@ class Viewer:
         self._seen: list[Array] = []
         self._ghosts: list[Array] = []
         self._motion: tuple[int, float] | None = None
-        self._shown: tuple[Array, Any] | None = None
+        self._shown: tuple[Array, Any, Sequence[Overlap]] | None = None
 
     # ---- content
 
@@ -126,7 +126,7 @@ class Viewer:
         posture = self._composition.checked(q)
         found = assess(problem, posture) if isinstance(problem, Problem) else None
         keyframe = self._composition.keyframe(posture, problem, found.blockers if found else (), marked)
-        self._seen, self._motion, self._shown = [posture], None, (posture, problem)
+        self._seen, self._motion, self._shown = [posture], None, (posture, problem, marked)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
         self._graph.do(panel(self.title, [keyframe], DEFAULT_DT, found))
@@ -211,9 +211,7 @@ class Viewer:
         for name in given:
             figure.frame_id(name)
         self._composition.frames(given, checks.number(length, "length", 1e-3, FARTHEST, "m"))
-        if self._shown is not None:
-            q, problem = self._shown
-            self.show(q, problem=problem, pieces=self._composition.pieces)
+        self._show_again()
 
     def color(self, segments: Mapping[str, Any]) -> None:
         """Draw the pieces of segments in colours, at the posture that is shown and at all after this call.
@@ -232,10 +230,15 @@ class Viewer:
             )
         for name in segments:
             checks.known(name, known, "segment", "color")
-        self._composition.dyed = {name: checks.color(given, f"color: {name}") for name, given in segments.items()}
+        colors = {name: checks.color(given, f"color: {name}") for name, given in segments.items()}
+        self._composition.segment_colors = colors
+        self._show_again()
+
+    def _show_again(self) -> None:
+        """Show the posture that is shown as it was asked for."""
         if self._shown is not None:
-            q, problem = self._shown
-            self.show(q, problem=problem)
+            q, problem, overlaps = self._shown
+            self.show(q, problem=problem, pieces=self._composition.pieces, overlaps=overlaps)
 
     def look(self, eye: ArrayLike | None = None, target: ArrayLike | None = None) -> None:
         """Set the camera; without arguments it looks at the figure.

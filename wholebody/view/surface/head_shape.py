@@ -55,8 +55,7 @@ def head_shape(size: Dimensions) -> HeadShape:
         return lambda points: field((points - origin) / scale) * least
 
     female = size.body.sex == "female"
-    skull, face = _skull(), _face(female)
-    parts = [skull, face, _hair(skull, female), _pair(lambda s: ball((0.0725, s * 0.0315, 0.118), 0.0126))]
+    parts = [_face(female), _hair(_skull(), female), _pair(lambda s: ball((0.0725, s * 0.0315, 0.118), 0.0126))]
     parts.append(_pair(lambda s: ball((0.0797, s * 0.0310, 0.118), 0.0066)))
     parts.append(_pair(lambda s: round_cone((0.0915, s * 0.018, 0.1365), (0.0835, s * 0.045, 0.1375), 0.0034, 0.0022)))
     parts.append(
@@ -67,7 +66,7 @@ def head_shape(size: Dimensions) -> HeadShape:
             ]
         )
     )
-    _, skin, hair, eyes, irises, brows, lips = (stretched(part) for part in parts)
+    skin, hair, eyes, irises, brows, lips = (stretched(part) for part in parts)
     return HeadShape(skin, hair, eyes, irises, brows, lips)
 
 

@@ -27,7 +27,7 @@ from wholebody.view.surface.fields import (
 from wholebody.view.surface.garments import Claim, Garment, bounds
 from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.head_shape import head_shape
-from wholebody.view.surface.profile import caps, limb, piece_field, trunk
+from wholebody.view.surface.profile import RAYS, caps, limb, piece_field, trunk
 
 SKIN, HAIR, LIPS = (0.86, 0.66, 0.54), (0.25, 0.17, 0.12), (0.72, 0.42, 0.38)
 SHIRT, TROUSERS, SHOES = (0.42, 0.55, 0.68), (0.27, 0.30, 0.38), (0.22, 0.18, 0.16)
@@ -308,8 +308,7 @@ class PersonShape:
         return float(self._trunk_ends(height)[0])
 
     def _trunk_ends(self, height: float) -> tuple[float, float]:
-        x = np.arange(-0.4, 0.4, 0.002)
-        inside = x[self._trunk(np.column_stack([x, np.zeros_like(x), np.full_like(x, height)])) < 0.0]
+        inside = RAYS[self._trunk(np.column_stack([RAYS, np.zeros_like(RAYS), np.full_like(RAYS, height)])) < 0.0]
         return float(inside[0]), float(inside[-1])
 
     @staticmethod

@@ -21,7 +21,7 @@ from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.view.surface.borders import Bound, divided
 from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
-from wholebody.view.surface.nets import coarsened
+from wholebody.view.surface.nets import Triangles, coarsened
 from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
 
 FORMAT = "7"
@@ -224,8 +224,6 @@ def _packed(surface: Surface) -> bytes:
 
 
 def _unpacked(data: bytes) -> Surface:
-    from wholebody.view.surface.nets import Triangles
-
     with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
         told = json.loads(arrays["told"].tobytes())
         bones = tuple(
