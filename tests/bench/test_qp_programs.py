@@ -127,9 +127,9 @@ def test_every_solver_is_given_every_program(recorded: list[Recorded]) -> None:
     assert [total.solver for total in totals] == list(solvers)
     for total in totals:
         assert total.programs == total.closed + total.handed_on + total.failed == len(recorded)
-        assert total.low <= total.closed / total.programs <= total.high
+        assert total.share.low <= total.closed / total.programs == total.share.value <= total.share.high
         assert total.failed == 0
-        assert 0.0 < total.median_low <= total.median_us <= total.median_high
+        assert 0.0 < total.median_us.low <= total.median_us.value <= total.median_us.high
         assert total.dual < 1e-4
     daqp = next(total for total in totals if total.solver == "daqp")
     assert daqp.closed == daqp.programs

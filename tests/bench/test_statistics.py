@@ -9,7 +9,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy import stats
 
-from wholebody.bench.compare import statistics
+from wholebody.bench import statistics
+from wholebody.bench.report import spanned
+from wholebody.bench.statistics import NOTHING, Interval
 
 
 @pytest.mark.parametrize(("count", "of"), [(0, 7), (199, 200), (200, 200), (3, 20), (1, 1)])
@@ -186,3 +188,29 @@ def test_what_two_methods_solve_is_compared_by_the_problems_that_only_one_solves
     one = {number: number < 10 + more for number in range(40)}
     other = {number: number < 10 or 20 <= number < 20 + fewer for number in range(45)}
     assert statistics.paired_difference(one, other) == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(
+    ("figure", "asked", "said"),
+    [
+        ((0.07, 0.06, 0.08), 0.08, "reached"),
+        ((0.07, 0.06, 0.09), 0.08, "reached, with an interval that goes higher"),
+        ((0.09, 0.07, 0.10), 0.08, "missed, with an interval that goes lower"),
+        ((0.10, 0.09, 0.12), 0.08, "missed"),
+    ],
+)
+def test_a_target_within_an_interval_is_neither_reached_nor_missed_for_sure(
+    figure: tuple[float, float, float], asked: float, said: str
+) -> None:
+    """What is asked to be at least something is the mirror image of what is asked to be at most that."""
+    value, low, high = figure
+    assert statistics.against(Interval(*figure), asked, at_least=False) == said
+    turned = said.replace("higher", "x").replace("lower", "higher").replace("x", "lower")
+    assert statistics.against(Interval(-value, -high, -low), -asked, at_least=True) == turned
+
+
+def test_figures_are_written_with_their_intervals() -> None:
+    assert spanned(Interval(0.985, 0.93, 0.99), ".1f", 100.0, " %", ".0f") == "98.5 % [93, 99]"
+    assert spanned(Interval(2.0, 1.0, inf), ".2g") == "2 [1, ∞]"
+    assert spanned(NOTHING, ".2g") == ""
+    assert Interval(2.0, 1.0, 3.0, 7).scaled(10.0) == (20.0, 10.0, 30.0, 7)

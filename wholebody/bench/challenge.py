@@ -17,7 +17,6 @@ from wholebody.tracking.paths import read_path, spread
 
 TASK = "sit_on_chair"
 METHODS = ("newton", "qp")
-FRAMES = 240
 
 
 @dataclass(frozen=True)

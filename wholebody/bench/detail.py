@@ -212,13 +212,13 @@ def chart(rows: Sequence[DetailRow], path: Path) -> tuple[Path, Path]:
     for column, name in enumerate(tasks):
         above, below = axes[0][column], axes[1][column]
         for one in (one for one in found if one.task == name):
-            look = {
+            style = {
                 "color": COLORS[one.detail], "marker": MARKERS[one.level], "linestyle": "none", "alpha": 0.85,
                 "markersize": 12 if one.level == "simplified" else 8,
             }  # fmt: skip
             time = one.solve_ms + one.judge_ms
-            above.plot([time], [one.worst_penetration_mm], **look)
-            below.plot([time], [100.0 * one.worst_above], **look)
+            above.plot([time], [one.worst_penetration_mm], **style)
+            below.plot([time], [100.0 * one.worst_above], **style)
         above.axhspan(1e3 * INSIDE, 1e3, color="#f4dddd", zorder=0)
         above.set_yscale("symlog", linthresh=1e-2)
         above.set_ylim(-2e-3, 1e2)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.bench.human_tasks import add_seat, draw
+from wholebody.bench.problem_sets.things import coal_distance
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -166,14 +166,12 @@ def distance(figure: Figure, q: Array, first: Collection[str], second: Collectio
     data, placed = figure.model.createData(), pin.GeometryData(figure.geometry)
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
     pieces = list(zip(figure.geometry.geometryObjects, placed.oMg, strict=True))
-    request = coal.DistanceRequest()
-    least = np.inf
-    for a, at in _of(pieces, first):
-        for b, where in _of(pieces, second):
-            result = coal.DistanceResult()
-            ends = [coal.Transform3s(place.rotation, place.translation) for place in (at, where)]
-            least = min(least, coal.distance(a.geometry, ends[0], b.geometry, ends[1], request, result))
-    return float(least)
+    apart = (
+        coal_distance(a.geometry, at, b.geometry, where)
+        for a, at in _of(pieces, first)
+        for b, where in _of(pieces, second)
+    )
+    return min(apart, default=np.inf)
 
 
 def _of(pieces: Sequence[tuple[Any, Any]], segments: Collection[str]) -> list[tuple[Any, Any]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.bench.adapters.own import reach_problem
-from wholebody.bench.compare.statistics import median
+from wholebody.bench.statistics import Interval, median
 from wholebody.bench.step import quiet
 from wholebody.bench.track import DT, Track
 from wholebody.tasks.base import Measure
@@ -33,7 +33,7 @@ class PersonCostRow:
         pairs: of pieces, that could touch.
         repeats: runs of both kinds, after each other in turning order.
         without_us, with_us: mean of a step, or time of a solve; median of the repeats [us].
-        ratio, low, high: of with to without in the same repeat: the median, and its 95 % interval by the bootstrap.
+        ratio: of with to without in the same repeat: the median, and its 95 % interval by the bootstrap.
     """
 
     what: str
@@ -41,9 +41,7 @@ class PersonCostRow:
     repeats: int
     without_us: float
     with_us: float
-    ratio: float
-    low: float
-    high: float
+    ratio: Interval
 
 
 def person_costs(courses: Sequence[Track], task: Path, repeats: int) -> list[PersonCostRow]:
@@ -119,4 +117,4 @@ def _row(what: str, pairs: int, both: Sequence[Callable[[], Iterator[float]]], r
     counted = spent[1:]
     ratio = median([float(value) for value in counted[:, 1] / counted[:, 0]])
     without, own = np.median(counted, axis=0).tolist()
-    return PersonCostRow(what, pairs, repeats, without, own, ratio.value, ratio.low, ratio.high)
+    return PersonCostRow(what, pairs, repeats, without, own, ratio)

@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from hashlib import sha256
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from wholebody.bench.statistics import Interval
 
 COLORS = {
     "wholebody": "#0072b2",
@@ -104,11 +108,56 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     return svg, png
 
 
-def band(panel: Any, y: float, value: float, ends: tuple[float, float], style: Style) -> Any:
+def band(panel: Any, y: float, found: Interval, style: Style) -> Any:
     """A figure as a marker on its interval, a band at a height; returns the marker, for a legend."""
-    panel.plot(ends, [y, y], color=style.color, linewidth=5.0, alpha=0.3, solid_capstyle="butt")
-    (line,) = panel.plot([value], [y], color=style.color, marker=style.marker, linestyle="")
+    panel.plot([found.low, found.high], [y, y], color=style.color, linewidth=5.0, alpha=0.3, solid_capstyle="butt")
+    (line,) = panel.plot([found.value], [y], color=style.color, marker=style.marker, linestyle="")
     return line
+
+
+def legend_below(chart: Any, drawn: Mapping[str, Any]) -> None:
+    """Put a legend of lines by name below a chart, and lay the chart out, once and not for each of its files."""
+    if drawn:
+        names, lines = list(drawn), list(drawn.values())
+        chart.legend(lines, names, loc="outside lower center", ncols=min(len(names), 6), frameon=False, fontsize=9)
+    chart.draw_without_rendering()
+    chart.set_layout_engine("none")
+
+
+def shares_and_times(
+    rows: Mapping[str, Mapping[str, tuple[Interval, Interval]]], styles: Mapping[str, Style], note: str, heading: str,
+    path: Path,
+) -> tuple[Path, Path]:  # fmt: skip
+    """A row a set: what each method solves [%] and its mean time [ms], with their intervals.
+
+    Args:
+        rows: by the title of the set and the name of the method.
+        styles: of the methods, in the order of the legend.
+        note: how failures count in the mean time.
+        heading: over the chart; "" for none.
+        path: file, whose suffix is replaced by svg and png.
+    """
+    chart, axes = figure(1, 2, (11.0, 0.9 + 0.85 * len(rows)))
+    left, right = axes[0]
+    drawn: dict[str, Any] = {}
+    for place, shown in enumerate(rows.values()):
+        for number, (name, style) in enumerate(styles.items()):
+            y = place + 0.75 * ((number + 0.5) / len(styles) - 0.5)
+            for panel, found in zip((left, right), shown.get(name, ()), strict=False):
+                if isfinite(found.value):
+                    drawn[name] = band(panel, y, found, style)
+    for panel, titles in ((left, list(rows)), (right, [""] * len(rows))):
+        for place in range(1, len(rows), 2):
+            panel.axhspan(place - 0.5, place + 0.5, color="#f3f5f7", zorder=0)
+        panel.set_yticks(range(len(rows)), titles)
+        panel.set_ylim(len(rows) - 0.5, -0.5)
+        panel.grid(axis="y", visible=False)
+    left.set(xlabel="solved [%]", xlim=(-2.0, 102.0))
+    plain_log(right)
+    right.set(xlabel=f"mean time of a solve or frame, {note} [ms]")
+    chart.suptitle(heading, x=0.01, ha="left", fontsize=13)
+    legend_below(chart, {name: drawn[name] for name in styles if name in drawn})
+    return save(chart, path)
 
 
 DECADES = 2.6  # beyond which the labels of 2 and 5 would overlap their neighbours

@@ -15,13 +15,12 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench import plot_style
+from wholebody.bench import plot_style, statistics
 from wholebody.bench.adapters.registry import adapters
-from wholebody.bench.compare import statistics
-from wholebody.bench.compare.statistics import Interval
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS
 from wholebody.bench.problem_sets.reaching import THINGS, reach_among
 from wholebody.bench.report import render
+from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import filled, programs_text
 
 TOLERANCE = 1e-5  # m, rad: what methods are asked for

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from wholebody.bench.machine import sentence
+from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import summed_programs
 
 if TYPE_CHECKING:
@@ -57,6 +58,7 @@ def _environment() -> Environment:
         "measured": sentence,
         "quantile": quantile,
         "scaled": scaled,
+        "span": spanned,
         "strong": strong,
         "summed": summed_programs,
         "upfirst": upfirst,
@@ -68,6 +70,22 @@ def _environment() -> Environment:
 def formatted(value: float, spec: str, unit: str = "", none: str = "") -> str:
     """A number by a format, with its unit; `none` for one that is not finite."""
     return f"{value:{spec}}{unit}" if isfinite(value) else none
+
+
+def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends: str = "") -> str:
+    """A figure and its interval, such as "98.5 % [93, 99]"; nothing for one that is not a number.
+
+    Args:
+        found: the figure.
+        spec: its format.
+        scale: by which it is multiplied.
+        unit: written after it.
+        ends: format of the ends of the interval; that of the figure where it is left out.
+    """
+    if found.value != found.value:
+        return ""
+    low, high = (formatted(scale * each, ends or spec, none="∞") for each in (found.low, found.high))
+    return f"{formatted(scale * found.value, spec, unit, none='∞')} [{low}, {high}]"
 
 
 def groups(rows: Sequence[Any], name: str) -> Iterator[list[Any]]:

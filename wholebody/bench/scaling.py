@@ -177,7 +177,7 @@ def _step_ms(problem: wb.Problem, method: str) -> float:
 
 
 NAMES = {"joints": "joints", "pieces": "pieces of each segment", "things": "things around"}
-LOOKS = {
+STYLES = {
     "qp": ("#0072b2", "o", "-"),
     SIMPLIFIED: ("#0072b2", "o", "--"),
     "newton": ("#e69f00", "^", "-"),
@@ -195,16 +195,16 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
     for column, name in enumerate(series):
         mine = [row for row in rows if row.series == name]
         above, below = axes[0][column], axes[1][column]
-        for method, (color, marker, line) in LOOKS.items():
+        for method, (color, marker, line) in STYLES.items():
             shown = [row for row in mine if row.method == method]
             stepped = [row for row in shown if not math.isnan(row.step_ms)]
-            look = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.5}
-            look["fillstyle"] = "none" if line == "--" else "full"
+            style = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.5}
+            style["fillstyle"] = "none" if line == "--" else "full"
             if shown:
-                above.plot([row.size for row in shown], [row.solve_ms for row in shown], line, label=method, **look)
+                above.plot([row.size for row in shown], [row.solve_ms for row in shown], line, label=method, **style)
             if stepped:
                 sizes, times = [row.size for row in stepped], [row.step_ms for row in stepped]
-                below.plot(sizes, times, line, label=f"a step, {method}", **look)
+                below.plot(sizes, times, line, label=f"a step, {method}", **style)
         whole = [row for row in mine if row.method == "qp"]
         for label, color, values in (
             ("the judgement", "#009e73", [row.judge_ms for row in whole]),
@@ -233,7 +233,7 @@ def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
 
 def report(rows: Sequence[ScalingRow], left_out: Sequence[str], facts: Mapping[str, str]) -> str:
     """Exponents, then the times at every size; `left_out` are sentences on methods that were not asked at some size."""
-    methods = [name for name in LOOKS if any(row.method == name for row in rows)]
+    methods = [name for name in STYLES if any(row.method == name for row in rows)]
     keys = dict.fromkeys((row.series, row.size) for row in rows)
     sizes = [{"series": series, "size": size, "rows": _by_method(rows, methods, series, size)} for series, size in keys]
     return render(

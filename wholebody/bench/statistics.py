@@ -1,4 +1,4 @@
-"""Intervals and tests that a comparison rests on. Every interval is of 95 %.
+"""Intervals and tests that comparisons rest on. Every interval is of 95 %.
 
 Shares have Wilson's interval (1927, "Probable inference, the law of succession, and statistical inference"); medians
 and ratios the bootstrap's percentiles (Efron 1979), problems drawn with replacement, and ratios paired by problem or by
@@ -32,17 +32,31 @@ class Interval(NamedTuple):
 
     Attributes:
         value, low, high: NaN, minus infinity and infinity where there is nothing to compute it from.
-        cases: how many problems it rests on.
+        cases: how many problems it rests on; 0 where that is not told.
     """
 
     value: float
     low: float
     high: float
-    cases: int
+    cases: int = 0
+
+    def scaled(self, factor: float) -> Interval:
+        """The figure and its ends in another unit."""
+        return Interval(factor * self.value, factor * self.low, factor * self.high, self.cases)
 
     def apart_from(self, value: float) -> bool:
         """Whether the interval excludes a value."""
         return self.low > value or self.high < value
+
+
+def against(found: Interval, asked: float, *, at_least: bool) -> str:
+    """Whether a figure is at least, or at most, what is asked, and whether its interval leaves that open; in words."""
+    ends = found.low, found.high
+    sure, ruled_out = (ends[0] >= asked, ends[1] < asked) if at_least else (ends[1] <= asked, ends[0] > asked)
+    if sure or ruled_out:
+        return "reached" if sure else "missed"
+    good = found.value >= asked if at_least else found.value <= asked
+    return f"{'reached' if good else 'missed'}, with an interval that goes {'lower' if good == at_least else 'higher'}"
 
 
 NOTHING = Interval(nan, -inf, inf, 0)

@@ -18,8 +18,8 @@ from wholebody.bench import track as setting
 from wholebody.bench.adapters.base import Tool
 from wholebody.bench.adapters.own import WholebodyTool
 from wholebody.bench.adapters.registry import make_tool
-from wholebody.bench.compare.statistics import BLOCK, NOTHING, quantile_ratio
 from wholebody.bench.report import render
+from wholebody.bench.statistics import BLOCK, NOTHING, Interval, quantile_ratio
 from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
 from wholebody.errors import InputError
@@ -42,8 +42,8 @@ class StepRow:
         setup_ms: to set the tool up and make its first step, which is not among the others; median.
         median_us, p95_us, cpu_median_us, cpu_p95_us: of all steps, by the clock and by the processor's time.
         ratio, ratio_p95, cpu_ratio, cpu_ratio_p95: of median_us, p95_us, cpu_median_us and cpu_p95_us to the
-            reference's in the same repeat, median of the repeats; nan without the reference. Each has its interval of
-            95 %, from `low` to `high`; see `statistics.quantile_ratio`. By the clock they mean nothing where others
+            reference's in the same repeat, median of the repeats, with the interval of 95 %, as
+            `quantile_ratio` has it; nan without the reference. By the clock they mean nothing where others
             use the processor too, who interrupt long steps more often than short ones.
         least_mm: least distance of any pair after any step.
         penetrating: steps after which some pair overlapped.
@@ -68,18 +68,10 @@ class StepRow:
     p95_us: float
     cpu_median_us: float
     cpu_p95_us: float
-    ratio: float
-    ratio_low: float
-    ratio_high: float
-    ratio_p95: float
-    ratio_p95_low: float
-    ratio_p95_high: float
-    cpu_ratio: float
-    cpu_ratio_low: float
-    cpu_ratio_high: float
-    cpu_ratio_p95: float
-    cpu_ratio_p95_low: float
-    cpu_ratio_p95_high: float
+    ratio: Interval
+    ratio_p95: Interval
+    cpu_ratio: Interval
+    cpu_ratio_p95: Interval
     least_mm: float
     penetrating: int
     final_error_mm: float
@@ -215,10 +207,10 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
         p95_us=float(np.quantile(wall, 0.95)),
         cpu_median_us=float(np.median(cpu)),
         cpu_p95_us=float(np.quantile(cpu, 0.95)),
-        **_ratio("ratio", mine, reference, "wall", 0.5),
-        **_ratio("ratio_p95", mine, reference, "wall", 0.95),
-        **_ratio("cpu_ratio", mine, reference, "cpu", 0.5),
-        **_ratio("cpu_ratio_p95", mine, reference, "cpu", 0.95),
+        ratio=_ratio(mine, reference, "wall", 0.5),
+        ratio_p95=_ratio(mine, reference, "wall", 0.95),
+        cpu_ratio=_ratio(mine, reference, "cpu", 0.5),
+        cpu_ratio_p95=_ratio(mine, reference, "cpu", 0.95),
         least_mm=1e3 * float(verdict.least_distance.min()),
         penetrating=int((verdict.least_distance < 0.0).sum()),
         final_error_mm=1e3 * float(verdict.error[-1]),
@@ -233,13 +225,12 @@ def _row(track: Track, name: str, runs: dict[str, list[_Run]], verdict: Verdict)
     )
 
 
-def _ratio(name: str, mine: list[_Run], reference: list[_Run] | None, clock: str, share: float) -> dict[str, float]:
-    """Quantile of a clock over that of the reference in the same repeat, and its interval, as fields of a row."""
-    found = NOTHING
-    if reference is not None:
-        one, other = (np.array([getattr(run, clock) for run in runs]) for runs in (mine, reference))
-        found = quantile_ratio(one, other, share)
-    return {name: found.value, f"{name}_low": found.low, f"{name}_high": found.high}
+def _ratio(mine: list[_Run], reference: list[_Run] | None, clock: str, share: float) -> Interval:
+    """Quantile of a clock over that of the reference in the same repeat."""
+    if reference is None:
+        return NOTHING
+    one, other = (np.array([getattr(run, clock) for run in runs]) for runs in (mine, reference))
+    return quantile_ratio(one, other, share)
 
 
 def step_report(

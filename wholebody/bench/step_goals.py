@@ -6,6 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from wholebody.bench.report import spanned
+from wholebody.bench.statistics import Interval, against
 from wholebody.bench.step import REFERENCE, StepRow
 from wholebody.bench.track import CLEARANCE
 
@@ -27,41 +29,28 @@ def goal_lines(rows: Sequence[StepRow]) -> list[str]:
         if row.reach not in JUDGED:
             median, p95 = (0.25, np.inf) if hot else NOT_ASKED
         asked = [
-            (f"median {_span(row, 'ratio')} of {REFERENCE}'s", _ends(row, "ratio"), median),
-            (f"p95 {_span(row, 'ratio_p95')} of {REFERENCE}'s", _ends(row, "ratio_p95"), p95),
+            (f"median {spanned(row.ratio, '.3f')} of {REFERENCE}'s", row.ratio, median),
+            (f"p95 {spanned(row.ratio_p95, '.3f')} of {REFERENCE}'s", row.ratio_p95, p95),
         ]
         if hot and row.reach in JUDGED:
             others = [other for other in rows if other.reach == row.reach and not other.tool.startswith("wholebody")]
             peers = [other.acceleration for other in others if np.isfinite(other.acceleration)]
             short = 1e3 * CLEARANCE - row.least_mm
             asked += [
-                (f"final error {row.final_error_mm:.2g} mm", (row.final_error_mm,), 1e-3),
-                (f"feet off by {row.foot_drift_mm:.2g} mm", (row.foot_drift_mm,), 2e-3),
-                (f"{max(short, 0.0):.2g} mm short of the clearance", (short,), 1e-3),
-                (f"acceleration {row.acceleration:.2f} rad/s²", (row.acceleration,), min(peers, default=np.nan)),
+                (f"final error {row.final_error_mm:.2g} mm", _sure(row.final_error_mm), 1e-3),
+                (f"feet off by {row.foot_drift_mm:.2g} mm", _sure(row.foot_drift_mm), 2e-3),
+                (f"{max(short, 0.0):.2g} mm short of the clearance", _sure(short), 1e-3),
+                (f"acceleration {row.acceleration:.2f} rad/s²", _sure(row.acceleration), min(peers, default=np.nan)),
             ]
         parts = [
-            f"{name} (at most {most:.2g}: {verdict(found, most)})"
+            f"{name} (at most {most:.2g}: {against(found, most, at_least=False)})"
             for name, found, most in asked
-            if np.isfinite(found[0]) and np.isfinite(most)
+            if np.isfinite(found.value) and np.isfinite(most)
         ]
         if parts or hot:
             lines.append(f"{row.tool}, {row.reach}: " + ("; ".join(parts) or "nothing to compare with") + ".")
     return lines
 
 
-def verdict(found: Sequence[float], most: float) -> str:
-    """Whether a figure is at most what is asked: the figure, and the ends of its interval where it has one."""
-    low, high = min(found), max(found)
-    if found[0] <= most:
-        return "reached" if high <= most else "reached, with an interval that goes higher"
-    return "missed" if low > most else "missed, with an interval that goes lower"
-
-
-def _ends(row: StepRow, name: str) -> tuple[float, ...]:
-    return tuple(float(getattr(row, f"{name}{end}")) for end in ("", "_low", "_high"))
-
-
-def _span(row: StepRow, name: str) -> str:
-    value, low, high = _ends(row, name)
-    return f"{value:.3f} [{low:.3f}, {high:.3f}]"
+def _sure(value: float) -> Interval:
+    return Interval(value, value, value)

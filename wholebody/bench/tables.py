@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
+from wholebody.bench.statistics import Interval
 from wholebody.errors import FileFormatError
 from wholebody.files import make_folder, read_text, write
 
@@ -24,16 +25,28 @@ def write_text(path: Path, text: str) -> None:
 
 
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
-    """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments."""
-    names = [field.name for field in dataclasses.fields(rows[0])]
+    """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
+
+    An interval has three columns, of which the ends are called NAME_low and NAME_high.
+    """
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(names)
+    writer.writerow(flat(rows[0]))
     for row in rows:
-        writer.writerow([_cell(getattr(row, name)) for name in names])
+        writer.writerow([repr(value) if isinstance(value, float) else str(value) for value in flat(row).values()])
     write_text(path, text.getvalue())
+
+
+def flat(row: Any) -> dict[str, Any]:
+    """The fields of a row by name, and the ends of those that are intervals."""
+    cells: dict[str, Any] = {}
+    for field in dataclasses.fields(row):
+        value = cells[field.name] = getattr(row, field.name)
+        if isinstance(value, Interval):
+            cells |= {field.name: value.value, f"{field.name}_low": value.low, f"{field.name}_high": value.high}
+    return cells
 
 
 def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
@@ -48,7 +61,8 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
         name, _, value = lines.pop(0)[2:].partition(": ")
         facts[name] = value
     types = get_type_hints(kind)
-    names = [field.name for field in dataclasses.fields(kind)]  # type: ignore[arg-type]
+    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    names = [name for each in parts.values() for name in each]
     try:
         given = list(csv.reader(lines))
     except csv.Error as error:
@@ -59,8 +73,9 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     rows = []
     for number, cells in enumerate(given[1:], start=1):
         try:
-            values = zip(names, cells, strict=True)
-            rows.append(kind(**{name: _value(types[name], cell) for name, cell in values}))
+            found = dict(zip(names, cells, strict=True))
+            values = {name: _value(types[name], [found[each] for each in parts[name]]) for name in parts}
+            rows.append(kind(**values))
         except ValueError as error:
             raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
     return facts, rows
@@ -75,7 +90,8 @@ def filled(kind: type[_R], *sources: Any, **values: Any) -> _R:
     """A row of a kind: fields by name, or as `of` computes them, or from the first source with such an attribute."""
     for name, as_type, compute in _columns(kind):  # type: ignore[arg-type]
         if name not in values and compute is not None:
-            values[name] = as_type(compute(*sources))
+            found = compute(*sources)
+            values[name] = found if as_type is Interval else as_type(found)
         elif name not in values:
             values[name] = next(getattr(source, name) for source in sources if hasattr(source, name))
     return kind(**values)
@@ -122,11 +138,15 @@ def replace_section(path: Path, name: str, text: str) -> None:
     write_text(path, f"{head}{first}\n\n{text.strip()}\n\n{last}{tail}")
 
 
-def _cell(value: Any) -> str:
-    return repr(value) if isinstance(value, float) else str(value)
+def _parts(name: str, kind: Any) -> tuple[str, ...]:
+    """The columns of a field."""
+    return (name, f"{name}_low", f"{name}_high") if kind is Interval else (name,)
 
 
-def _value(kind: Any, text: str) -> Any:
+def _value(kind: Any, texts: Sequence[str]) -> Any:
+    if kind is Interval:
+        return Interval(*map(float, texts))
+    (text,) = texts
     if kind is bool:
         if text not in ("True", "False"):
             raise ValueError(f"{text!r} is neither True nor False")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from itertools import pairwise
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 from wholebody.bench import plot_style
 from wholebody.bench.interaction import PAPER
 from wholebody.bench.report import render
+from wholebody.bench.tables import filled, of
 from wholebody.dynamics.world import WorldFrame
 
 
@@ -27,82 +28,66 @@ class WorldFrameRow:
 
     scene: str
     frame: int
-    milliseconds: float
-    energy: float
-    events: int
-    contacts: int
-    sleeping: int
-    deepest_mm: float
-    unavoided: int
+    milliseconds: float = field(metadata=of(lambda frame: 1e3 * frame.seconds))
+    energy: float = field(metadata=of(lambda frame: frame.engine.energy if frame.engine else 0.0))
+    events: int = field(metadata=of(lambda frame: len(frame.engine.events) if frame.engine else 0))
+    contacts: int = field(metadata=of(lambda frame: frame.engine.contacts if frame.engine else 0))
+    sleeping: int = field(metadata=of(lambda frame: frame.engine.sleeping if frame.engine else 0))
+    deepest_mm: float = field(metadata=of(lambda frame: 1e3 * _deepest(frame)))
+    unavoided: int = field(metadata=of(lambda frame: len(frame.collisions)))
     drawing_ms: float
-    query_ms: float
-    ik_ms: float
-    iterations: int
-    joints: int
+    query_ms: float = field(metadata=of(lambda frame: 1e3 * frame.loop.contact_seconds))
+    ik_ms: float = field(metadata=of(lambda frame: 1e3 * frame.loop.solve_seconds))
+    iterations: int = field(metadata=of(lambda frame: frame.loop.iterations))
+    joints: int = field(metadata=of(lambda frame: frame.loop.joints))
     pairs: int
     note: str
 
 
 @dataclass(frozen=True)
 class WorldRow:
-    """One scene; units in the names."""
+    """One scene; units in the names; iterations count in frames in which the tracked posture overlaps something."""
 
     scene: str
     bodies: int
-    frames: int
-    median_ms: float
-    p99_ms: float
-    max_ms: float
-    events: int
-    deepest_mm: float
-    unavoided: int
-    first_energy: float
-    last_energy: float
-    drawn_mean_ms: float
-    drawn_p99_ms: float
-    mean_ms: float
-    joints: float
-    iterations: float
-    ik_percent: float
-    pairs: float
-    query_percent: float
+    frames: int = field(metadata=of(lambda run: len(run["frame"])))
+    median_ms: float = field(metadata=of(lambda run: np.median(run["milliseconds"])))
+    p99_ms: float = field(metadata=of(lambda run: np.quantile(run["milliseconds"], 0.99)))
+    max_ms: float = field(metadata=of(lambda run: run["milliseconds"].max()))
+    events: int = field(metadata=of(lambda run: run["events"].sum()))
+    deepest_mm: float = field(metadata=of(lambda run: run["deepest_mm"].max()))
+    unavoided: int = field(metadata=of(lambda run: run["unavoided"].sum()))
+    first_energy: float = field(metadata=of(lambda run: run["energy"][0]))
+    last_energy: float = field(metadata=of(lambda run: run["energy"][-1]))
+    drawn_mean_ms: float = field(metadata=of(lambda run: (run["milliseconds"] + run["drawing_ms"]).mean()))
+    drawn_p99_ms: float = field(metadata=of(lambda run: np.quantile(run["milliseconds"] + run["drawing_ms"], 0.99)))
+    mean_ms: float = field(metadata=of(lambda run: run["milliseconds"].mean()))
+    joints: float = field(metadata=of(lambda run: run["joints"].mean()))
+    iterations: float = field(metadata=of(lambda run: np.where(run["pairs"] > 0, run["iterations"], 0).mean()))
+    ik_percent: float = field(metadata=of(lambda run: 100.0 * run["ik_ms"].sum() / run["milliseconds"].sum()))
+    pairs: float = field(metadata=of(lambda run: run["pairs"].mean()))
+    query_percent: float = field(metadata=of(lambda run: 100.0 * run["query_ms"].sum() / run["milliseconds"].sum()))
+
+
+def _deepest(frame: WorldFrame) -> float:
+    """Deepest overlap in a frame, of the figure or of what moves by itself, metres."""
+    return max(frame.deepest, frame.engine.deepest if frame.engine else 0.0)
 
 
 def frame_rows(
     scene: str, frames: Sequence[WorldFrame], drawing: Sequence[float], pairs: Sequence[int]
 ) -> list[WorldFrameRow]:
     """A row for each frame; `drawing` has the seconds that drawing it took, `pairs` what the wanted posture was in."""
-    rows = []
-    for number, (frame, drawn, inside) in enumerate(zip(frames, drawing, pairs, strict=True)):
-        loop = frame.loop
-        engine = frame.engine
-        energy, events, contacts, sleeping = (
-            (engine.energy, len(engine.events), engine.contacts, engine.sleeping) if engine else (0.0, 0, 0, 0)
-        )
-        deepest = max(frame.deepest, engine.deepest if engine else 0.0)
-        rows.append(
-            WorldFrameRow(
-                scene, number, 1e3 * frame.seconds, energy, events, contacts, sleeping, 1e3 * deepest,
-                len(frame.collisions), 1e3 * drawn, 1e3 * loop.contact_seconds, 1e3 * loop.solve_seconds,
-                loop.iterations, loop.joints, inside, frame.note,
-            )
-        )  # fmt: skip
-    return rows
+    return [
+        filled(WorldFrameRow, frame, scene=scene, frame=number, drawing_ms=1e3 * drawn, pairs=inside)
+        for number, (frame, drawn, inside) in enumerate(zip(frames, drawing, pairs, strict=True))
+    ]
 
 
 def summary(bodies: int, rows: Sequence[WorldFrameRow]) -> WorldRow:
-    """The row of a scene; iterations count in frames in which the tracked posture overlaps something."""
-    time = np.array([row.milliseconds for row in rows])
-    drawn, whole = time + [row.drawing_ms for row in rows], float(time.sum())
-    return WorldRow(
-        rows[0].scene, bodies, len(rows), float(np.median(time)), float(np.quantile(time, 0.99)), float(time.max()),
-        sum(row.events for row in rows), max(row.deepest_mm for row in rows), sum(row.unavoided for row in rows),
-        rows[0].energy, rows[-1].energy, float(drawn.mean()), float(np.quantile(drawn, 0.99)), float(time.mean()),
-        float(np.mean([row.joints for row in rows])),
-        float(np.mean([row.iterations if row.pairs else 0 for row in rows])),
-        100.0 * sum(row.ik_ms for row in rows) / whole, float(np.mean([row.pairs for row in rows])),
-        100.0 * sum(row.query_ms for row in rows) / whole,
-    )  # fmt: skip
+    """The row of a scene."""
+    columns = {each.name: np.array([getattr(row, each.name) for row in rows]) for each in fields(WorldFrameRow)}
+    return filled(WorldRow, columns, scene=rows[0].scene, bodies=bodies)
 
 
 def moments(frames: Sequence[WorldFrame]) -> list[int]:

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters.base import FIRST_FIT, Adapter
+from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter
 from wholebody.bench.adapters.registry import ALL, adapters, missing, names
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.problem_sets.registry import SETS
@@ -140,20 +140,20 @@ def test_unknown_and_missing_adapters_are_named() -> None:
             adapters([name])
 
 
-def test_budgets_of_first_fit_leave_the_measures_out_and_have_no_part_in_drags(table: wb.Problem) -> None:
+def test_budgets_of_feasibility_only_leave_the_measures_out_and_have_no_part_in_drags(table: wb.Problem) -> None:
     (adapter,) = adapters(["qp/osqp"])
-    solutions = [adapter.make(1e-4, most).solve(table) for most in (None, FIRST_FIT)]
+    solutions = [adapter.make(1e-4, most).solve(table) for most in (None, FEASIBILITY_ONLY)]
     assert all(solution.solved for solution in solutions)
     assert solutions[1].iterations < solutions[0].iterations
     assert solutions[1].assessment.measure > solutions[0].assessment.measure
     kinds = [level[1] for level in adapter.loose]
-    assert FIRST_FIT in kinds
-    assert FIRST_FIT not in kinds[kinds.index(None) :]
+    assert FEASIBILITY_ONLY in kinds
+    assert FEASIBILITY_ONLY not in kinds[kinds.index(None) :]
     settings = Settings(sets=tuple(SETS.values()), adapters=(adapter,))
     chosen = settings.ladder(adapter)
-    for kind in (FIRST_FIT, None):
+    for kind in (FEASIBILITY_ONLY, None):
         assert min(level[0] for level in chosen if level[1] == kind) == 1e-8, "the most exact of each kind"
-    assert FIRST_FIT not in [level[1] for level in settings.ladder(adapter, moving=True)]
+    assert FEASIBILITY_ONLY not in [level[1] for level in settings.ladder(adapter, moving=True)]
 
 
 def test_pruned_placo_loses_pairs_of_the_figure_alone_and_few_of_them_ever_meet(table: wb.Problem) -> None:

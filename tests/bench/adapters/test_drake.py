@@ -1,4 +1,4 @@
-"""drake's InverseKinematics as an entrant: it solves whole problems, and refuses by name what it cannot express."""
+"""drake's InverseKinematics as an method: it solves whole problems, and refuses by name what it cannot express."""
 
 from __future__ import annotations
 

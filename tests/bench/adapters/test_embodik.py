@@ -1,4 +1,4 @@
-"""embodik as an entrant: its model is ours, it solves arms among things, and it refuses by name what it cannot take."""
+"""embodik as an method: its model is ours, it solves arms among things, and it refuses by name what it cannot take."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""optik as an entrant: it solves chains, and refuses by name what it cannot express."""
+"""optik as an method: it solves chains, and refuses by name what it cannot express."""
 
 from __future__ import annotations
 

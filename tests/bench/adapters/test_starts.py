@@ -1,4 +1,4 @@
-"""Entrants that differ in their starts: the same method from one start, and from more within the same time."""
+"""Methods that differ in their starts: the same method from one start, and from more within the same time."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def test_one_start_means_one(shelf: wb.Problem) -> None:
         assert "Further starts" in more.setup
 
 
-def test_entrants_that_differ_in_starts_are_left_out_unless_they_are_asked_for() -> None:
+def test_methods_that_differ_in_starts_are_left_out_unless_they_are_asked_for() -> None:
     few, all_ = [adapter.name for adapter in adapters()], [adapter.name for adapter in adapters(starts=True)]
     assert "qp" in few
     assert not any(name.endswith(("/one_start", "/starts")) for name in few)

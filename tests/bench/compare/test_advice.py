@@ -13,18 +13,19 @@ from wholebody.bench.compare.front import Rival
 from wholebody.bench.compare.record import ANSWERED, OVERTIME, Record
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.summary import Summary, summaries
+from wholebody.bench.statistics import Interval
 
 BLANK: dict[str, Any] = {**{field.name: nan for field in fields(Summary)}, "said": "", "programs": ""}
 
 
 def row(family: str, success: float, low: float, high: float, method: str = "qp", refused: int = 0) -> Summary:
     found: dict[str, Any] = {"set": family, "method": method, "cases": 100, "refused": refused}
-    shares = {"success": success, "success_low": low, "success_high": high}
+    shares = {"success": Interval(success, low, high)}
     return Summary(**{**BLANK, **found, **shares})
 
 
 def rival(method: str, ratio: float) -> Rival:
-    return Rival("one", "worst", method, 1e-3, ratio, 0.9 * ratio, 1.1 * ratio, 0.01, 0.02, 40)
+    return Rival("one", "worst", method, 1e-3, Interval(ratio, 0.9 * ratio, 1.1 * ratio, 40), 0.01, 0.02)
 
 
 def test_a_share_is_reached_or_missed_by_its_interval() -> None:
@@ -65,4 +66,4 @@ def test_a_failure_counts_as_long_as_a_solve_or_a_frame_may_take(frames: int, lo
     one = Record("drag", 0, "qp", 1e-4, 0, ANSWERED, seconds=0.01, cpu_seconds=0.01, frames=frames)
     other = Record("drag", 0, "mink", 1e-4, 0, OVERTIME)
     rows = summaries(Results([one, other], ["drag"], ["qp", "mink"]))
-    assert rows[1].mean_ms == pytest.approx(1e3 * longest)
+    assert rows[1].mean_ms.value == pytest.approx(1e3 * longest)

@@ -7,13 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from wholebody.bench.compare.lock import Figure, Locked, differences, in_words, locked, read_lock, shares, write_lock
+from wholebody.bench.compare.lock import Locked, differences, in_words, locked, read_lock, shares, write_lock
 from wholebody.bench.compare.pages import Material
 from wholebody.bench.compare.record import Record
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.solving import JUDGED
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import summaries
+from wholebody.bench.statistics import Interval
 from wholebody.cli import main
 from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
@@ -21,14 +22,14 @@ pytestmark = pytest.mark.usefixtures("one_process")
 
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
 FIGURES = {
-    ("robot_arm", "qp", "solved"): Figure(0.98, 0.95, 0.99),
-    ("robot_arm", "qp", "median time"): Figure(3.0, 2.5, 3.5),
-    ("robot_arm", "dls", "solved"): Figure(0.5, 0.4, 0.6),
+    ("robot_arm", "qp", "solved"): Interval(0.98, 0.95, 0.99),
+    ("robot_arm", "qp", "median time"): Interval(3.0, 2.5, 3.5),
+    ("robot_arm", "dls", "solved"): Interval(0.5, 0.4, 0.6),
 }
 PUBLISHED = Locked(("robot_arm",), ("dls",), AMOUNTS, {"wholebody": "0.1", "load": "3"}, FIGURES)
 
 
-def changed(key: tuple[str, str, str], figure: Figure) -> Locked:
+def changed(key: tuple[str, str, str], figure: Interval) -> Locked:
     return replace(PUBLISHED, figures={**FIGURES, key: figure})
 
 
@@ -42,17 +43,17 @@ def test_a_lock_file_comes_back(tmp_path: Path) -> None:
 def test_only_what_is_beyond_both_intervals_differs() -> None:
     key = ("robot_arm", "dls", "solved")
     assert differences(PUBLISHED, PUBLISHED) == []
-    assert differences(PUBLISHED, changed(key, Figure(0.62, 0.45, 0.75))) == []  # which holds what was published
-    assert differences(PUBLISHED, changed(key, Figure(0.58, 0.55, 0.61))) == []  # within what was published
-    (one,) = differences(PUBLISHED, changed(key, Figure(0.7, 0.65, 0.75)))
+    assert differences(PUBLISHED, changed(key, Interval(0.62, 0.45, 0.75))) == []  # which holds what was published
+    assert differences(PUBLISHED, changed(key, Interval(0.58, 0.55, 0.61))) == []  # within what was published
+    (one,) = differences(PUBLISHED, changed(key, Interval(0.7, 0.65, 0.75)))
     assert (one.method, one.what) == ("dls", "solved")
-    slower = differences(PUBLISHED, changed(("robot_arm", "qp", "median time"), Figure(9.0, 8.0, 10.0)))
+    slower = differences(PUBLISHED, changed(("robot_arm", "qp", "median time"), Interval(9.0, 8.0, 10.0)))
     assert len(slower) == 1
     assert shares(slower) == []
 
 
 def test_what_differs_is_said() -> None:
-    found = replace(changed(("robot_arm", "dls", "solved"), Figure(0.7, 0.65, 0.75)), facts={"wholebody": "0.2"})
+    found = replace(changed(("robot_arm", "dls", "solved"), Interval(0.7, 0.65, 0.75)), facts={"wholebody": "0.2"})
     assert in_words(PUBLISHED, found) == [
         "3 figures compared; 1 differ by more than their intervals.",
         "robot arm, dls, solved: 50.0 % [40, 60] published, 70.0 % [65, 75] now.",
@@ -68,11 +69,12 @@ def test_other_files_and_unknown_methods_are_refused(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="dlss"):
         replace(PUBLISHED, methods=("dlss",)).settings()
     with pytest.raises(InputError, match="no figure in common"):
-        differences(PUBLISHED, replace(PUBLISHED, figures={("a", "b", "c"): Figure(1.0, 1.0, 1.0)}))
+        differences(PUBLISHED, replace(PUBLISHED, figures={("a", "b", "c"): Interval(1.0, 1.0, 1.0)}))
 
 
 def test_a_comparison_is_done_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    write_lock(tmp_path / "lock.json", replace(PUBLISHED, figures={("robot_arm", "dls", "solved"): Figure(1, 0.9, 1)}))
+    figures = {("robot_arm", "dls", "solved"): Interval(1, 0.9, 1)}
+    write_lock(tmp_path / "lock.json", replace(PUBLISHED, figures=figures))
     out = tmp_path / "out"
     main(["bench", "reproduce", str(tmp_path / "lock.json"), "--out", str(out)])
     assert "1 figures compared" in capsys.readouterr().out
@@ -107,5 +109,5 @@ def test_the_published_lock_is_of_this_version_and_a_changed_figure_is_told(root
     said = f"{len(published.figures)} figures compared; 0 differ by more than their intervals."
     assert in_words(published, published) == [said]
     key = next(key for key in published.figures if key[2] == "solved" and published.figures[key].value > 0.9)
-    other = replace(published, figures={**published.figures, key: Figure(0.1, 0.05, 0.2)})
+    other = replace(published, figures={**published.figures, key: Interval(0.1, 0.05, 0.2)})
     assert [one[:3] for one in differences(other, published)] == [key]

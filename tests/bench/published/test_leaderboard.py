@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 from published_helpers import answers
 
-from wholebody.bench.compare.statistics import NOTHING, share
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.published.judging import NONE, Judged, set_score
 from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences, styles, summary
+from wholebody.bench.statistics import NOTHING, share
 from wholebody.cli import main
 from wholebody.errors import InputError
 

@@ -1,4 +1,4 @@
-"""First postures that fit: sooner than the best, by damped steps that ask for the whole way."""
+"""Feasibility only: sooner than the best posture, by damped steps that ask for the whole way."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ def test_the_first_posture_that_fits_meets_the_goals_sooner_and_costs_more(hones
     assert first.assessment.measure > best.assessment.measure
 
 
-def test_the_way_to_the_first_fit_begins_like_damped_least_squares(planar_arm):
+def test_feasibility_only_begins_like_damped_least_squares(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     goals = [wb.Point("tip", (0.3, 0.5, 0.0))]
     problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=goals, measures=[wb.Displacement()])
@@ -34,7 +34,7 @@ def test_the_way_to_the_first_fit_begins_like_damped_least_squares(planar_arm):
         assert ours.goal_error == pytest.approx(theirs.goal_error, abs=1e-4)
 
 
-def test_a_first_fit_asks_for_the_whole_way_and_damps_it_as_the_page_says():
+def test_feasibility_only_asks_for_full_steps_and_damps_it_as_the_page_says():
     human = wb.load("human")
     goals = [wb.Point("right_index_tip", (0.5, -0.3, 1.3)), wb.Point("left_index_tip", (0.4, 0.4, 1.1))]
     problem = wb.Problem(wb.Scene(human), "standing", goals=goals)
@@ -52,7 +52,7 @@ def test_a_first_fit_asks_for_the_whole_way_and_damps_it_as_the_page_says():
     assert whole.diagonal == pytest.approx(piece.diagonal + damping)
 
 
-def test_a_first_fit_gives_up_haste_after_two_steps_that_are_rejected():
+def test_feasibility_only_damps_more_after_two_steps_that_are_rejected():
     """The way up through a board is blocked; the next step is damped more, the third asks for a piece of the way."""
     scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
     scene.add(wb.Box((0.5, 1.0, 0.04)), name="table", at=(0.6, 0.0, 0.8))
@@ -67,14 +67,14 @@ def test_a_first_fit_gives_up_haste_after_two_steps_that_are_rejected():
     assert solution.status == "solved"
 
 
-def test_a_first_fit_far_away_does_not_crawl():
+def test_feasibility_only_far_away_does_not_crawl():
     problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_hand", (40.0, 0.0, 1.0))])
     solution = wb.QP(measures=False).solve(problem)
     assert solution.status == "solved"
     assert solution.message == "solved directly"
 
 
-def test_the_first_fit_of_a_goal_out_of_reach_comes_as_near_as_goes(planar_arm):
+def test_feasibility_only_of_a_goal_out_of_reach_comes_as_near_as_goes(planar_arm):
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3)))
     problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=[wb.Point("tip", (1.2, 0.9, 0.0))])
     solution = wb.QP(measures=False).solve(problem)

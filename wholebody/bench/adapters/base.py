@@ -12,9 +12,9 @@ from wholebody.methods.base import Method
 from wholebody.problem import Problem
 
 Budget = tuple[float, "int | None"]
-"""Tolerance [m, rad], and the most iterations, or None for the method's own default, or FIRST_FIT."""
+"""Tolerance [m, rad], and the most iterations, or None for the method's own default, or FEASIBILITY_ONLY."""
 
-FIRST_FIT = -1
+FEASIBILITY_ONLY = -1
 """In place of a count of iterations: the first posture that fits, whatever its measures are."""
 
 LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
@@ -36,7 +36,8 @@ class Adapter:
     Attributes:
         name: "qp", "qp/osqp", "ccd", "newton/slack", ...; it has one colour in all charts.
         make: a fresh method from a tolerance and the most iterations, as in a `Budget`.
-        loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of first fit go before.
+        loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of feasibility only
+            go before.
         setup: how it was set up, for reports.
         differences: what it cannot express, or does otherwise; one sentence each.
         prepare: builds what a solve of a problem needs, so that it is not timed with it; raises InputError where the

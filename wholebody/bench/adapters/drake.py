@@ -14,7 +14,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter, few
-from wholebody.bench.adapters.loop import kept_apart, placements, pulls
+from wholebody.bench.adapters.loop import kept_apart, placements, posture_costs
 from wholebody.bench.adapters.one_call import OneCall
 from wholebody.bench.adapters.urdf import axis_of
 from wholebody.errors import InputError
@@ -33,7 +33,7 @@ ITERATIONS = 500  # most of SNOPT's major ones
 
 
 def drake_adapter() -> Adapter:
-    """The entrant: InverseKinematics of drake."""
+    """The method: InverseKinematics of drake."""
     return Adapter(
         name="drake",
         make=Drake,
@@ -230,12 +230,12 @@ class _Program:
                 chosen: Any = dof[problem.scene.figure.dofs(bound.joints)]
                 chosen = np.arange(7) if (chosen < 0).any() else chosen
                 program.AddBoundingBoxConstraint(start[chosen], start[chosen], variables[chosen])
-        for pull in pulls(problem):
-            reference = plant.theirs(pull.reference)
+        for cost in posture_costs(problem):
+            reference = plant.theirs(cost.reference)
             weights = np.zeros(len(reference))
-            weights[dof[dof >= 0]] = pull.weights[dof >= 0]
+            weights[dof[dof >= 0]] = cost.weights[dof >= 0]
             if (dof < 0).any():  # a quaternion turns by twice what it changes
-                weights[:4], weights[4:7] = 4.0 * pull.weights[3:6].mean(), pull.weights[:3]
+                weights[:4], weights[4:7] = 4.0 * cost.weights[3:6].mean(), cost.weights[:3]
             program.AddQuadraticErrorCost(np.diag(weights), reference, variables)
 
     def solved(self, q: Array, iterations: int) -> tuple[Array, bool]:

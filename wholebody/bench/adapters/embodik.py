@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, Adapter, few
-from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, placements, pulls, size
+from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, placements, posture_costs, size
 from wholebody.bench.adapters.urdf import Frames, joint_name, piece_name, write_urdf
 from wholebody.files import Scratch
 from wholebody.methods.base import named_terms
@@ -102,11 +102,11 @@ class _EmbodikStepper:
         self._options, self._targets = embodik.PositionStepOptions(), list[Any]()
         for goal in problem.goals:
             self._goal(goal)
-        for pull in pulls(problem)[-1:]:
+        for cost in posture_costs(problem)[-1:]:
             task = solver.add_posture_task("posture")
             task.priority, task.weight, task.solve_mode = 1, POSTURE, embodik.TaskSolveMode.MIN_ERROR
-            task.set_target_configuration(self._theirs(pull.reference))
-            task.set_joint_weights(self._spread(pull.weights))
+            task.set_target_configuration(self._theirs(cost.reference))
+            task.set_joint_weights(self._spread(cost.weights))
         options = self._options
         options.max_steps = 1
         options.adaptive_dt, options.adaptive_dt_max_scale, options.adaptive_dt_reference_distance = True, LARGER, AT

@@ -32,7 +32,7 @@ OUT = 0.1  # of the room beside things that move: what a pair that lacks it gain
 DECAY = 0.6  # of the measures' weight from one iteration to the next
 
 
-class Pull(NamedTuple):
+class PostureCost(NamedTuple):
     """A measure as a weighted squared distance from a posture.
 
     Attributes:
@@ -133,13 +133,14 @@ def placements(problem: Problem) -> Array:
     return np.array([piece.placement.homogeneous for piece in problem.scene.geometry.geometryObjects])
 
 
-def pulls(problem: Problem) -> list[Pull]:
+def posture_costs(problem: Problem) -> list[PostureCost]:
     """The measures, with weights of at most 1."""
     found = []
     for measure in problem.measures:
         if isinstance(measure, (wb.Effort, wb.Displacement)):
             weights = measure.distance.weights
-            found.append(Pull(measure.distance.reference, measure.weight * weights / max(float(weights.max()), 1e-12)))
+            share = measure.weight / max(float(weights.max()), 1e-12)
+            found.append(PostureCost(measure.distance.reference, share * weights))
     return found
 
 

@@ -12,7 +12,17 @@ import numpy as np
 import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import NEAR, OUT, Loop, Stepper, kept_apart, longest_moves, placements, pulls, size
+from wholebody.bench.adapters.loop import (
+    NEAR,
+    OUT,
+    Loop,
+    Stepper,
+    kept_apart,
+    longest_moves,
+    placements,
+    posture_costs,
+    size,
+)
 from wholebody.bench.adapters.mjcf import ROOT, mjcf
 from wholebody.bench.adapters.urdf import Frames, own_frame
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
@@ -113,9 +123,9 @@ class _MinkStepper:
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
             self._hard.append(mink.DofFreezingTask(model, sorted(dofs)))
-        self._comfort = []
-        for pull in pulls(problem):
-            self._comfort.append((self._joints(pull.reference), self._spread(np.sqrt(pull.weights))))
+        self._measures = []
+        for posture in posture_costs(problem):
+            self._measures.append((self._joints(posture.reference), self._spread(np.sqrt(posture.weights))))
 
     def step(self, q: Array, weight: float, damping: float) -> Array:
         """One `solve_ik`, with a time step of one second."""
@@ -127,12 +137,12 @@ class _MinkStepper:
         for task, site, place in self._points:
             turn = configuration.get_transform_frame_to_world(site, "site").rotation()
             task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
-        for task, share in self._comfort:
+        for task, share in self._measures:
             task.set_cost(weight**0.5 * share)
         try:
             with TOOL:
                 velocity = mink.solve_ik(
-                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    configuration, [*self._tasks, *(task for task, _ in self._measures)], 1.0, solver="daqp",
                     damping=damping, limits=self._limits, constraints=self._hard or None,
                 )  # fmt: skip
         except mink.NoSolutionFound as error:
@@ -292,7 +302,6 @@ class MinkTool(Tool):
         self._order = _Order(figure, model)
         self.reset(track.start)
         self._reach = self._task(track.tip, REACH_COST, 0.0)
-        self._at = np.eye(4)
         posture = mink.PostureTask(model, cost=POSTURE_COST)
         posture.set_target(self._configuration.q)
         self._tasks = [self._reach, posture]

@@ -22,7 +22,7 @@ LONGEST = 1.0  # s: of its restarts
 
 
 def optik_adapter() -> Adapter:
-    """The entrant: `Robot.ik` of optik."""
+    """The method: `Robot.ik` of optik."""
     return Adapter(
         name="optik",
         make=Optik,

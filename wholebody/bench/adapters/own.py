@@ -12,7 +12,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import FIRST_FIT, LADDER, Adapter, Budget, Tool, few, made
+from wholebody.bench.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Budget, Tool, few, made
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
@@ -26,7 +26,7 @@ from wholebody.methods.qp.tracking import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (
-    *((tolerance, FIRST_FIT) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
+    *((tolerance, FEASIBILITY_ONLY) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
     *LADDER[1:],
 )
 
@@ -47,7 +47,7 @@ _NEWTON_SETUPS = {
 
 
 def qp_settings(solver: str) -> dict[str, Any]:
-    """The settings of an entrant: as it comes for "", active sets throughout, else every program by that solver."""
+    """The settings of an method: as it comes for "", active sets throughout, else every program by that solver."""
     if not solver:
         return {}
     return {"solver": solver} if solver == "active_set" else {"solver": solver, "hot_start": False}
@@ -68,14 +68,14 @@ def qp_adapter(solver: str) -> Adapter:
         make=partial(_qp, settings),
         hindered=partial(UnfinishedQP, **settings),
         loose=_QP_BUDGETS,
-        setup=f"wb.QP({said}), all else as it comes: {closes}; stages and seeded starts follow where the first "
-        "descent does not reach the goals. Budgets of first fit are wb.QP(measures=False), those of "
-        "few iterations have one descent only.",
+        setup=f"wb.QP({said}), all else as it comes: {closes}; feasibility first, relaxed probes and further starts "
+        "follow where the first descent does not reach the goals. Budgets of feasibility only are "
+        "wb.QP(measures=False), those of few iterations have one descent only.",
     )
 
 
 def one_start(family: str) -> Adapter:
-    """The entrant of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
+    """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
     known: dict[str, tuple[Adapter, Callable[..., Method], str]] = {
         "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0), "wb.QP(budget=0, restarts=0)"),
         "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0), "wb.Newton(restarts=0)"),
@@ -87,7 +87,7 @@ def one_start(family: str) -> Adapter:
         name=f"{family}/one_start",
         make=partial(made, kind, {}),
         hindered=partial(kind, iterations=1),
-        loose=tuple(level for level in adapter.loose if level[1] != FIRST_FIT),
+        loose=tuple(level for level in adapter.loose if level[1] != FEASIBILITY_ONLY),
         setup=f"{said}, all else as it comes; one start, and nothing after the descent from it.",
     )
 
@@ -141,7 +141,7 @@ def newton_adapter(way: str) -> Adapter:
 
 
 def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
-    if iterations is None or iterations == FIRST_FIT:
+    if iterations is None or iterations == FEASIBILITY_ONLY:
         return QP(**settings, tolerance=tolerance, measures=iterations is None)
     return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
 

@@ -13,8 +13,8 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.bench.adapters.base import FIRST_FIT, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.adapters.loop import OUT, Loop, Stepper, kept_apart, longest_moves, pulls, size
+from wholebody.bench.adapters.base import FEASIBILITY_ONLY, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.adapters.loop import OUT, Loop, Stepper, kept_apart, longest_moves, posture_costs, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
@@ -31,20 +31,20 @@ def pink_adapter() -> Adapter:
         name="pink",
         make=_pink,
         prepare=PinkLoop.prepare,
-        loose=(*((tolerance, FIRST_FIT) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
+        loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
         setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
         "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
         f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
         f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
-        f"{GAIN} a step ({OUT} beside things that move), safe_displacement_gain 0 (1, its default, in budgets of first "
-        f"fit), d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
+        f"{GAIN} a step ({OUT} beside things that move), safe_displacement_gain 0 (1, its default, in budgets of "
+        f"feasibility only), d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
         "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
         differences=(
             f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
             "pink's barrier has one least distance for all pairs: those that begin nearer are left out, but for those "
             "with a half-space, which is lowered",
             "pairs that hard tasks keep in place are left out, since their rows leave pink no solution",
-            "inside of something pink's barrier pulls deeper, so a margin is kept",
+            "inside of something pink's barrier posture_costs deeper, so a margin is kept",
             "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
             "pink minimises Effort and Displacement only",
         ),
@@ -52,7 +52,7 @@ def pink_adapter() -> Adapter:
 
 
 def _pink(tolerance: float, iterations: int | None) -> Loop:
-    return SafePinkLoop(tolerance) if iterations == FIRST_FIT else PinkLoop(tolerance, iterations)
+    return SafePinkLoop(tolerance) if iterations == FEASIBILITY_ONLY else PinkLoop(tolerance, iterations)
 
 
 class PinkLoop(Loop):
@@ -106,10 +106,10 @@ class _PinkStepper:
                   for figure_dof in scene.figure.dofs(bound.joints).tolist()]  # fmt: skip
         if frozen:
             self._hard.append(self._joints(problem.start, sorted(set(frozen)), np.ones(len(set(frozen)))))
-        self._comfort = []
-        for pull in pulls(problem):
-            dofs = np.flatnonzero(pull.weights > 0.0)
-            self._comfort.append((self._joints(pull.reference, dofs, np.ones(len(dofs))), np.sqrt(pull.weights[dofs])))
+        self._measures = []
+        for cost in posture_costs(problem):
+            dofs = np.flatnonzero(cost.weights > 0.0)
+            self._measures.append((self._joints(cost.reference, dofs, np.ones(len(dofs))), np.sqrt(cost.weights[dofs])))
         pairs = len(self._geometry.collisionPairs)
         self._barriers = (
             [
@@ -135,12 +135,12 @@ class _PinkStepper:
         for task, place in self._points:
             turn = configuration.get_transform_frame_to_world(task.frame).rotation
             task.set_target(pin.SE3(turn, place))
-        for task, share in self._comfort:
+        for task, share in self._measures:
             task.cost = weight**0.5 * share
         try:
             with TOOL:
                 velocity = pink.solve_ik(
-                    configuration, [*self._tasks, *(task for task, _ in self._comfort)], 1.0, solver="daqp",
+                    configuration, [*self._tasks, *(task for task, _ in self._measures)], 1.0, solver="daqp",
                     damping=damping, barriers=self._barriers, constraints=self._hard, safety_break=False,
                 )  # fmt: skip
         except pink.exceptions.NoSolutionFound as error:

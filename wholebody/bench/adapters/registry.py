@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from wholebody.bench.adapters.base import Adapter, Tool
 from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
-from wholebody.bench.adapters.starts import FAMILY, ONE, restarted
+from wholebody.bench.adapters.starts import ONE, STARTS, restarted
 from wholebody.bench.track import Track
 from wholebody.errors import MissingPackageError, UnknownNameError
 from wholebody.records import with_values
@@ -20,17 +20,17 @@ SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 """Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
 
 
-VARIANTS = (f"/{ONE}", f"/{FAMILY}")
+VARIANTS = (f"/{ONE}", f"/{STARTS}")
 
 ALL = "all"
-"""In place of a name: every entrant that is installed."""
+"""In place of a name: every method that is installed."""
 
 USUAL = ("qp", "newton/slack", "ccd", "placo", "pink", "mink", "dls", "drake", "optik")
-"""Entrants where none is named: one of each algorithm. Their other settings take part by name, or with `ALL`."""
+"""Methods where none is named: one of each algorithm. Their other settings take part by name, or with `ALL`."""
 
 USUAL_FURTHER = (
     "placo/pruned",
-    *(f"{family}/{FAMILY}" for family in ("dls", "placo", "pink", "mink", "drake")),
+    *(f"{family}/{STARTS}" for family in ("dls", "placo", "pink", "mink", "drake")),
     *(f"{family}/{ONE}" for family in ("qp", "newton", "ccd")),
 )
 """With those, placo takes part with the pairs that a careful user leaves it, and every method but optik, which draws
@@ -59,7 +59,7 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     """The adapters of these names, in the order given; where None, the installed ones of `USUAL`.
 
     The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
-    "all" means every entrant that is installed. Entrants that differ from another in their starts alone, such as
+    "all" means every method that is installed. Methods that differ from another in their starts alone, such as
     "qp/one_start" and "mink/starts", are among several only if `starts` is true.
 
     Raises:
@@ -138,7 +138,7 @@ def _rows() -> dict[str, _Row]:
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
         row = rows.get(f"{family}/{ONE}", rows.get(family))
         assert row is not None
-        rows[f"{family}/{FAMILY}"] = with_values(row, build=partial(_restarted, row))
+        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row))
     return rows
 
 

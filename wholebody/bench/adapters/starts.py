@@ -37,8 +37,8 @@ DRAWS = 40
 
 DEEPER = 1e-4  # m: by which a start may overlap more than the problem's own
 SEED = 0
-FAMILY, ONE = "starts", "one_start"
-"""Ends of the names of entrants."""
+STARTS, ONE = "starts", "one_start"
+"""Ends of the names of methods."""
 
 
 class Restarted:
@@ -57,7 +57,7 @@ class Restarted:
     @property
     def name(self) -> str:
         """Name for tables."""
-        return f"{self.method.name}/{FAMILY}"
+        return f"{self.method.name}/{STARTS}"
 
     def accepts(self, problem: Problem) -> str | None:
         """What the method says."""
@@ -101,11 +101,11 @@ class Restarted:
 
 
 def restarted(adapter: Adapter) -> Adapter:
-    """An entrant with further starts, from one with a single start."""
+    """An method with further starts, from one with a single start."""
     family = adapter.name.removesuffix(f"/{ONE}")
     return replace(
         adapter,
-        name=f"{family}/{FAMILY}",
+        name=f"{family}/{STARTS}",
         make=partial(_make, adapter),
         loose=(),
         prepare=Restarted.prepare,

@@ -1,4 +1,4 @@
-"""Figures at random: people, avatars, hands, shipped robots, and small ones that are made up."""
+"""Figures at random: people, avatars, hands, packaged robots, and small ones that are made up."""
 
 from __future__ import annotations
 
@@ -80,13 +80,13 @@ class Body:
 
 def body(rng: np.random.Generator) -> Body:
     """Return a figure."""
-    kind = rng.choice(["human", "avatar", "hand", "shipped", "robot"], p=[0.27, 0.1, 0.17, 0.11, 0.35])
+    kind = rng.choice(["human", "avatar", "hand", "packaged", "robot"], p=[0.27, 0.1, 0.17, 0.11, 0.35])
     if kind == "robot":
         return robot(rng)
     if kind == "hand":
         side = ("left", "right")[int(rng.integers(2))]
         return _called(f"wb.load('hand', side={side!r})", 0.15)
-    if kind == "shipped":
+    if kind == "packaged":
         name = ("human", "avatar", "hand", "arm")[int(rng.integers(4))]
         if name == "arm":
             return _called("wb.load(task_paths()['shelf'].with_name('arm.urdf'))", 0.9)

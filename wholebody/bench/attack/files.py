@@ -15,7 +15,7 @@ from wholebody.figures.packaged_urdf import task_paths, urdf_path
 
 LONGEST = 1500  # characters of a refusal: more is no sentence
 HEAVIEST = 1e9  # kg, m, rad/s: numbers of a robot above this are slips
-SHIPPED = 0.15  # share of cases that begin with a shipped file
+PACKAGED = 0.15  # share of cases that begin with a file of the package
 NO_FILES = (
     "/dev/zero",
     "/dev/null",
@@ -100,11 +100,11 @@ def _reader(rng: np.random.Generator) -> Reader:
             _stored({"result.json": "result.json"} | TASK),
         )
     if kind == "robot":
-        if rng.random() < SHIPPED:
+        if rng.random() < PACKAGED:
             return Reader("", "wb.load({path})", {"hand.urdf": urdf_path("hand").read_bytes()})
         return Reader("", "wb.load({path})", _stored(ROBOT))
     imports = "from wholebody.taskfile import read_task\n"
-    if rng.random() < SHIPPED:
+    if rng.random() < PACKAGED:
         tasks = task_paths()
         name = sorted(tasks)[int(rng.integers(len(tasks)))]
         beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}

@@ -13,8 +13,8 @@ import numpy as np
 
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Outcome
 from wholebody.bench.attack.running import Ended, put
-from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.report import render
+from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import write_text
 
 ATTACKED = {

@@ -11,9 +11,9 @@ from wholebody.bench.compare.front import OURS, Rival
 from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.record import COARSE, FLOOR
 from wholebody.bench.compare.results import EFFORT_FLOOR, Results, middle
-from wholebody.bench.compare.statistics import LEVEL, NOTHING, Interval, paired_difference, ratio
 from wholebody.bench.compare.summary import GOOD, Summary
-from wholebody.bench.report import upfirst, words
+from wholebody.bench.report import spanned, upfirst, words
+from wholebody.bench.statistics import LEVEL, NOTHING, Interval, against, paired_difference, ratio
 
 
 class Choice(NamedTuple):
@@ -82,7 +82,7 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     cheap = paired.best(efforts)
     return Choice(
         family,
-        fast, next((row.median_ms for row in rows if fast and row.method == fast[0]), nan),
+        fast, next((row.median_ms.value for row in rows if fast and row.method == fast[0]), nan),
         exact, middle(list(errors[exact[0]].values())) if exact else nan,
         cheap, middle(list(efforts[cheap[0]].values())) if cheap else nan,
         leading, sum(solved[order[0]].values()) / given if order else 0.0,
@@ -103,14 +103,14 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
         if not mine:
             continue
         judged = [row for row in mine if row.refused < row.cases]
-        worst = min(judged, key=lambda row: row.success, default=None)
+        worst = min(judged, key=lambda row: row.success.value, default=None)
         found.append(
             Standing(
                 adapter,
                 sum(not row.refused for row in mine),
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
-                Interval(worst.success, worst.success_low, worst.success_high, worst.cases) if worst else NOTHING,
+                worst.success if worst else NOTHING,
                 ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
@@ -166,7 +166,7 @@ def _in_doubt(results: Results, ranked: Sequence[Standing], rows: Sequence[Summa
     if not apart and len(alike) > 1:
         apart = " The times of its settings cannot be told apart."
     solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
-    lowest = min(row.success_low for row in rows if row.method in alike and row.dependable)
+    lowest = min(row.success.low for row in rows if row.method in alike and row.dependable)
     return (
         f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems given in "
         f"{most} of {len(results.sets)} sets; "
@@ -177,14 +177,14 @@ def _in_doubt(results: Results, ranked: Sequence[Standing], rows: Sequence[Summa
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
     """That a method is not enough, if in no set so many problems that it might be dependable after all are solved."""
     mine = [row for row in rows if row.method == standing.method and row.refused < row.cases]
-    if any(not row.refused and row.success_high >= GOOD for row in mine):
+    if any(not row.refused and row.success.high >= GOOD for row in mine):
         return []
-    best = max(mine, key=lambda row: row.success)
+    best = max(mine, key=lambda row: row.success.value)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
     worst = "" if standing.worst_set == best.set else f" and in {words(standing.worst_set)} {percent(standing.worst)}"
     return [
-        f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {100 * best.success:.0f} % "
-        f"[{100 * best.success_low:.0f}, {100 * best.success_high:.0f}] ({words(best.set)}){worst}{deep}."
+        f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {percent(best.success)} "
+        f"({words(best.set)}){worst}{deep}."
     ]
 
 
@@ -199,19 +199,17 @@ def targets(rows: Sequence[Summary], wall: Sequence[Rival], dependable: Sequence
     mine = [row for row in rows if row.method == OURS and row.refused < row.cases]
     if not mine:
         return []
-    verdicts = {
-        "reached": [row for row in mine if row.success_low >= GOOD],
-        "reached, with an interval that goes lower": [row for row in mine if row.success >= GOOD > row.success_low],
-        "missed, with an interval that goes higher": [row for row in mine if row.success < GOOD <= row.success_high],
-        "missed": [row for row in mine if row.success_high < GOOD],
+    verdicts: dict[str, list[Summary]] = {
+        "reached": [],
+        "reached, with an interval that goes lower": [],
+        "missed, with an interval that goes higher": [],
+        "missed": [],
     }
+    for row in mine:
+        verdicts[against(row.success, GOOD, at_least=True)].append(row)
     found = "; ".join(
         f"{verdict}: "
-        + ", ".join(
-            f"{words(row.set)} {100 * row.success:.1f} % [{100 * row.success_low:.1f}, {100 * row.success_high:.1f}] "
-            f"of {row.cases}"
-            for row in listed
-        )
+        + ", ".join(f"{words(row.set)} {spanned(row.success, '.1f', 100.0, ' %')} of {row.cases}" for row in listed)
         for verdict, listed in verdicts.items()
         if listed
     )
@@ -246,11 +244,9 @@ def effort(value: float) -> str:
 
 def percent(found: Interval) -> str:
     """A share with its interval; empty where there is none."""
-    return f"{100 * found.value:.0f} % [{100 * found.low:.0f}, {100 * found.high:.0f}]" if isfinite(found.value) else ""
+    return spanned(found, ".0f", 100.0, " %")
 
 
 def slowness(found: Interval) -> str:
     """A ratio of times with its interval; empty where there are too few problems."""
-    if not isfinite(found.value):
-        return ""
-    return f"× {found.value:.2g} [{found.low:.2g}, {found.high:.2g}]"
+    return f"× {spanned(found, '.2g')}" if isfinite(found.value) else ""

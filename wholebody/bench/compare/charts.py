@@ -18,9 +18,9 @@ from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.front import OURS
 from wholebody.bench.compare.record import COARSE, FINE
 from wholebody.bench.compare.results import Quantity, Results, middle
-from wholebody.bench.compare.statistics import wilson
 from wholebody.bench.compare.summary import Summary
 from wholebody.bench.plot_style import method_style
+from wholebody.bench.statistics import wilson
 
 BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
 GREY = "#666666"
@@ -47,7 +47,7 @@ def speed_accuracy(results: Results, family: str, title: str, adapters: Sequence
                 drawn[adapter] = _draw(panel, points, adapter, quantity)
         _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
-    _legend(chart, adapters, drawn)
+    plot_style.legend_below(chart, {name: drawn[name] for name in adapters if name in drawn})
     return plot_style.save(chart, path)
 
 
@@ -134,7 +134,7 @@ def profiles(results: Results, family: str, title: str, adapters: Sequence[str],
         panel.set_title(f"{count} problems, which all methods took", loc="right", fontsize=8, color=GREY)
         panel.set(xlabel="time over that of the fastest method", ylabel="cases solved within that factor [%]")
     chart.suptitle(title, x=0.01, ha="left", fontsize=13)
-    _legend(chart, adapters, drawn)
+    plot_style.legend_below(chart, {name: drawn[name] for name in adapters if name in drawn})
     return plot_style.save(chart, path)
 
 
@@ -173,35 +173,22 @@ def overview(
     rows: Sequence[Summary], titles: Mapping[str, str], adapters: Sequence[str], path: Path
 ) -> tuple[Path, Path]:
     """One row a set: share solved and mean time of each method, with their intervals of 95 %."""
-    chart, axes = plot_style.figure(1, 2, (11.0, 0.9 + 0.85 * len(titles)))
-    drawn: dict[str, Any] = {}
-    left, right = axes[0]
-    for place, family in enumerate(titles):
-        mine = {row.method: row for row in rows if row.set == family and row.refused < row.cases}
-        if place % 2:
-            for panel in (left, right):
-                panel.axhspan(place - 0.5, place + 0.5, color="#f3f5f7", zorder=0)
-        for number, name in enumerate(adapters):
-            if name not in mine:
-                continue
-            row, seen = mine[name], method_style(name)
-            y = place + 0.75 * ((number + 0.5) / len(adapters) - 0.5)
-            spans = (
-                (left, 100.0 * row.success, 100.0 * row.success_low, 100.0 * row.success_high),
-                (right, row.mean_ms, row.mean_low_ms, row.mean_high_ms),
-            )
-            for panel, value, low, high in spans:
-                drawn[name] = plot_style.band(panel, y, value, (low, high), seen)
-    for panel in (left, right):
-        panel.set_yticks(range(len(titles)), list(titles.values()) if panel is left else [""] * len(titles))
-        panel.set_ylim(len(titles) - 0.5, -0.5)
-        panel.grid(axis="y", visible=False)
-    left.set(xlabel="solved [%]", xlim=(-2.0, 102.0))
-    plot_style.plain_log(right)
-    right.set(xlabel="mean time of a solve or frame, failures as the longest [ms]")
-    chart.suptitle("Every set: solved, and how fast; bands are intervals of 95 %", x=0.01, ha="left", fontsize=13)
-    _legend(chart, adapters, drawn)
-    return plot_style.save(chart, path)
+    shown = {
+        title: {
+            row.method: (row.success.scaled(100.0), row.mean_ms)
+            for row in rows
+            if row.set == family and row.method in adapters and row.refused < row.cases
+        }
+        for family, title in titles.items()
+    }
+    note = "failures as the longest"
+    heading = "Every set: solved, and how fast; bands are intervals of 95 %"
+    return plot_style.shares_and_times(shown, {name: method_style(name) for name in adapters}, note, heading, path)
+
+
+def chart_name(family: str, kind: str = "", number: int = 0) -> str:
+    """Name of the chart of a set for a group of methods; the first group has no number."""
+    return f"compare-{family.replace('_', '-')}{kind}{f'-{number + 1}' if number else ''}"
 
 
 MOST = 6  # methods in a chart
@@ -224,17 +211,6 @@ def groups(adapters: Sequence[str]) -> list[tuple[str, ...]]:
     return [tuple(base + others[first : first + size]) for first in range(0, len(others), size)]
 
 
-def _legend(chart: Any, adapters: Sequence[str], drawn: dict[str, Any]) -> None:
-    names = [adapter for adapter in adapters if adapter in drawn]
-    if names:
-        chart.legend(
-            [drawn[name] for name in names], names, loc="outside lower center", ncols=min(len(names), 6),
-            frameon=False, fontsize=9,
-        )  # fmt: skip
-    chart.draw_without_rendering()
-    chart.set_layout_engine("none")  # laid out once, not for each of the files
-
-
 def draw_all(
     results: Results, rows: Sequence[Summary], titles: Iterable[tuple[str, str]], folder: Path
 ) -> dict[str, tuple[Path, Path]]:
@@ -244,13 +220,11 @@ def draw_all(
     """
     drawn = {}
     known = dict(titles)
-    for number, adapters in enumerate(groups(results.adapters), start=1):
-        more = "" if number == 1 else f"-{number}"
-        name = f"compare-overview{more}"
+    for number, adapters in enumerate(groups(results.adapters)):
+        name = chart_name("overview", number=number)
         drawn[name] = overview(rows, known, adapters, folder / name)
         for family, title in known.items():
-            name = f"compare-{family.replace('_', '-')}"
-            profile_name, scatter_name = f"{name}-profile{more}", f"{name}{more}"
+            profile_name, scatter_name = chart_name(family, "-profile", number), chart_name(family, number=number)
             drawn[profile_name] = profiles(results, family, title, adapters, folder / profile_name)
             drawn[scatter_name] = speed_accuracy(results, family, title, adapters, folder / scatter_name)
     return drawn

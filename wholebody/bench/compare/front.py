@@ -23,7 +23,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.bench.compare.results import Quantity, Results
-from wholebody.bench.compare.statistics import budget_ratio
+from wholebody.bench.statistics import Interval, budget_ratio
 
 ACCURACIES = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8)
 """From where an accuracy is worth the name to where coal's distances end."""
@@ -34,7 +34,7 @@ OURS = "qp"
 HALF, MOST = 0.5, 0.9
 """Shares of the cases that the time to an accuracy is of: the median, and nine in ten."""
 
-FAMILY = "qp/"
+OUR_VARIANTS = "qp/"
 """The same method with other settings for its programs, which is not another method."""
 
 
@@ -47,33 +47,28 @@ class Rival:
         method: which other method; empty where no other gets to any accuracy.
         accuracy: at which the ratio is greatest.
         ratio: our time over the other's there; up to 1 we are on the front. Infinite where we do not get there.
-        low, high: interval of the ratio.
         ours, other: seconds.
-        cases: compared.
     """
 
     set: str
     quantity: str
     method: str
     accuracy: float
-    ratio: float
-    low: float
-    high: float
+    ratio: Interval
     ours: float
     other: float
-    cases: int
 
     @property
     def on_front(self) -> bool:
         """Whether no other method is faster at any accuracy."""
-        return self.ratio <= 1.0
+        return self.ratio.value <= 1.0
 
     @property
     def verdict(self) -> Literal["yes", "no", "not told apart"]:
         """Whether we are on the front, where the interval leaves no doubt."""
         if not self.method:
             return "yes" if self.on_front else "no"
-        return "yes" if self.high <= 1.0 else "no" if self.low > 1.0 else "not told apart"
+        return "yes" if self.ratio.high <= 1.0 else "no" if self.ratio.low > 1.0 else "not told apart"
 
 
 def times_to(
@@ -113,7 +108,7 @@ def front(results: Results, family: str, quantity: Quantity, share: float = HALF
         return None
     worst: tuple[Rival, Array, Array] | None = None
     for other in results.adapters:
-        if other == OURS or other.startswith(FAMILY):
+        if other == OURS or other.startswith(OUR_VARIANTS):
             continue
         cases = own & results.swept(family, other)
         if not cases:
@@ -127,15 +122,16 @@ def front(results: Results, family: str, quantity: Quantity, share: float = HALF
                 continue
             ours = times_to(results, family, OURS, quantity, accuracy, cases)
             here = _least(ours, share)
-            rival = Rival(family, quantity.name, other, accuracy, here / there, 0.0, inf, here, there, len(cases))
-            if worst is None or rival.ratio > worst[0].ratio:
+            ratio = Interval(here / there, 0.0, inf, len(cases))
+            rival = Rival(family, quantity.name, other, accuracy, ratio, here, there)
+            if worst is None or ratio.value > worst[0].ratio.value:
                 worst = rival, ours, theirs
     if worst is None:
         here = time_to(results, family, OURS, quantity, ACCURACIES[0], own, share)
-        ratio = 0.0 if here < inf else inf
-        return Rival(family, quantity.name, "", ACCURACIES[0], ratio, ratio, ratio, here, inf, len(own))
-    found = budget_ratio(*worst[1:], share)
-    return replace(worst[0], low=found.low, high=found.high)
+        value = 0.0 if here < inf else inf
+        ratio = Interval(value, value, value, len(own))
+        return Rival(family, quantity.name, "", ACCURACIES[0], ratio, here, inf)
+    return replace(worst[0], ratio=budget_ratio(*worst[1:], share))
 
 
 def fronts(results: Results, share: float = HALF) -> list[Rival]:

@@ -14,6 +14,7 @@ from wholebody.bench.compare.summary import GOOD, Summary, summaries
 from wholebody.bench.problem_sets import robots
 from wholebody.bench.problem_sets.registry import NAMED, TUNED_ON, problem_set
 from wholebody.bench.report import render
+from wholebody.bench.statistics import against
 from wholebody.errors import InputError
 
 METHODS = ("qp", "placo", "placo/starts", "dls/starts")
@@ -66,20 +67,11 @@ def beside(rows: Sequence[Summary]) -> dict[str, list[Beside]]:
     }
 
 
-def verdict(row: Summary) -> str:
-    """Whether `GOOD` is reached, as far as the interval tells."""
-    if row.success_low >= GOOD:
-        return "reached"
-    if row.success_high < GOOD:
-        return "missed"
-    return f"{'reached' if row.success >= GOOD else 'missed'}, too few to be sure"
-
-
 def report(rows: Sequence[Summary], asked: Settings, left_out: str, facts: Mapping[str, str]) -> str:
     """The page's part as Markdown."""
     sets = {family.name: family for family in asked.sets}
     return render(
         "held_out.md",
         listed=beside(rows), sets=sets, tuned_on=TUNED_ON, asked=asked, left_out=left_out, facts=facts, good=GOOD,
-        verdict=verdict,
+        against=against,
     )  # fmt: skip

@@ -8,7 +8,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from wholebody.batches import own_child
-from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
+from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
 from wholebody.bench.compare.reference_kernel import kernel_seconds
 from wholebody.bench.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
@@ -83,14 +83,14 @@ def _sweep(
 ) -> list[Record]:
     """All further budgets; where the process has ended over one, the rest count as what they would have been.
 
-    Budgets of first fit are cheaper than all others, and count for themselves.
+    Budgets of feasibility only are cheaper than all others, and count for themselves.
     """
     records: list[Record] = []
     if first.outcome == REFUSED:
         return records
     last = {False: (first, ended), True: (first, False)}
     for level in ladder:
-        kind = level[1] == FIRST_FIT
+        kind = level[1] == FEASIBILITY_ONLY
         record, over = last[kind]
         if not over:
             last[kind] = record, over = _solve(child, adapter, level, task)

@@ -16,10 +16,10 @@ from typing import Any, NamedTuple
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.pages import Material
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.compare.statistics import LEAST, median
 from wholebody.bench.compare.summary import kernel_of
 from wholebody.bench.problem_sets.registry import problem_set
-from wholebody.bench.report import words
+from wholebody.bench.report import spanned, words
+from wholebody.bench.statistics import LEAST, Interval, median
 from wholebody.bench.tables import write_text
 from wholebody.errors import FileFormatError, InputError
 from wholebody.files import read_text
@@ -28,14 +28,6 @@ NAME = "lock.json"
 FORMAT = "wholebody comparison"
 VERSION = "1.0"
 AMOUNTS = ("cases", "sweep", "levels", "seed", "cap", "minutes")
-
-
-class Figure(NamedTuple):
-    """A figure with its interval; NaN and an open interval where there is none."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -54,7 +46,7 @@ class Locked:
     methods: tuple[str, ...]
     amounts: Mapping[str, float]
     facts: Mapping[str, str]
-    figures: Mapping[tuple[str, str, str], Figure]
+    figures: Mapping[tuple[str, str, str], Interval]
 
     def settings(self) -> Settings:
         """The settings to do it again.
@@ -78,15 +70,15 @@ class Locked:
 def locked(given: Material) -> Locked:
     """What a comparison found. An interval of a time in kernels has the uncertainty of the kernel's own time too."""
     kernel = kernel_of(given.chunks)
-    figures: dict[tuple[str, str, str], Figure] = {}
+    figures: dict[tuple[str, str, str], Interval] = {}
     for row in given.rows:
         if row.refused < row.cases:
-            figures[row.set, row.method, "solved"] = Figure(row.success, row.success_low, row.success_high)
+            figures[row.set, row.method, "solved"] = Interval(*row.success[:3])
             answered = [one for one in given.results.default(row.set, row.method) if one.answered]
             spent = median([one.cpu_seconds for one in answered])
             times = (spent.value / kernel.value, spent.low / kernel.high, spent.high / kernel.low)
             if row.cases - row.refused >= LEAST and all(isfinite(value) for value in times):
-                figures[row.set, row.method, "median time"] = Figure(*times)
+                figures[row.set, row.method, "median time"] = Interval(*times)
     asked = given.settings
     return Locked(
         tuple(family.name for family in asked.sets),
@@ -106,7 +98,7 @@ def write_lock(path: Path, found: Locked) -> None:
         "methods": list(found.methods),
         "amounts": dict(found.amounts),
         "facts": dict(found.facts),
-        "figures": [[*key, *figure] for key, figure in found.figures.items()],
+        "figures": [[*key, *figure[:3]] for key, figure in found.figures.items()],
     }
     write_text(path, json.dumps(content, indent=1) + "\n")
 
@@ -127,7 +119,7 @@ def read_lock(path: Path) -> Locked:
             tuple(map(str, content["methods"])),
             {name: float(content["amounts"][name]) for name in AMOUNTS},
             {str(name): str(value) for name, value in content["facts"].items()},
-            {(str(a), str(b), str(c)): Figure(float(x), float(y), float(z)) for a, b, c, x, y, z in content["figures"]},
+            {(str(a), str(b), str(c)): Interval(*map(float, figure)) for a, b, c, *figure in content["figures"]},
         )
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise FileFormatError(
@@ -141,12 +133,12 @@ class Difference(NamedTuple):
     set: str
     method: str
     what: str
-    published: Figure
-    found: Figure
+    published: Interval
+    found: Interval
 
 
 def differences(published: Locked, found: Locked) -> list[Difference]:
-    """Figures that differ beyond their intervals, in the order of the lock file.
+    """Intervals that differ beyond their intervals, in the order of the lock file.
 
     Raises:
         InputError: the two have no figure in common.
@@ -163,7 +155,7 @@ def differences(published: Locked, found: Locked) -> list[Difference]:
     ]
 
 
-def _apart(one: Figure, other: Figure) -> bool:
+def _apart(one: Interval, other: Interval) -> bool:
     return not (one.low <= other.value <= one.high or other.low <= one.value <= other.high)
 
 
@@ -190,10 +182,10 @@ def in_words(published: Locked, found: Locked) -> list[str]:
     return said
 
 
-def _shown(what: str, figure: Figure) -> str:
+def _shown(what: str, figure: Interval) -> str:
     if what == "solved":
-        return f"{100 * figure.value:.1f} % [{100 * figure.low:.0f}, {100 * figure.high:.0f}]"
-    return f"{figure.value:.3g} kernels [{figure.low:.3g}, {figure.high:.3g}]"
+        return spanned(figure, ".1f", 100.0, " %", ".0f")
+    return spanned(figure, ".3g", unit=" kernels")
 
 
 def shares(found: Sequence[Difference]) -> list[Difference]:

@@ -38,7 +38,7 @@ class TaskRow:
     """One method on the task.
 
     Attributes:
-        method: name of the entrant.
+        method: name of the method.
         outcome: "solved", the status that the method gives, or "refused", "failed", "overtime"; "not solved" where the
             method calls solved what is judged to be none.
         said: the refusal, the exception, or the message of the method.

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.bench.compare.advice import choices, effort, error, percent, reference, slowness, standings
-from wholebody.bench.compare.charts import groups
+from wholebody.bench.compare.charts import chart_name, groups
 from wholebody.bench.compare.examples import Pair, fault, resisting
 from wholebody.bench.compare.paired import named
 from wholebody.bench.compare.rankings import in_words, rankings
@@ -68,14 +68,9 @@ def write_pages(
         **{adapter.name: page_name("method", adapter.name) for adapter in given.settings.adapters},
     }
     made = []
-    together = groups(results.adapters)
+    groups_count = len(groups(results.adapters))
     for family in given.settings.sets:
-        stem = f"compare-{family.name.replace('_', '-')}"
-        shown = [
-            f"{stem}{kind}{'' if number == 0 else f'-{number + 1}'}"
-            for number in range(len(together))
-            for kind in ("-profile", "")
-        ]
+        shown = [chart_name(family.name, kind, number) for number in range(groups_count) for kind in ("-profile", "")]
         text = render(
             "compare_set.md", family=family, rows=[row for row in rows if row.set == family.name],
             moving=results.moving(family.name), choice=picked[family.name], ranking=ranked[family.name].ranking,

@@ -8,10 +8,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
-from wholebody.bench.compare.front import FAMILY
+from wholebody.bench.compare.front import OUR_VARIANTS, OURS
 from wholebody.bench.compare.record import COARSE, FLOOR
 from wholebody.bench.compare.results import QUANTITIES, Results, effort_excess, middle
-from wholebody.bench.compare.statistics import LEAST, ratio
+from wholebody.bench.statistics import LEAST, ratio
 
 WORST = QUANTITIES[0]
 
@@ -72,14 +72,14 @@ def named(adapters: Sequence[str]) -> str:
     """Return methods in words, with the settings of one method that cannot be told apart."""
     ours = [f"`{name}`" for name in adapters if _is_ours(name)]
     alike = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
-    return ", ".join(f"`{name}`{alike if name == FAMILY[:-1] else ''}" for name in algorithms(adapters))
+    return ", ".join(f"`{name}`{alike if name == OURS else ''}" for name in algorithms(adapters))
 
 
 def algorithms(adapters: Sequence[str]) -> list[str]:
     """Return the names of methods; several settings of one method have the name of the method."""
     several = sum(_is_ours(name) for name in adapters) > 1
-    return list(dict.fromkeys(FAMILY[:-1] if several and _is_ours(name) else name for name in adapters))
+    return list(dict.fromkeys(OURS if several and _is_ours(name) else name for name in adapters))
 
 
 def _is_ours(name: str) -> bool:
-    return f"{name}/".startswith(FAMILY)
+    return f"{name}/".startswith(OUR_VARIANTS)

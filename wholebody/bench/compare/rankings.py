@@ -10,7 +10,7 @@ from typing import NamedTuple
 from wholebody.bench.compare.record import COARSE
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import SEEDS
-from wholebody.bench.compare.statistics import LEAST, LEVEL, Ranking, ranking, same_share
+from wholebody.bench.statistics import LEAST, LEVEL, Ranking, ranking, same_share
 
 
 class SetRanking(NamedTuple):

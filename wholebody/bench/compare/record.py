@@ -26,7 +26,7 @@ class Record:
     """One solve. Errors are infinite where there is no answer.
 
     Attributes:
-        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is `FIRST_FIT`.
+        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is `FEASIBILITY_ONLY`.
         status: what the method claims; empty without an answer.
         said: its message, its refusal or the exception.
         seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.

@@ -20,7 +20,7 @@ from wholebody.bench.compare.advice import (
     standings,
     targets,
 )
-from wholebody.bench.compare.charts import draw_all, groups
+from wholebody.bench.compare.charts import chart_name, draw_all, groups
 from wholebody.bench.compare.examples import pairs
 from wholebody.bench.compare.front import MOST, OURS, Rival, fronts
 from wholebody.bench.compare.lock import NAME as LOCK
@@ -34,7 +34,7 @@ from wholebody.bench.compare.scenes import Scene, chosen, draw, in_brief
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.compare.summary import GOOD, exclusions, kernel_of, summaries
-from wholebody.bench.report import formatted, html, render
+from wholebody.bench.report import html, render, spanned
 from wholebody.bench.tables import replace_section, write_rows, write_text
 
 PAGE = "report.html"
@@ -112,14 +112,13 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
     by_cpu, by_most = ({(rival.set, rival.quantity): rival for rival in rivals} for rivals in (processor, dependable))
     counts = [row.cases for row in given.rows]
     together = groups(results.adapters)
-    numbers = ["" if number == 0 else f"-{number + 1}" for number in range(len(together))]
     return render(
         "compare.md",
         given=given, whole=whole, charts=charts, advice=advice(results, given.rows),
         picked=choices(results, given.rows), targets=targets(given.rows, wall, dependable),
         plain=_plain,
         ranked=standings(results, given.rows), reference=reference(results), error=error, effort=effort,
-        slowness=slowness, percent=percent, rival=_rival, ratio=_ratio, chart=_chart,
+        slowness=slowness, percent=percent, rival=_rival, chart=chart_name,
         least=min(counts, default=0), most=max(counts, default=0), few=FEW,
         wall=wall, off=[rival for rival in wall if not rival.on_front], dependable=dependable,
         by_cpu=by_cpu, by_most=by_most, ours=OURS,
@@ -127,8 +126,8 @@ def as_markdown(given: Material, whole: bool, charts: str) -> str:
         left_out=exclusions(settings, given.chunks, given.rows),
         ranking=rankings(results), ranking_words=in_words,
         seeds=seeds_in_words(sensitivity(results), {family.name: family.title for family in settings.sets}),
-        kernel=kernel_of(given.chunks), kernel_about=KERNEL, groups=together, numbers=numbers,
-        overviews=[f"compare-overview{more}" for more in numbers],
+        kernel=kernel_of(given.chunks), kernel_about=KERNEL, groups=together,
+        overviews=[chart_name("overview", number=number) for number in range(len(together))],
         good=GOOD, coarse=COARSE, tolerance=DEFAULT[0],
     )  # fmt: skip
 
@@ -153,11 +152,6 @@ def as_page(given: Material, charts: Mapping[str, tuple[Path, Path]], scenes: Se
     )  # fmt: skip
 
 
-def _chart(family: str) -> str:
-    """Name of the chart of a set."""
-    return f"compare-{family.replace('_', '-')}"
-
-
 def _plain(adapters: Sequence[str]) -> str:
     return ", ".join(algorithms(adapters))
 
@@ -166,13 +160,7 @@ def _rival(rival: Rival | None) -> str:
     """A ratio and the method that it is to, in a cell beside the others."""
     if rival is None or not rival.method:
         return "" if rival is None else "no other" if rival.on_front else "none"
-    return f"{_ratio(rival)} ({rival.method})"
-
-
-def _ratio(rival: Rival) -> str:
-    """A ratio of times with its interval."""
-    value, low, high = (formatted(number, ".2g", none="∞") for number in (rival.ratio, rival.low, rival.high))
-    return f"{value} [{low}, {high}]"
+    return f"{spanned(rival.ratio, '.2g')} ({rival.method})"
 
 
 def _anchor(title: str) -> str:

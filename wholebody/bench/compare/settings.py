@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
-from wholebody.bench.adapters.base import FIRST_FIT, Adapter, Budget
+from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.errors import InputError
@@ -79,15 +79,16 @@ class Settings:
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
 
-        Budgets of first fit are chosen among themselves, as many as their share: the most exact of them is the time to
-        an exact posture where least measures are not asked for.
+        Budgets of feasibility only are chosen among themselves, as many as their share: the most exact of them is the
+        time to an exact posture where least measures are not asked for.
         """
-        listed = [level for level in adapter.loose if level != DEFAULT and not (moving and level[1] == FIRST_FIT)]
+        unused = FEASIBILITY_ONLY if moving else 0
+        listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
         most = min(self.levels, MOVING_LEVELS) if moving else self.levels
         if len(listed) <= most:
             return listed
-        first = [level for level in listed if level[1] == FIRST_FIT]
-        others = [level for level in listed if level[1] != FIRST_FIT]
+        first = [level for level in listed if level[1] == FEASIBILITY_ONLY]
+        others = [level for level in listed if level[1] != FEASIBILITY_ONLY]
         share = round(most * len(first) / len(listed))
         return [*_evenly(first, share), *_evenly(others, most - share)]
 

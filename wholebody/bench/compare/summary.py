@@ -2,39 +2,70 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from math import inf, nan
 from typing import NamedTuple
 
 from wholebody.bench.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED, frame_cap
 from wholebody.bench.compare.results import Results, effort_excess, middle
 from wholebody.bench.compare.settings import Settings
-from wholebody.bench.compare.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.report import words
-from wholebody.bench.tables import summed_programs
+from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
+from wholebody.bench.tables import filled, of, summed_programs
 
 CAP = 20.0  # s: as a comparison ends a solve
 SHOWN = 110  # characters of a message
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
 
 
+class _Cell:
+    """One method in one set: its records, and what is computed of several of them."""
+
+    def __init__(self, results: Results, family: str, adapter: str, chunks: Sequence[Chunk], cap: float) -> None:
+        self.set, self.method, self.results = family, adapter, results
+        self.mine, self.taken = results.default(family, adapter), results.taken(family, adapter)
+        self.answered = [record for record in self.mine if record.answered]
+        self.silent = [record for record in self.mine if not record.answered]
+        self.kernel = kernel_of(chunks).value
+        self.cold = [chunk.cold[adapter] for chunk in chunks if chunk.set == family and adapter in chunk.cold]
+        self.longest = frame_cap(cap, results.frames(family)) if results.moving(family) else cap
+
+    def count(self, outcome: str) -> int:
+        return sum(record.outcome == outcome for record in self.mine)
+
+    def middle(self, name: str, share: float = 0.5) -> float:
+        """A quantile over the answers."""
+        return middle([getattr(record, name) for record in self.answered], share)
+
+    def mean(self) -> Interval:
+        # the cap is of the processor's time: by the clock, a busy machine may take longer
+        return shifted_geometric_mean(
+            [min(one.seconds, self.longest) if one.success(COARSE) else self.longest for one in self.taken]
+        )
+
+    def effort(self) -> float:
+        efforts = (effort_excess(record, self.results.best(record)) for record in self.answered)
+        return middle([value for value in efforts if value < inf])
+
+    def tool(self) -> float:
+        return middle([record.tool_seconds / max(record.seconds, 1e-9) for record in self.answered])
+
+
 @dataclass(frozen=True)
 class Summary:
-    """One method in one set.
+    """One method in one set. Shares and times are with their intervals of 95 %.
 
     Attributes:
         cases, swept: given to it, fewer than asked for where it is too slow; and of these solved at all its budgets.
         refused, failed, overtime: cases without an answer: said so, broke, or took too long.
         said: the first refusal or exception.
         success, success_fine: share of the cases not refused that are solved to 1e-3 and to 1e-4, as judged.
-        success_low, success_high: Wilson's interval of the first.
         false_claims: answers called solved that are off by more than 1 mm.
         median_ms, p95_ms, cpu_median_ms: of a call (of a frame where goals move), over all answers.
-        median_low_ms, median_high_ms: bootstrap interval of the median.
-        mean_ms, mean_low_ms, mean_high_ms: shifted geometric mean over all cases not refused, with its interval; one
-            that is not solved counts as long as a solve, or on the average a frame, may take.
+        mean_ms: shifted geometric mean over all cases not refused; one that is not solved counts as long as a solve, or
+            on the average a frame, may take.
         kernels: the median of the processor's time in units of the reference kernel; NaN where that was not timed.
         cold_ms: median of the first solve in a process; NaN where no process was new.
         tool: share of the time within calls of the tool behind an adapter, median; 0 for methods of our own.
@@ -48,43 +79,37 @@ class Summary:
 
     set: str
     method: str
-    cases: int
-    swept: int
-    refused: int
-    failed: int
-    overtime: int
-    said: str
-    success: float
-    success_low: float
-    success_high: float
-    success_fine: float
-    false_claims: int
-    median_ms: float
-    median_low_ms: float
-    median_high_ms: float
-    mean_ms: float
-    mean_low_ms: float
-    mean_high_ms: float
-    kernels: float
-    cold_ms: float
-    p95_ms: float
-    cpu_median_ms: float
-    tool: float
-    setup_ms: float
-    iterations: float
-    programs: str
-    worst_median: float
-    deepest_mm: float
-    effort: float
-    frame_p95_ms: float
-    error_mm: float
-    jerk: float
-    turns: float
+    cases: int = field(metadata=of(lambda cell: len(cell.mine)))
+    swept: int = field(metadata=of(lambda cell: len(cell.results.swept(cell.set, cell.method))))
+    refused: int = field(metadata=of(lambda cell: cell.count(REFUSED)))
+    failed: int = field(metadata=of(lambda cell: cell.count(FAILED)))
+    overtime: int = field(metadata=of(lambda cell: cell.count(OVERTIME)))
+    said: str = field(metadata=of(lambda cell: cell.silent[0].said if cell.silent else ""))
+    success: Interval = field(metadata=of(lambda cell: share([one.success(COARSE) for one in cell.taken])))
+    success_fine: float = field(metadata=of(lambda cell: share([one.success(FINE) for one in cell.taken]).value))
+    false_claims: int = field(metadata=of(lambda cell: sum(one.false_claim for one in cell.mine)))
+    median_ms: Interval = field(metadata=of(lambda cell: median([one.seconds for one in cell.answered]).scaled(1e3)))
+    mean_ms: Interval = field(metadata=of(lambda cell: cell.mean().scaled(1e3)))
+    kernels: float = field(metadata=of(lambda cell: cell.middle("cpu_seconds") / cell.kernel))
+    cold_ms: float = field(metadata=of(lambda cell: 1e3 * middle(cell.cold)))
+    p95_ms: float = field(metadata=of(lambda cell: 1e3 * cell.middle("seconds", 0.95)))
+    cpu_median_ms: float = field(metadata=of(lambda cell: 1e3 * cell.middle("cpu_seconds")))
+    tool: float = field(metadata=of(lambda cell: cell.tool()))
+    setup_ms: float = field(metadata=of(lambda cell: 1e3 * cell.middle("setup_seconds")))
+    iterations: float = field(metadata=of(lambda cell: cell.middle("iterations")))
+    programs: str = field(metadata=of(lambda cell: summed_programs(one.programs for one in cell.answered)))
+    worst_median: float = field(metadata=of(lambda cell: cell.middle("worst")))
+    deepest_mm: float = field(metadata=of(lambda cell: 1e3 * max((r.penetration for r in cell.answered), default=nan)))
+    effort: float = field(metadata=of(lambda cell: cell.effort()))
+    frame_p95_ms: float = field(metadata=of(lambda cell: 1e3 * cell.middle("frame_p95", 0.95)))
+    error_mm: float = field(metadata=of(lambda cell: 1e3 * cell.middle("missed")))
+    jerk: float = field(metadata=of(lambda cell: cell.middle("jerk")))
+    turns: float = field(metadata=of(lambda cell: cell.middle("turns")))
 
     @property
     def dependable(self) -> bool:
         """Whether it takes all cases and solves as many as a dependable method does."""
-        return not self.refused and self.success >= GOOD
+        return not self.refused and self.success.value >= GOOD
 
 
 def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = CAP) -> list[Summary]:
@@ -95,76 +120,13 @@ def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = CAP) 
         chunks: what was timed beside them: the reference kernel, and first solves.
         cap: seconds of the processor's time after which a solve was ended.
     """
-    kernel = kernel_of(chunks).value
-    return [
-        _summary(results, family, adapter, [chunk.cold for chunk in chunks if chunk.set == family], kernel, cap)
-        for family in results.sets
-        for adapter in results.adapters
-        if results.default(family, adapter)
-    ]
+    cells = (_Cell(results, family, adapter, chunks, cap) for family in results.sets for adapter in results.adapters)
+    return [filled(Summary, cell) for cell in cells if cell.mine]
 
 
 def kernel_of(chunks: Sequence[Chunk]) -> Interval:
     """Median seconds of the reference kernel over a run, with its interval; NaN where it was not timed."""
     return median([chunk.kernel for chunk in chunks if chunk.kernel > 0.0])
-
-
-def _summary(
-    results: Results, family: str, adapter: str, cold: Sequence[Mapping[str, float]], kernel: float, cap: float
-) -> Summary:
-    mine, taken = results.default(family, adapter), results.taken(family, adapter)
-    answered = [record for record in mine if record.answered]
-    efforts = [value for record in answered if (value := effort_excess(record, results.best(record))) < inf]
-    silent = [record for record in mine if not record.answered]
-
-    solved, fine = (share([record.success(tolerance) for record in taken]) for tolerance in (COARSE, FINE))
-    usual = median([record.seconds for record in answered])
-    cpu = middle([record.cpu_seconds for record in answered])
-    longest = frame_cap(cap, results.frames(family)) if results.moving(family) else cap
-    # the cap is of the processor's time: by the clock, a busy machine may take longer
-    mean = shifted_geometric_mean(
-        [min(record.seconds, longest) if record.success(COARSE) else longest for record in taken]
-    )
-
-    def count(outcome: str) -> int:
-        return sum(record.outcome == outcome for record in mine)
-
-    return Summary(
-        set=family,
-        method=adapter,
-        cases=len(mine),
-        swept=len(results.swept(family, adapter)),
-        refused=count(REFUSED),
-        failed=count(FAILED),
-        overtime=count(OVERTIME),
-        said=silent[0].said if silent else "",
-        success=solved.value,
-        success_low=solved.low,
-        success_high=solved.high,
-        success_fine=fine.value,
-        false_claims=sum(record.false_claim for record in mine),
-        median_ms=1e3 * usual.value,
-        median_low_ms=1e3 * usual.low,
-        median_high_ms=1e3 * usual.high,
-        mean_ms=1e3 * mean.value,
-        mean_low_ms=1e3 * mean.low,
-        mean_high_ms=1e3 * mean.high,
-        kernels=cpu / kernel,
-        cold_ms=1e3 * middle([seconds[adapter] for seconds in cold if adapter in seconds]),
-        p95_ms=1e3 * middle([record.seconds for record in answered], 0.95),
-        cpu_median_ms=1e3 * cpu,
-        tool=middle([record.tool_seconds / max(record.seconds, 1e-9) for record in answered]),
-        setup_ms=1e3 * middle([record.setup_seconds for record in answered]),
-        iterations=middle([record.iterations for record in answered]),
-        programs=summed_programs(record.programs for record in answered),
-        worst_median=middle([record.worst for record in answered]),
-        deepest_mm=1e3 * max((record.penetration for record in answered), default=nan),
-        effort=middle(efforts),
-        frame_p95_ms=1e3 * middle([record.frame_p95 for record in answered], 0.95),
-        error_mm=1e3 * middle([record.missed for record in answered]),
-        jerk=middle([record.jerk for record in answered]),
-        turns=middle([record.turns for record in answered]),
-    )
 
 
 class Excluded(NamedTuple):

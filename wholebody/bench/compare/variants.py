@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.bench.adapters.starts import FAMILY, ONE
+from wholebody.bench.adapters.starts import ONE, STARTS
 from wholebody.bench.compare import paired
 from wholebody.bench.compare.advice import percent
 from wholebody.bench.compare.record import COARSE
 from wholebody.bench.compare.results import Results
-from wholebody.bench.compare.statistics import LEAST, Interval, ratio, share
 from wholebody.bench.report import render
+from wholebody.bench.statistics import LEAST, Interval, ratio, share
 
 SHOWN = ("self_contact", "passage")
 """Sets in which starts decide most of what is solved."""
@@ -50,7 +50,7 @@ def starts(results: Results) -> list[Starts]:
         first.setdefault(name.partition("/")[0], name)
     found = []
     for family, name in first.items():
-        one, several = f"{family}/{ONE}", f"{family}/{FAMILY}"
+        one, several = f"{family}/{ONE}", f"{family}/{STARTS}"
         pair = (one, name) if one in results.adapters else (name, several)
         if set(pair) <= set(results.adapters):
             shown = [each for each in SHOWN if each in results.sets]

@@ -14,7 +14,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.motion.cases import RATE
-from wholebody.bench.motion.report import LOOKS
+from wholebody.bench.motion.report import STYLES
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.files import Scratch, make_folder, write
@@ -239,12 +239,12 @@ def _curves(drawing: Drawing, before: Clip, after: Mapping[str, Clip], shown: Cl
             before.times, np.degrees(before.q[:, place]), color="#000000", linewidth=2.4, alpha=0.35, label="before"
         )
         for method, clip in after.items():
-            axis.plot(clip.times, np.degrees(clip.q[:, place]), label=method, **_look(method))
+            axis.plot(clip.times, np.degrees(clip.q[:, place]), label=method, **_style(method))
         axis.set_title(f"{columns[column].replace('_', ' ')}, degrees", fontsize=10)
     last = axes[0][2]
     title, measured = _about(drawing, before)
     for method, clip in after.items():
-        last.plot(clip.times, 1e3 * measured(clip), **_look(method))
+        last.plot(clip.times, 1e3 * measured(clip), **_style(method))
     last.set_title(title, fontsize=10)
     for axis in axes[0]:
         axis.set_xlabel("s")
@@ -252,10 +252,10 @@ def _curves(drawing: Drawing, before: Clip, after: Mapping[str, Clip], shown: Cl
     return plot_style.save(drawn, path)
 
 
-def _look(method: str) -> dict[str, Any]:
-    if method in LOOKS:
-        return {"color": LOOKS[method][0], "linewidth": 1.1}
-    return {"color": LOOKS["bisection"][0], "linewidth": 1.1, "linestyle": ":"}
+def _style(method: str) -> dict[str, Any]:
+    if method in STYLES:
+        return {"color": STYLES[method][0], "linewidth": 1.1}
+    return {"color": STYLES["bisection"][0], "linewidth": 1.1, "linestyle": ":"}
 
 
 def _about(drawing: Drawing, before: Clip) -> tuple[str, Callable[[Clip], Array]]:

@@ -27,7 +27,7 @@ REAL_TIME = {"check": 0.1, "bisection": 1.0, "frames": 1.0, "trajectory": 2.0}
 BESIDE = (CHECKED, NEAREST)
 """What stands in place of a method."""
 
-LOOKS = {"trajectory": ("#0072b2", "o"), "bisection": ("#d55e00", "s"), "frames": ("#009e73", "^"),
+STYLES = {"trajectory": ("#0072b2", "o"), "bisection": ("#d55e00", "s"), "frames": ("#009e73", "^"),
          "fade": ("#8c8c8c", "X"), "check": ("#000000", ".")}  # fmt: skip
 
 DRAWN = (
@@ -197,7 +197,7 @@ def chart(rows: Sequence[MotionRow], path: Path) -> tuple[Path, Path]:
     drawn, axes = plot_style.figure(1, len(DRAWN), (10.5, 3.6))
     for axis, (name, title, asked) in zip(axes[0], DRAWN, strict=True):
         for each in standings([row for row in rows if row.method not in BESIDE]):
-            color, marker = LOOKS.get(each.method, ("#882255", "p"))
+            color, marker = STYLES.get(each.method, ("#882255", "p"))
             for outcome, face in (("free", color), ("left", "none")):
                 own = [row for row in each.rows if row.outcome == outcome]
                 axis.scatter(
@@ -223,7 +223,7 @@ def check_chart(rows: Sequence[MotionRow], path: Path) -> tuple[Path, Path]:
     drawn, axes = plot_style.figure(1, 1, (7.4, 0.9 + 0.32 * len(names)))
     axis = axes[0][0]
     for row in own:
-        color, marker = LOOKS.get(row.method, ("#882255", "p"))
+        color, marker = STYLES.get(row.method, ("#882255", "p"))
         axis.scatter(row.check_ms, names.index(row.clip), s=18, color=color, marker=marker)
     axis.axvline(1e3 / 30.0 / 10.0, color="#555555", linewidth=0.9, linestyle=":")
     axis.set_yticks(range(len(names)), names)

@@ -21,6 +21,12 @@ TRIES = 5000
 """Places that are tried for one thing: many times what the most crowded postures have needed."""
 
 
+def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3) -> float:
+    """Signed distance of two shapes of coal at placements, metres: a call of its own, which keeps nothing."""
+    put, other = (coal.Transform3s(place.rotation, place.translation) for place in (at, there))
+    return float(coal.distance(first, put, second, other, coal.DistanceRequest(), coal.DistanceResult()))
+
+
 class Occupied:
     """The space that a figure takes up in some postures.
 
@@ -70,12 +76,8 @@ class Occupied:
 
     def _distances(self, geometry: Any, there: pin.SE3, numbers: Iterable[int]) -> Iterator[float]:
         """Signed distances of a piece from some of the figure's, metres."""
-        put = coal.Transform3s(there.rotation, there.translation)
         for number in numbers:
-            place = self.places[number]
-            other = coal.Transform3s(place.rotation, place.translation)
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            yield float(coal.distance(geometry, put, self._shapes[number], other, request, result))
+            yield coal_distance(geometry, there, self._shapes[number], self.places[number])
 
 
 def add_things(

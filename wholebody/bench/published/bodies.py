@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
+from wholebody.bench.published.reading import VERSION
 from wholebody.bench.published.shapes import Meshes, described, pose_of
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
@@ -69,7 +70,7 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     bounds = {joint: limits[place[joint].idx_q] for joint in joints if place[joint].idx_q in limits}
     content = {
         "format": "wholebody body",
-        "version": "1.0",
+        "version": VERSION,
         "name": name,
         "urdf": f"bodies/{name}.urdf",
         "root": figure.root,

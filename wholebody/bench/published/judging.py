@@ -8,13 +8,15 @@ from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
-from wholebody.bench.compare.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.published.answers import SEEDS, Answer, Answers
 from wholebody.bench.published.reading import VERSION, read_index, read_json
 from wholebody.bench.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, worst_of
+from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
+from wholebody.bench.tables import flat
 
 FINE = 1e-4  # m, rad: the stricter of the two accuracies
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time
+SHARE = ("share_low", "share_high")  # in the file of a verdict, low and high alone
 ANSWERED, REFUSED, UNANSWERED = "answered", "refused", "unanswered"
 NONE = Score(inf, inf, inf, inf, inf, inf, inf)
 
@@ -179,13 +181,7 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _row(row: SetScore) -> dict[str, Any]:
-    plain = asdict(row)
-    named = {"share": row.share.value, "low": row.share.low, "high": row.share.high}
-    for key in ("share", "share_fine", "worst", "effort_above", "seconds", "mean_seconds"):
-        found = plain.pop(key)
-        if key != "share":
-            named |= {key: found[0], f"{key}_low": found[1], f"{key}_high": found[2]}
-    return {**plain, **named}
+    return {name.removeprefix("share_") if name in SHARE else name: value for name, value in flat(row).items()}
 
 
 def _answer(one: Judged) -> dict[str, Any]:

@@ -6,21 +6,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf, isfinite
 from pathlib import Path
-from typing import Any
 
 from numpy import nan_to_num
 
 from wholebody.bench import plot_style
 from wholebody.bench.compare.pages import write_page
 from wholebody.bench.compare.rankings import in_words
-from wholebody.bench.compare.statistics import Ranking, ranking, ratio
 from wholebody.bench.plot_style import Style, method_style
 from wholebody.bench.published.answers import read_answers
 from wholebody.bench.published.judging import ANSWERED, Judged, SetScore, Verdict, judge, set_score
 from wholebody.bench.published.reading import read_index
 from wholebody.bench.published.rebuilt import EXACT
 from wholebody.bench.published.words import cells, left_out
-from wholebody.bench.report import render, words
+from wholebody.bench.report import render, spanned, words
+from wholebody.bench.statistics import Ranking, ranking, ratio
 from wholebody.bench.tables import write_text
 from wholebody.errors import InputError
 from wholebody.files import is_folder
@@ -133,7 +132,7 @@ def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
         return ["Nobody took every problem and solved one."]
     first, *others = board.leading
     best = dict(board.rows)[first].share
-    said = [f"**{first}** solves {100 * best.value:.0f} % [{100 * best.low:.0f}, {100 * best.high:.0f}]."]
+    said = [f"**{first}** solves {spanned(best, '.0f', 100.0, ' %')}."]
     if others:
         said.append(f"{', '.join(others)} cannot be told apart from it by what they solve.")
     below = [name for name, row in board.rows if name not in board.leading and not row.refused]
@@ -191,31 +190,18 @@ def _in_kernels(verdict: Verdict) -> float:
 def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> list[Path]:
     """One row a set and seed: shares and mean times with their intervals; at most six methods a chart."""
     names = [verdict.answers.method for verdict in verdicts]
-    seen, drawn = styles(names), []
+    seen = styles(names)
+    rows = {
+        f"{words(board.set)}, {board.seed}": {
+            name: (row.share.scaled(100.0), row.mean_seconds.scaled(1e3)) for name, row in board.rows
+        }
+        for board in found
+    }
+    drawn = []
     for first in range(0, len(names), MOST):
-        part = names[first : first + MOST]
-        chart, axes = plot_style.figure(1, 2, (11.0, 1.2 + 0.7 * len(found)))
-        handles: dict[str, Any] = {}
-        for place, board in enumerate(found):
-            rows = dict(board.rows)
-            for number, name in enumerate(part):
-                if name in rows:
-                    y = place + 0.7 * ((number + 0.5) / len(part) - 0.5)
-                    spans = ((axes[0][0], rows[name].share, 100.0), (axes[0][1], rows[name].mean_seconds, 1e3))
-                    for panel, span, scale in spans:
-                        if isfinite(span.value):
-                            ends = scale * span.low, scale * span.high
-                            handles[name] = plot_style.band(panel, y, scale * span.value, ends, seen[name])
-        labels = [f"{words(board.set)}, {board.seed}" for board in found]
-        for panel, texts in zip(axes[0], (labels, [""] * len(labels)), strict=True):
-            panel.set_yticks(range(len(found)), texts)
-            panel.set_ylim(len(found) - 0.5, -0.5)
-        axes[0][0].set(xlabel="solved [%]", xlim=(-2.0, 102.0))
-        plot_style.plain_log(axes[0][1])
-        axes[0][1].set(xlabel="mean time; one that is not solved counts 10 s [ms]")
-        if handles:
-            chart.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=3, frameon=False)
-        drawn.append(plot_style.save(chart, out / "charts" / f"leaderboard-{first // MOST + 1}")[0])
+        part = {name: seen[name] for name in names[first : first + MOST]}
+        path = out / "charts" / f"leaderboard-{first // MOST + 1}"
+        drawn.append(plot_style.shares_and_times(rows, part, "one that is not solved counts 10 s", "", path)[0])
     return drawn
 
 

@@ -12,11 +12,11 @@ import wholebody as wb
 from wholebody.arrays import Array
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.published.bodies import BodyFiles
+from wholebody.bench.published.reading import VERSION
 from wholebody.bench.published.shapes import Meshes, described, pose_of
 from wholebody.errors import InputError
 from wholebody.tasks.base import Goal
 
-VERSION = "1.0"
 SAME = 1e-12  # m: clearances that differ by less are the same
 
 

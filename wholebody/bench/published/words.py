@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections import Counter
 from math import isfinite
 
-from wholebody.bench.compare.statistics import Interval
 from wholebody.bench.published.judging import ANSWERED, REFUSED, UNANSWERED, SetScore, Verdict
 from wholebody.bench.published.rebuilt import Score
-from wholebody.bench.report import formatted, words
+from wholebody.bench.report import formatted, spanned, words
 
 TURN = 6.3  # rad, m: a joint that is more than a turn out of its limits was hardly meant
 CRITERIA = {
@@ -38,14 +37,6 @@ def cells(row: SetScore) -> tuple[str, ...]:
         spanned(row.seconds, ".3g", 1e3),
         spanned(row.mean_seconds, ".3g", 1e3),
     )
-
-
-def spanned(found: Interval, spec: str, scale: float = 1.0) -> str:
-    """A figure and its interval, such as "98 [93, 99]"; empty without one."""
-    if found.value != found.value:
-        return ""
-    low, high = (formatted(scale * end, spec, none="none") for end in (found.low, found.high))
-    return f"{formatted(scale * found.value, spec, none='none')} [{low}, {high}]"
 
 
 def left_out(verdict: Verdict) -> list[str]:

@@ -5,16 +5,16 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.bench.compare.statistics import quantile, wilson
 from wholebody.bench.qp_programs.recording import Recorded
 from wholebody.bench.report import render
+from wholebody.bench.statistics import Interval, quantile, share
+from wholebody.bench.tables import filled, of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.osqp_solver import ActiveSetSolver
@@ -70,36 +70,43 @@ class QPRow:
 
 @dataclass(frozen=True)
 class QPSummary:
-    """All programs by one solver; times in microseconds, with 95 % intervals by the bootstrap.
+    """All programs by one solver; times in microseconds.
 
     Attributes:
         closed: programs that the solver closed itself, its active set corrected.
-        low, high: 95 % interval of the share of them (Wilson).
+        share: of them, with Wilson's interval.
         handed_on: programs that semismooth Newton steps closed, or another solver.
         failed: programs without an exact answer.
+        median_us, p95_us: with intervals by the bootstrap.
     """
 
     solver: str
-    programs: int
-    closed: int
-    low: float
-    high: float
-    handed_on: int
-    failed: int
-    median_us: float
-    median_low: float
-    median_high: float
-    p95_us: float
-    p95_low: float
-    p95_high: float
-    cpu_median_us: float
-    cpu_p95_us: float
-    iterations: float
-    own_error: float
-    own_worst: float
-    primal: float
-    dual: float
-    gap: float
+    programs: int = field(metadata=of(lambda rows: len(rows)))
+    closed: int = field(metadata=of(lambda rows: sum(map(_by_itself, rows))))
+    share: Interval = field(metadata=of(lambda rows: share([_by_itself(row) for row in rows])))
+    handed_on: int = field(metadata=of(lambda rows: sum(row.exact and not _by_itself(row) for row in rows)))
+    failed: int = field(metadata=of(lambda rows: sum(not row.exact for row in rows)))
+    median_us: Interval = field(metadata=of(lambda rows: quantile([row.wall_us for row in rows], 0.5)))
+    p95_us: Interval = field(metadata=of(lambda rows: quantile([row.wall_us for row in rows], 0.95)))
+    cpu_median_us: float = field(metadata=of(lambda rows: np.median([row.cpu_us for row in rows])))
+    cpu_p95_us: float = field(metadata=of(lambda rows: np.quantile([row.cpu_us for row in rows], 0.95)))
+    iterations: float = field(metadata=of(lambda rows: np.median([row.iterations for row in rows])))
+    own_error: float = field(metadata=of(lambda rows: _own(rows, 0.5)))
+    own_worst: float = field(metadata=of(lambda rows: _own(rows, 1.0)))
+    primal: float = field(metadata=of(lambda rows: max(row.primal for row in rows)))
+    dual: float = field(metadata=of(lambda rows: max(row.dual for row in rows)))
+    gap: float = field(metadata=of(lambda rows: max(row.gap for row in rows)))
+
+
+def _by_itself(row: QPRow) -> bool:
+    """Whether the solver that was asked closed a program."""
+    return row.by == (ACTIVE_SET if row.solver == ActiveSetSolver.name else row.solver)
+
+
+def _own(rows: Sequence[QPRow], part: float) -> float:
+    """A quantile of how far the solver's own answers are off, of those that it has."""
+    known = [row.own_error for row in rows if np.isfinite(row.own_error)]
+    return float(np.quantile(known, part)) if known else float("nan")
 
 
 def measure(
@@ -178,45 +185,7 @@ def residuals(program: QuadraticProgram, answer: QPSolution) -> Residuals:
 
 def summaries(rows: Sequence[QPRow], solvers: Sequence[str]) -> list[QPSummary]:
     """One row a solver."""
-    return [_summary(name, [row for row in rows if row.solver == name]) for name in solvers]
-
-
-def _summary(solver: str, mine: Sequence[QPRow]) -> QPSummary:
-    itself = ACTIVE_SET if solver == ActiveSetSolver.name else solver
-    closed = sum(row.by == itself for row in mine)
-    failed = sum(not row.exact for row in mine)
-    wall = np.array([row.wall_us for row in mine])
-    cpu = np.array([row.cpu_us for row in mine])
-    own = np.array([row.own_error for row in mine])
-    own = own[np.isfinite(own)]
-    share, median, p95 = wilson(closed, len(mine)), quantile(wall.tolist(), 0.5), quantile(wall.tolist(), 0.95)
-    return QPSummary(
-        solver=solver,
-        programs=len(mine),
-        closed=closed,
-        low=share[0],
-        high=share[1],
-        handed_on=len(mine) - closed - failed,
-        failed=failed,
-        median_us=float(np.median(wall)),
-        median_low=median.low,
-        median_high=median.high,
-        p95_us=float(np.quantile(wall, 0.95)),
-        p95_low=p95.low,
-        p95_high=p95.high,
-        cpu_median_us=float(np.median(cpu)),
-        cpu_p95_us=float(np.quantile(cpu, 0.95)),
-        iterations=float(np.median([row.iterations for row in mine])),
-        own_error=_quantile(own, 0.5),
-        own_worst=_quantile(own, 1.0),
-        primal=max(row.primal for row in mine),
-        dual=max(row.dual for row in mine),
-        gap=max(row.gap for row in mine),
-    )
-
-
-def _quantile(values: Array, share: float) -> float:
-    return float(np.quantile(values, share)) if len(values) else float("nan")
+    return [filled(QPSummary, [row for row in rows if row.solver == name], solver=name) for name in solvers]
 
 
 def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping[str, str]) -> str:

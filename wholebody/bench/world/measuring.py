@@ -12,6 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.bench.problem_sets.things import coal_distance
 from wholebody.bench.world.drops import GRAVITY, Drop
 from wholebody.bench.world.engines import ENGINES
 
@@ -19,7 +20,7 @@ PACKAGES = {"mujoco": "mujoco", "rapier": "rapier3d"}
 
 
 @dataclass(frozen=True)
-class WorldRow:
+class DropRow:
     """One drop in one engine.
 
     Attributes:
@@ -50,7 +51,7 @@ def installed(names: Sequence[str]) -> list[str]:
     return [name for name in names if name not in PACKAGES or util.find_spec(PACKAGES[name])]
 
 
-def measure(drop: Drop, engine: str, frames: int | None = None) -> WorldRow:
+def measure(drop: Drop, engine: str, frames: int | None = None) -> DropRow:
     """Run a drop in an engine, and judge the end of every frame.
 
     Args:
@@ -70,7 +71,7 @@ def measure(drop: Drop, engine: str, frames: int | None = None) -> WorldRow:
         depths.append(judge.deepest(poses))
         energies.append(judge.energy(poses, velocities))
     start = energies[0]
-    return WorldRow(
+    return DropRow(
         drop.name, engine, len(drop.sizes), count, 1e3 * float(np.median(times)),
         1e3 * float(np.quantile(times, 0.99)), 1e3 * drop.frame, 1e3 * max(depths),
         float(np.diff(energies).max()) / start, energies[-1] / start,
@@ -95,15 +96,11 @@ class Judge:
 
     def deepest(self, poses: Array) -> float:
         """Greatest depth of two things, or of one and the floor, metres; 0 if there is none."""
-        placed = [coal.Transform3s(pin.XYZQUATToSE3(pose).rotation, pose[:3]) for pose in poses]
+        placed = [pin.XYZQUATToSE3(pose) for pose in poses]
         depth = 0.0
         for k in np.flatnonzero(poses[:, 2] < self._reach):
-            depth = max(depth, -self._distance(self._floor, coal.Transform3s(), self._shapes[k], placed[k]))
+            depth = max(depth, -coal_distance(self._floor, pin.SE3.Identity(), self._shapes[k], placed[k]))
         apart = np.linalg.norm(poses[:, None, :3] - poses[None, :, :3], axis=2)
         for i, j in np.argwhere(np.triu(apart < self._reach[:, None] + self._reach[None], 1)):
-            depth = max(depth, -self._distance(self._shapes[i], placed[i], self._shapes[j], placed[j]))
+            depth = max(depth, -coal_distance(self._shapes[i], placed[i], self._shapes[j], placed[j]))
         return depth
-
-    @staticmethod
-    def _distance(first: object, at: object, second: object, there: object) -> float:
-        return float(coal.distance(first, at, second, there, coal.DistanceRequest(), coal.DistanceResult()))

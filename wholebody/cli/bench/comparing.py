@@ -31,7 +31,7 @@ anew. --jobs works on cases beside each other through joblib; --cluster does so 
     listed("--sets", "problem sets (default: all)"),
     listed(
         "--methods",
-        "methods, such as qp, newton or qp/daqp; all for every entrant (default: one of each algorithm, from one "
+        "methods, such as qp, newton or qp/daqp; all for every method (default: one of each algorithm, from one "
         "start and from several; with --quick as they come)",
     ),
     count("--cases", None, "problems of each set (default: 200)"),
