@@ -8,14 +8,17 @@ from __future__ import annotations
 
 import fcntl
 import os
+import re
 import shutil
 import stat
+import sys
 import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
+from typing import Any
 
 from wholebody.errors import FileFormatError, InputError, one_line
 
@@ -27,6 +30,15 @@ LARGEST = 1_000_000_000
 
 LONGEST_NAME = 200
 """Largest number of characters of a path in a message."""
+
+DEEPEST_KEY = 20
+"""Largest number of parts of a dotted key of TOML."""
+
+LONGEST_QUOTE = 300
+"""Largest number of characters of a message of the TOML reader that our message quotes."""
+
+_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST_KEY}}}""")
+_LONG_NUMBER = re.compile(r"[\d_]{4000}")
 
 PREFIX = "wholebody-scratch-"
 """Beginning of the names of our scratch folders."""
@@ -74,6 +86,35 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise FileFormatError(f"{kind} {_named(path)}, line {line}: is no UTF-8 text; save it in UTF-8") from None
+
+
+def parsed_toml(text: str, name: str) -> dict[str, Any]:
+    """What a text in TOML says.
+
+    Args:
+        text: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        FileFormatError: it is not TOML, or has keys, tables or numbers that a reader of TOML does not bear.
+    """
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    name = one_line(name)
+    if _DEEP_KEY.search(text):  # the reader's memory grows with the square of a key's parts
+        raise FileFormatError(f"{name}: a key has more than {DEEPEST_KEY} parts; two are the most that is needed")
+    try:
+        data: dict[str, Any] = tomllib.loads(text)
+        return data
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST_QUOTE)}") from None
+    except RecursionError:
+        raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; three are enough") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
+        raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
 
 
 def check_file(path: str | PathLike[str], kind: str) -> None:

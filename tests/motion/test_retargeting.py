@@ -184,7 +184,9 @@ def test_a_robot_follows(human: Figure, tmp_path: Path) -> None:
         ("[skelton]\n", "no table is called 'skelton'"),
         ("[skeleton]\nhead = 3", "head is 3; give the name"),
         ("skeleton = 3", "skeleton is 3; give names by role"),
-        ("[skeleton", r"bones\.toml: is no TOML"),
+        ("[skeleton", r"bones\.toml: is not TOML"),
+        pytest.param(f"[skeleton]\nhead = {'9' * 5000}", "a number has thousands of digits", id="digits"),
+        pytest.param(f"{'a.' * 5000}a = 1", "a key has more than 20 parts", id="parts"),
     ],
 )
 def test_wrong_names_of_bones_are_one_sentence(text: str, sentence: str, human: Figure, tmp_path: Path) -> None:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import os
 import re
-import sys
 from collections.abc import Mapping
 from typing import NamedTuple
 
 from wholebody.checks import path as checked_path
 from wholebody.checks import shown
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
-from wholebody.files import read_text
+from wholebody.files import parsed_toml, read_text
 
 SIDED = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist", "hand")
 ROLES = ("pelvis", "chest", "neck", "head", *(f"{side}_{part}" for side in ("left", "right") for part in SIDED))
@@ -188,7 +187,7 @@ def _given(names: object) -> dict[str, Mapping[str, str]]:
         return {}
     if not isinstance(names, Mapping):
         path = checked_path(names, "names")
-        names = _toml(read_text(path, "names of bones"), path.name)
+        names = parsed_toml(read_text(path, "names of bones"), path.name)
     for key, table in names.items():
         if key not in ("skeleton", "figure"):
             raise UnknownNameError("table", str(key), ("skeleton", "figure"), "names of bones")
@@ -197,18 +196,6 @@ def _given(names: object) -> dict[str, Mapping[str, str]]:
                 f'names of bones: {key} is {shown(table)}; give names by role, such as left_knee = "LeftLeg"'
             )
     return dict(names)
-
-
-def _toml(text: str, name: str) -> Mapping[str, Mapping[str, str]]:
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
-    try:
-        found: Mapping[str, Mapping[str, str]] = tomllib.loads(text)
-        return found
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise FileFormatError(f"{name}: is no TOML ({error})") from None
 
 
 def _checked(table: Mapping[str, str], known: tuple[str, ...] | None, kind: str) -> dict[str, str]:

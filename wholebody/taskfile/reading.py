@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -11,19 +10,10 @@ from typing import Any, NamedTuple
 from wholebody.checks import shown
 from wholebody.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.files import is_file, read_text
+from wholebody.files import is_file, parsed_toml, read_text
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where
-
-DEEPEST = 20
-"""Largest number of parts of a dotted key."""
-
-LONGEST = 300
-"""Largest number of characters of a message of the TOML reader that our message quotes."""
-
-_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST}}}""")
-_LONG_NUMBER = re.compile(r"[\d_]{4000}")
 
 
 class Entry(NamedTuple):
@@ -110,7 +100,7 @@ def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
         UnknownNameError: there is no such file.
     """
     text = _text(path, kind)
-    return text, _parse(path, text)
+    return text, parsed_toml(text, path.name)
 
 
 def _text(path: Path, kind: str) -> str:
@@ -123,28 +113,6 @@ def _text(path: Path, kind: str) -> str:
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
         raise UnknownNameError(kind, path.name, there, one_line(str(path.parent))) from None
-
-
-def _parse(path: Path, text: str) -> dict[str, Any]:
-    import sys
-
-    if sys.version_info >= (3, 11):
-        import tomllib
-    else:
-        import tomli as tomllib
-    name = one_line(path.name)
-    if _DEEP_KEY.search(text):  # the reader's memory grows with the square of a key's parts
-        raise FileFormatError(f"{name}: a key has more than {DEEPEST} parts; a task has at most two")
-    try:
-        data: dict[str, Any] = tomllib.loads(text)
-        return data
-    except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST)}") from None
-    except RecursionError:
-        raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; a task has three") from None
-    except ValueError:  # Python reads no whole number of more than 4300 digits
-        line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
-        raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
 
 
 def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:
