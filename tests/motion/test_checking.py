@@ -13,7 +13,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.arrays import Array
-from wholebody.motion.clip_contacts import contact, contact_as_dict, runs
+from wholebody.motion.clip_contacts import contact, contact_as_dict
 from wholebody.motion.ready_equipment import equipment
 
 
@@ -167,12 +167,6 @@ def test_ctrl_c_ends_a_check(free_bodies: Callable[..., Any]) -> None:
     with pytest.raises(KeyboardInterrupt):
         wb.check(clip, progress=stop)
     assert wb.check(clip).free
-
-
-def test_runs() -> None:
-    starts, ends = runs(np.array([True, True, False, True, False, False, True]))
-    assert (starts.tolist(), ends.tolist()) == ([0, 3, 6], [2, 4, 7])
-    assert len(runs(np.zeros(4, dtype=bool))[0]) == 0
 
 
 def test_times_of_a_contact() -> None:

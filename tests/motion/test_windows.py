@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.motion.windows import Window, outwards, runs, windows
+from wholebody.motion.windows import Window, long_runs, outwards, runs, windows
 
 
 def marked(count: int, *frames: int) -> np.ndarray:
@@ -30,3 +30,8 @@ def test_outwards_visits_every_other_frame_once_from_its_neighbour() -> None:
     for frame, neighbour in visited:
         assert neighbour in seen
         seen.add(frame)
+
+
+def test_short_runs_are_left_out() -> None:
+    assert long_runs(marked(8, 0, 1, 4, 6, 7), 2).tolist() == marked(8, 0, 1, 6, 7).tolist()
+    assert long_runs(marked(3, 1), 0).tolist() == marked(3, 1).tolist()

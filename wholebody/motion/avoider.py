@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol
 
 from wholebody.arrays import Array
 from wholebody.checks import function, instance
-from wholebody.errors import InputError
+from wholebody.motion.checking import same_joints
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given
 from wholebody.motion.strength import Strength
@@ -91,11 +91,7 @@ def check_input(clip: object, scene: object, progress: object) -> None:
     instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
     assert isinstance(clip, Clip)
     assert isinstance(scene, Scene)
-    if list(scene.model.names) != list(clip.figure.model.names) or scene.model.nq != clip.figure.model.nq:
-        raise InputError(
-            f"avoid: the scene's figure {scene.figure.name} has other joints than the clip's {clip.figure.name}; make "
-            "the scene with wb.Scene(clip.figure)"
-        )
+    same_joints(clip, scene.figure, "avoid")
     function(progress, "avoid: progress")
 
 

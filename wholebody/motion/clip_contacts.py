@@ -6,10 +6,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.geometry.continuous.swept_depth import Depths
+from wholebody.motion.windows import runs
 from wholebody.scene import Scene
 
 Kind = Literal["self", "equipment", "thing"]
@@ -121,8 +121,8 @@ def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, t
     times = np.zeros(2 * len(depth) - 1)
     times[::2], times[1::2] = depth, between
     touching = times > tolerance
-    starts, ends = runs(touching)
-    long = int(np.argmax(ends - starts))
+    touched = runs(touching)
+    longest = max(touched, key=len)
     deepest = int(np.argmax(times))
     # a gap is never less deep than its ends: the frame is meant where it is as deep, to the accuracy of gaps
     beside = [k for k in (deepest - 1, deepest + 1) if 0 <= k < len(times) and times[k] >= 0.95 * times[deepest]]
@@ -134,11 +134,11 @@ def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, t
         kind=kind,
         frames=int(touching[::2].sum()),
         gaps=int(touching[1::2].sum()),
-        start=int(starts[0]) // 2,
+        start=touched[0].first // 2,
         deepest=float(times[deepest]),
         deepest_frame=deepest // 2,
         deepest_between=bool(deepest % 2),
-        longest=(int(starts[long]) // 2, int(ends[long]) // 2),
+        longest=(longest.first // 2, longest.end // 2),
         depth=depth,
         between=between,
     )
@@ -165,9 +165,3 @@ def contact_as_dict(contact: Contact, dt: float) -> dict[str, Any]:
             "seconds": (contact.longest[1] - contact.longest[0]) * dt,
         },
     }
-
-
-def runs(mask: NDArray[np.bool_]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """First places of the runs of true values of a mask (n,), and the places after their last ones."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return edges[::2].astype(np.intp), edges[1::2].astype(np.intp)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.motion.clip_contacts import runs
 from wholebody.motion.stance import StanceFeet, foot_points, standing
+from wholebody.motion.windows import runs
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ def slid(path: Array, stands: NDArray[np.bool_]) -> tuple[float, int]:
         The longest distance, metres, and its frame; 0 and 0 where it never stands.
     """
     far, at = 0.0, 0
-    for first, after in zip(*runs(stands), strict=True):
+    for first, after in runs(stands):
         away = np.linalg.norm(path[first:after, :2] - path[first, :2], axis=1)
         if away.max() > far:
             far, at = float(away.max()), int(first + np.argmax(away))

@@ -9,6 +9,8 @@ import numpy as np
 from wholebody.arrays import Array, Mask
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
+from wholebody.motion.stance import speeds
+from wholebody.motion.windows import Window, long_runs, runs
 
 SLOW = 0.15
 """Metres a second: a foot that is slower may stand."""
@@ -51,16 +53,16 @@ def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
             if f"{side}_{part}" in roles.joints
         }
         places = {role: motion.positions[:, joint] for role, joint in pair.items()}
-        speeds = {role: _speed(at, motion.dt) for role, at in places.items()}
-        slow = [at[speeds[role] < SLOW, 2] for role, at in places.items()]
+        speed = {role: speeds(at, motion.dt) for role, at in places.items()}
+        slow = [at[speed[role] < SLOW, 2] for role, at in places.items()]
         low = np.concatenate(slow) if slow else np.zeros(0)
         if not len(low):
             continue
         height = float(np.percentile(low, 10))
         for role, at in places.items():
             heights[role] = height
-            still = _apart(at, (speeds[role] < SLOW) & (at[:, 2] < height + LOW))
-            stands[role] = _longer(still, round(SHORTEST / motion.dt))
+            still = _apart(at, (speed[role] < SLOW) & (at[:, 2] < height + LOW))
+            stands[role] = long_runs(still, round(SHORTEST / motion.dt))
     for side in ("left", "right"):  # a heel stands only while the toes do, so that both keep the length of the foot
         if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
             stands[f"{side}_ankle"] &= stands[f"{side}_toe"]
@@ -120,37 +122,15 @@ def _blended(way: Array, places: list[tuple[int, int, Array]], over: int) -> Arr
     return found
 
 
-def runs(mask: Mask) -> list[tuple[int, int]]:
-    """First frame of each run, and the frame after its last one."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(int), [0]])))
-    return [(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]
-
-
-def _speed(places: Array, dt: float) -> Array:
-    if len(places) < 2:
-        return np.zeros(len(places))
-    found: Array = np.linalg.norm(np.gradient(places, dt, axis=0), axis=1)
-    return found
-
-
 def _apart(places: Array, mask: Mask) -> Mask:
     """The mask without the fastest frame of each run over which a foot goes on, so that it stands at several places."""
     kept: Mask = np.array(mask)
     waiting = runs(kept)
-    speeds = np.linalg.norm(np.gradient(places, axis=0), axis=1) if len(places) > 1 else np.zeros(len(places))
+    moved = speeds(places, 1.0)
     while waiting:
         first, last = waiting.pop()
         if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > DRIFT:
-            cut = first + 1 + int(speeds[first + 1 : last - 1].argmax())
+            cut = first + 1 + int(moved[first + 1 : last - 1].argmax())
             kept[cut] = False
-            waiting += [(first, cut), (cut + 1, last)]
-    return kept
-
-
-def _longer(mask: Mask, least: int) -> Mask:
-    """The mask without runs that are shorter."""
-    kept = np.zeros_like(mask)
-    for first, last in runs(mask):
-        if last - first >= max(1, least):
-            kept[first:last] = True
+            waiting += [Window(first, cut), Window(cut + 1, last)]
     return kept

@@ -13,8 +13,8 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.checking import ClipCheck, joint_jerk
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_contacts import runs
 from wholebody.motion.feet import paths, standing_points
+from wholebody.motion.windows import runs
 
 ROUNDING = 1e-9  # s: by which time steps may differ
 
@@ -89,7 +89,7 @@ def foot_sliding(before: Clip, after: Clip) -> float:
     old, new = (paths(clip.figure, clip.q, tuple(stand)) for clip in (before, after))
     for k, stands in enumerate(stand.values()):
         offset = (new[:, k] - old[:, k])[:, :2]
-        for first, end in zip(*runs(stands), strict=True):
+        for first, end in runs(stands):
             most = max(most, float(np.linalg.norm(offset[first:end] - offset[first], axis=1).max()))
     return most
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.motion.footfalls import Footfalls, held
+from wholebody.motion.footfalls import SMALL, Footfalls, held
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
 
@@ -32,9 +32,6 @@ SHORT = 0.4
 
 LIMB_ABOVE = {second: first for first, second in LIMBS}
 """Part of a limb to the part nearer to the trunk."""
-
-SMALL = 1e-9
-"""Metres: shorter ways have no direction."""
 
 
 class Targets(NamedTuple):

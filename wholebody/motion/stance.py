@@ -12,6 +12,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
+from wholebody.motion.windows import long_runs
 from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
@@ -97,14 +98,14 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     for frame, posture in enumerate(q):
         state.update(posture)
         places[frame] = [state.frame(figure.frame_id(name)).translation for name in names]
-    speeds = _speeds(places, dt)
+    speed = speeds(places, dt)
     shortest = max(1, round(settings.least / dt))
     found = {}
     for number, name in enumerate(names):
         height = places[:, number, 2]
         lowest = np.quantile(height, LOWEST_SHARE)
-        stand = (speeds[:, number] <= settings.speed) & (height <= lowest + settings.height)
-        found[name] = _long(stand, shortest)
+        stand = (speed[:, number] <= settings.speed) & (height <= lowest + settings.height)
+        found[name] = long_runs(stand, shortest)
     return found
 
 
@@ -123,18 +124,8 @@ def held_feet(figure: Figure, stand: Sequence[str]) -> tuple[Hold, ...]:
     return tuple(found)
 
 
-def _speeds(places: Array, dt: float) -> Array:
-    """(n, feet) speeds of places (n, feet, 3), central inside."""
+def speeds(places: Array, dt: float) -> Array:
+    """(n, ...) speeds of places (n, ..., 3), `dt` seconds apart; central inside."""
     if len(places) < 2:
-        return np.zeros(places.shape[:2])
-    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=2))
-
-
-def _long(stand: Mask, shortest: int) -> Mask:
-    """Marks of runs that are long enough."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], stand, [False]]).astype(np.int8)))
-    kept = np.zeros(len(stand), dtype=bool)
-    for first, end in edges.reshape(-1, 2):
-        if end - first >= shortest:
-            kept[first:end] = True
-    return kept
+        return np.zeros(places.shape[:-1])
+    return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))

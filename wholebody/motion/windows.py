@@ -30,6 +30,15 @@ def runs(wrong: Mask) -> list[Window]:
     return [Window(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
+def long_runs(marked: Mask, least: int) -> Mask:
+    """(n,) the marks of runs of `least` frames or more."""
+    kept = np.zeros(len(marked), dtype=bool)
+    for run in runs(marked):
+        if len(run) >= least:
+            kept[run.first : run.end] = True
+    return kept
+
+
 def windows(wrong: Mask, margin: int) -> list[Window]:
     """Windows around marked frames; those that meet are one.
 

@@ -104,8 +104,8 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
                 content = np.load(io.BytesIO(archive.read(entry)), allow_pickle=False)
                 if isinstance(content, np.ndarray):
                     arrays[entry.filename.removesuffix(".npy")] = content
-    except FileFormatError as error:
-        raise FileFormatError(f"{error}") from None
+    except FileFormatError:
+        raise
     except BROKEN as error:
         why = one_line(f"{type(error).__name__}: {error}")
         raise FileFormatError(f"{path.name}: is no npz file, or it is cut off or damaged ({why})") from None

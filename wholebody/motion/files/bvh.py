@@ -13,9 +13,9 @@ from wholebody.arrays import Array
 from wholebody.errors import FileFormatError, InputError, MissingPackageError
 from wholebody.files import read_text
 from wholebody.motion.files.bvh_text import BvhText, parsed
+from wholebody.motion.files.text import LARGEST_FILE
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit
 
-LARGEST = 500_000_000  # bytes: an hour of 75 joints at 120 frames a second
 STEADY = 0.01
 """Share of the skeleton's size by which the place of a joint in its parent may change before it is told."""
 
@@ -56,7 +56,7 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         MissingPackageError: pybvh is not installed.
     """
     library = pybvh()
-    found = parsed(read_text(path, "motion", LARGEST), path.name)
+    found = parsed(read_text(path, "motion", LARGEST_FILE), path.name)
     offsets, root, notes = _offsets(found)
     made = _pybvh_motion(library, found, offsets, root)
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)

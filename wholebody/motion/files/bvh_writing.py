@@ -15,7 +15,7 @@ from wholebody.files import Scratch
 from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.files.bvh import pybvh
-from wholebody.motion.files.nodes import OFF, nodes_of, postures, rotations
+from wholebody.motion.files.nodes import OFF, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
 
 ORDER = "ZXY"
@@ -96,12 +96,7 @@ def _angles(local: Array) -> Array:
     other = first * (1.0, -1.0, 1.0) + np.pi
     found = np.array(first)
     for k in range(1, frames):
-        near = [found[k - 1] + _wrapped(choice[k] - found[k - 1]) for choice in (first, other)]
+        near = [found[k - 1] + wrapped(choice[k] - found[k - 1]) for choice in (first, other)]
         jumps = [np.abs(choice - found[k - 1]).sum(axis=1) for choice in near]
         found[k] = np.where((jumps[1] < jumps[0])[:, None], near[1], near[0])
-    return found
-
-
-def _wrapped(angles: Array) -> Array:
-    found: Array = (angles + np.pi) % (2.0 * np.pi) - np.pi
     return found

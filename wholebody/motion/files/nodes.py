@@ -157,14 +157,14 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
         first = turned.as_davenport(axes, "intrinsic")
         mirrored = -1.0 if abs(axes[0] @ axes[2]) > 0.5 else 1.0  # axes as Z X Z, or as Z X Y
         other = first * (1.0, -mirrored, 1.0) + (np.pi, np.pi if mirrored > 0.0 else 0.0, np.pi)
-        off = np.abs(_wrapped(first[:, 2])) if count == 2 else np.zeros(len(first))
+        off = np.abs(wrapped(first[:, 2])) if count == 2 else np.zeros(len(first))
         # The other solution of two axes has half a turn about a third one, which the node has not.
         choices = first[:, :2][None] if count == 2 else np.stack([first, other])
     if (off > OFF).any():
         return None
     lower, upper = _ranges(figure, node)
     middle = 0.5 * (lower + upper)
-    choices = middle + _wrapped(choices - middle)
+    choices = middle + wrapped(choices - middle)
     beyond = (np.maximum(lower - choices, 0.0) + np.maximum(choices - upper, 0.0)).sum(axis=2)
     best = beyond.argmin(axis=0)
     chosen: Array = choices[best, np.arange(len(turns))]
@@ -181,7 +181,8 @@ def _ranges(figure: Figure, node: Node) -> tuple[Array, Array]:
     return np.array([low for low, _ in found]), np.array([high for _, high in found])
 
 
-def _wrapped(angles: Array) -> Array:
+def wrapped(angles: Array) -> Array:
+    """Angles between minus and plus half a turn, radians."""
     found: Array = (angles + np.pi) % (2.0 * np.pi) - np.pi
     return found
 

@@ -11,7 +11,7 @@ from wholebody.errors import FileFormatError, one_line
 from wholebody.tracking.tracks import LARGEST
 
 LARGEST_FILE = 500_000_000
-"""Bytes of a text file of motion."""
+"""Bytes of a text file of motion: an hour of 75 joints at 120 frames a second."""
 
 
 def number(word: str, where: str) -> float:
