@@ -73,8 +73,8 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     rows = []
     for number, cells in enumerate(given[1:], start=1):
         try:
-            found = dict(zip(names, cells, strict=True))
-            values = {name: _value(types[name], [found[each] for each in parts[name]]) for name in parts}
+            texts = dict(zip(names, cells, strict=True))
+            values = {name: _value(types[name], [texts[each] for each in parts[name]]) for name in parts}
             rows.append(kind(**values))
         except ValueError as error:
             raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
@@ -145,7 +145,8 @@ def _parts(name: str, kind: Any) -> tuple[str, ...]:
 
 def _value(kind: Any, texts: Sequence[str]) -> Any:
     if kind is Interval:
-        return Interval(*map(float, texts))
+        value, low, high = map(float, texts)
+        return Interval(value, low, high)
     (text,) = texts
     if kind is bool:
         if text not in ("True", "False"):

@@ -119,7 +119,10 @@ def read_lock(path: Path) -> Locked:
             tuple(map(str, content["methods"])),
             {name: float(content["amounts"][name]) for name in AMOUNTS},
             {str(name): str(value) for name, value in content["facts"].items()},
-            {(str(a), str(b), str(c)): Interval(*map(float, figure)) for a, b, c, *figure in content["figures"]},
+            {
+                (str(a), str(b), str(c)): Interval(float(value), float(low), float(high))
+                for a, b, c, value, low, high in content["figures"]
+            },
         )
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise FileFormatError(
