@@ -6,8 +6,7 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
-from four_bar import COUPLER, CRANK, GROUND, ROCKER, Array, Y, angle_of, closed_form
+from four_bar import COUPLER, CRANK, GROUND, ROCKER, Array, Y, angle_of, bar, closed_form
 from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
@@ -40,9 +39,6 @@ def rocker_at_post() -> float:
 def build() -> wb.Assembly:
     """Three bars with four joints, a slider on a rail, a post; the crank is driven by a goal for its tip."""
     coupler, rocker = closed_form(0.0)
-
-    def bar(x: float, z: float, angle: float) -> pin.SE3:
-        return pin.SE3(pin.rpy.rpyToMatrix(0.0, -angle, 0.0), np.array((x, 0.0, z)))
 
     def rod(length: float, y: float) -> list[tuple[wb.Shape, tuple[float, ...]]]:
         return [(wb.Capsule(RADIUS, length), (0.5 * length, y, 0.0, *ALONG_X))]

@@ -26,18 +26,18 @@ def main(
     out: Path = Path("pictures"),
     pictures: bool = True,
     clip: Path | None = None,
-    gear: str = "pack",
+    worn: str = "pack",
     method: str = "bisection",
 ) -> Avoided:
     """Free the clip, print a report, and write a chart and film strips."""
     figure = wb.load("human")
     walk = read(figure, clip)
     scene = wb.Scene(figure)
-    for piece in wb.equipment(gear, figure):
+    for piece in wb.equipment(worn, figure):
         piece.attach(scene)
     freed = wb.avoid(walk, scene, method=method)
     report = freed.report
-    print(f"{walk.name} with {gear}: {len(walk)} frames of {walk.dt:.4f} s, by {report.method}")
+    print(f"{walk.name} with {worn}: {len(walk)} frames of {walk.dt:.4f} s, by {report.method}")
     for name, found in (("before", report.before), ("after", report.after)):
         print(f"  {name}: {found.colliding} frames collide, {1e3 * found.deepest:.1f} mm at most; {found.dips} dips")
     print(
@@ -46,7 +46,7 @@ def main(
     print(f"  {report.message}")
     if pictures:
         out.mkdir(parents=True, exist_ok=True)
-        print(f"  {chart(walk, freed.clip, gear, out / 'free_a_clip_curves.png')}")
+        print(f"  {chart(walk, freed.clip, worn, out / 'free_a_clip_curves.png')}")
         film(scene, walk, freed.clip, out)
     return freed
 
@@ -71,7 +71,7 @@ def swing(figure: wb.Figure) -> wb.Clip:
     return wb.Clip(figure, np.array(q), 1 / 30, "swing")
 
 
-def chart(before: wb.Clip, after: wb.Clip, gear: str, path: Path) -> Path:
+def chart(before: wb.Clip, after: wb.Clip, worn: str, path: Path) -> Path:
     """Write the curves of the joints that change most, before and after."""
     away = np.abs(after.q - before.q)[:, -len(before.names) :].max(axis=0)
     most = np.argsort(-away)[:CURVES].tolist()
@@ -82,7 +82,7 @@ def chart(before: wb.Clip, after: wb.Clip, gear: str, path: Path) -> Path:
         axes.plot(after.times, np.degrees(after.q[:, column]), color="C0", label="after")
         axes.set_ylabel(before.names[joint].replace("_", " ") + " [°]", fontsize=7)
     drawn.axes[0].legend(loc="upper right", fontsize=8)
-    drawn.axes[0].set_title(f"{before.name} with {gear}", fontsize=10)
+    drawn.axes[0].set_title(f"{before.name} with {worn}", fontsize=10)
     drawn.axes[-1].set_xlabel("time [s]")
     drawn.savefig(path, dpi=110)
     return path
@@ -128,7 +128,7 @@ if __name__ == "__main__":
     parser.add_argument("--out", type=Path, default=Path("pictures"), help="folder for the pictures (./pictures)")
     parser.add_argument("--no-pictures", action="store_true", help="only solve and report")
     parser.add_argument("--clip", type=Path, help="a BVH or clip file")
-    parser.add_argument("--gear", default="pack", help="side_sphere, pouches, vest_plate, pack or torus")
+    parser.add_argument("--equipment", default="pack", help="side_sphere, pouches, vest_plate, pack or torus")
     parser.add_argument("--method", default="bisection", help="bisection, trajectory, frames or fade")
     options = parser.parse_args()
-    main(options.out, not options.no_pictures, options.clip, options.gear, options.method)
+    main(options.out, not options.no_pictures, options.clip, options.equipment, options.method)
