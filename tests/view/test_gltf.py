@@ -13,7 +13,7 @@ import trimesh
 
 import wholebody as wb
 from wholebody.cli import main
-from wholebody.view.gltf import triangles
+from wholebody.motion.files.gltf import triangles
 
 UP = np.array([[0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, 1.0]])
 """From our x forward, z up to glTF's z forward, y up."""

@@ -16,7 +16,7 @@ from wholebody.errors import MissingPackageError, WholebodyError
 from wholebody.methods import METHODS
 from wholebody.tracking.drag import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
-from wholebody.view.gltf import triangles
+from wholebody.view.gltf import drawn_triangles
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
@@ -98,7 +98,7 @@ class LivePage:
             thing = scene.objects.get(scene.piece_owner[number])
             color = SKIN if thing is None else _bytes(thing.color, number)
             opacity = THROUGH if thing is None else None if thing.color is None else thing.color[3]
-            mesh = triangles(piece.geometry)
+            mesh = drawn_triangles(piece.geometry)
             pieces.append(
                 self.server.scene.add_mesh_simple(
                     f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),

@@ -5,10 +5,11 @@ trimesh writes the meshes and the nodes. Its postprocessors add keyframes of rot
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
+import coal
 import numpy as np
 import pinocchio as pin
 
@@ -28,6 +29,12 @@ STILL = 1e-9
 COLOR = (214, 189, 165, 255)
 """Red, green, blue, alpha of the figure."""
 
+SECTIONS = (24, 24)
+"""Of what is round."""
+
+ROUGH = 0.8
+"""Of the material: 0 is a mirror."""
+
 MOST_KEYS = 20_000_000
 """Keyframes of all joints together: about 600 MB."""
 
@@ -42,7 +49,6 @@ def write(motion: Motion, path: Path) -> Path:
         MissingPackageError: trimesh is not installed.
     """
     try:
-        import trimesh
         from trimesh.exchange.gltf import export_glb
     except ImportError:
         raise MissingPackageError("writing glTF needs trimesh: pip install trimesh") from None
@@ -53,15 +59,9 @@ def write(motion: Motion, path: Path) -> Path:
     scene, names = joint_tree(
         figure.model, [pin.XYZQUATToSE3(np.r_[at, turn]) for turn, at in zip(keys[0][0], keys[1][0], strict=True)]
     )
-    material = trimesh.visual.material.PBRMaterial(baseColorFactor=COLOR, roughnessFactor=0.8, metallicFactor=0.0)
     for piece in figure.geometry.geometryObjects:
-        mesh = _mesh(trimesh, piece.geometry)
-        if mesh is not None:
-            mesh.visual = trimesh.visual.TextureVisuals(material=material)
-            scene.add_geometry(
-                mesh, node_name=f"piece {piece.name}", geom_name=f"mesh {piece.name}",
-                parent_node_name=names[piece.parentJoint], transform=piece.placement.homogeneous,
-            )  # fmt: skip
+        if not isinstance(piece.geometry, coal.Halfspace):  # it has no end
+            add_piece(scene, names, piece, triangles(piece.geometry), COLOR)
     animate = _Animation(motion, names, keys)
     return write_file(path, export_glb(scene, buffer_postprocessor=animate.buffers, tree_postprocessor=animate.tree))
 
@@ -154,17 +154,41 @@ def _keys(figure: Figure, q: Array) -> tuple[Array, Array]:
     return turns, places
 
 
-def _mesh(trimesh: Any, shape: Any) -> Any:
-    """Triangles of a convex piece; None for a half-space, which has no end."""
-    kind = type(shape).__name__
-    makers: dict[str, Callable[[], Any]] = {
-        "Sphere": lambda: trimesh.creation.icosphere(3, shape.radius),
-        "Box": lambda: trimesh.creation.box(2.0 * np.asarray(shape.halfSide)),
-        "Capsule": lambda: trimesh.creation.capsule(2.0 * shape.halfLength, shape.radius, count=[16, 16]),
-        "Ellipsoid": lambda: trimesh.creation.icosphere(3, 1.0).apply_scale(np.asarray(shape.radii)),
-    }
-    if kind in makers:
-        return makers[kind]()
-    if kind in ("Halfspace", "Plane"):
-        return None
-    return trimesh.convex.convex_hull(np.asarray(shape.points()))
+def add_piece(tree: Any, joints: Sequence[str], piece: Any, mesh: Any, color: Sequence[int]) -> None:
+    """Add a piece to a `joint_tree`, below the node of its joint.
+
+    Args:
+        tree: the trimesh.Scene.
+        joints: names of its nodes.
+        piece: of Pinocchio's geometry model.
+        mesh: a trimesh of it.
+        color: red, green, blue, alpha, each from 0 to 255.
+    """
+    from trimesh.visual import TextureVisuals
+    from trimesh.visual.material import PBRMaterial
+
+    blend = "BLEND" if color[3] < 255 else None
+    mesh.visual = TextureVisuals(
+        material=PBRMaterial(baseColorFactor=color, roughnessFactor=ROUGH, metallicFactor=0.0, alphaMode=blend)
+    )
+    tree.add_geometry(
+        mesh, node_name=f"piece {piece.name}", geom_name=f"mesh {piece.name}",
+        parent_node_name=joints[piece.parentJoint], transform=piece.placement.homogeneous,
+    )  # fmt: skip
+
+
+def triangles(shape: Any) -> Any:
+    """A trimesh of a coal shape of finite size, about the shape's own origin."""
+    from trimesh import convex, creation
+
+    if isinstance(shape, coal.Box):
+        return creation.box(2.0 * np.array(shape.halfSide))
+    if isinstance(shape, coal.Sphere):
+        return creation.icosphere(radius=shape.radius)
+    if isinstance(shape, coal.Capsule):
+        mesh = creation.capsule(2.0 * shape.halfLength, shape.radius, count=SECTIONS)
+        mesh.apply_translation(-mesh.bounds.mean(axis=0))  # not centred in every version
+        return mesh
+    if isinstance(shape, coal.Ellipsoid):
+        return creation.icosphere().apply_scale(np.array(shape.radii))
+    return convex.convex_hull(np.array(shape.points()))
