@@ -163,15 +163,20 @@ def contacts(figure: Figure, pictures: Path | None = None) -> list[ContactRow]:
 
 def distance(figure: Figure, q: Array, first: Collection[str], second: Collection[str]) -> float:
     """Least distance between the pieces of two groups of segments, metres, negative inside; whether tested or not."""
-    data, placed = figure.model.createData(), pin.GeometryData(figure.geometry)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
-    pieces = list(zip(figure.geometry.geometryObjects, placed.oMg, strict=True))
+    pieces = _placed(figure, q)
     apart = (
         coal_distance(a.geometry, at, b.geometry, where)
         for a, at in _of(pieces, first)
         for b, where in _of(pieces, second)
     )
     return min(apart, default=np.inf)
+
+
+def _placed(figure: Figure, q: Array) -> list[tuple[Any, Any]]:
+    """The pieces of a figure with their placements at a posture (nq,)."""
+    data, placed = figure.model.createData(), pin.GeometryData(figure.geometry)
+    pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
+    return list(zip(figure.geometry.geometryObjects, placed.oMg, strict=True))
 
 
 def _of(pieces: Sequence[tuple[Any, Any]], segments: Collection[str]) -> list[tuple[Any, Any]]:
@@ -204,9 +209,7 @@ def _thighs_on_seat(figure: Figure) -> ContactRow:
 
     bend = {f"{side}_{joint}_flexion": 0.5 * np.pi for side in ("left", "right") for joint in ("hip", "knee")}
     q = figure.with_joints(pin.neutral(figure.model), bend)
-    data, placed = figure.model.createData(), pin.GeometryData(figure.geometry)
-    pin.updateGeometryPlacements(figure.model, data, figure.geometry, placed, q)
-    pieces = list(zip(figure.geometry.geometryObjects, placed.oMg, strict=True))
+    pieces = _placed(figure, q)
     down = np.array([0.0, 0.0, -1.0])
     pelvis, thighs = (
         max(support(piece.geometry, place, down) for piece, place in _of(pieces, segments))

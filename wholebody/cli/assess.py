@@ -86,15 +86,12 @@ def _show(judged: Any, scores: Any) -> None:
     from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import judgement, table
 
     console = Console()
     made = table("judged", "")
     made.add_row("goals missed by", f"{1e3 * judged.goal_error:.3f} mm, {math.degrees(judged.goal_angle):.3f} deg")
-    made.add_row("deepest overlap", f"{1e3 * judged.penetration:.4f} mm")
-    made.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
-    made.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
-    console.print(made)
+    console.print(judgement(made, judged))
     if scores is not None:
         made = table("ergonomics", "left", "right", "worse")
         made.columns[3].justify = "left"

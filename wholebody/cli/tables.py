@@ -14,6 +14,7 @@ from wholebody.figures.state import State
 from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
+    from wholebody.assessment import Assessment
     from wholebody.figures import Figure
     from wholebody.problem import Problem
     from wholebody.solution import Solution
@@ -67,12 +68,17 @@ def show_solution(console: Console, task: Task, solution: Solution) -> None:
     console.print(_goals(task, solution))
     console.print(_contacts(problem, solution))
     console.print(_measures(problem, solution))
-    held = table("judged independently", "", title="")
-    held.add_row("deepest penetration", f"{1e3 * judged.penetration:.4f} mm")
-    held.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
-    held.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
+    held = judgement(table("judged independently", ""), judged)
     held.add_row("first-order optimality", f"{judged.optimality:.1e}")
     console.print(held)
+
+
+def judgement(made: Table, judged: Assessment) -> Table:
+    """The table with a row for everything that must hold."""
+    made.add_row("deepest penetration", f"{1e3 * judged.penetration:.4f} mm")
+    made.add_row("limits, worst violation", f"{math.degrees(judged.limit_violation):.4f} deg")
+    made.add_row("constraints, worst violation", f"{1e3 * judged.constraint_violation:.4f} mm or mrad")
+    return made
 
 
 def _goals(task: Task, solution: Solution) -> Table:
