@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Judged, Pairs, judge
-from wholebody.bench.attack.things import Thing, clear, inside, seven
+from wholebody.bench.attack.things import Thing, clear, inside, xyzquat
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.methods import METHODS, installed_methods
 from wholebody.methods.solve import method_named
@@ -63,36 +63,36 @@ print(verdict)
 
 
 @dataclass
-class Asked:
-    """What is asked, while it is being made up.
+class Terms:
+    """Goals and constraints, while they are being made up.
 
     Attributes:
         goals, constraints: as Python.
-        can: whether the witness fits all of it.
+        feasible: whether the witness fits all of it.
     """
 
     goals: list[str] = field(default_factory=list)
     constraints: list[str] = field(default_factory=list)
-    can: bool = True
+    feasible: bool = True
 
 
 def written(rng: np.random.Generator) -> Written:
     """Write a solve."""
     figure = body(rng)
     clearance = float(CLEARANCES[int(rng.integers(len(CLEARANCES)))]) * min(1.0, figure.size)
-    start = begun(figure, rng)
+    start = start_posture(figure, rng)
     witness = figure.clear(start, float(rng.choice([0.1, 0.4, 1.0])), rng, clearance + 1e-4 * figure.size)
     things = around(figure, start, witness, clearance, rng)
-    asked = wishes(figure, start, witness, rng)
-    known = witness is not None and asked.can and bool(asked.goals) and _clear(figure, witness, things, clearance)
+    terms = random_terms(figure, start, witness, rng)
+    known = witness is not None and terms.feasible and bool(terms.goals) and _clear(figure, witness, things, clearance)
     chosen = ASKED_OF[int(rng.integers(len(ASKED_OF)))]
     measures = MEASURES[int(rng.integers(len(MEASURES)))]
     title = f"{figure.figure.name} among {len(things)} things; {'a posture that fits is known' if known else 'made up'}"
     tail = TAIL.format(measures=measures, clearance=clearance, method=chosen, witness=known)
-    return Written(opening(title, figure, start, things, asked, "solves") + tail, figure.files)
+    return Written(script_head(title, figure, start, things, terms, "solves") + tail, figure.files)
 
 
-def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: Asked, judge: str) -> str:
+def script_head(title: str, figure: Body, start: Array, things: list[Thing], terms: Terms, judge: str) -> str:
     """Return the script up to the problem: figure, scene, start, goals, constraints; `judge` is its judging module."""
     imports = f"from wholebody.bench.attack import {judge}\n"
     if "_path" in figure.call:
@@ -102,13 +102,13 @@ def opening(title: str, figure: Body, start: Array, things: list[Thing], asked: 
         "scene = wb.Scene(figure)",
         *(thing.line(f"thing {number}") for number, thing in enumerate(things)),
         f"start = np.array({start.tolist()!r})",
-        f"goals = [{', '.join(asked.goals)}]",
-        f"constraints = [{', '.join(asked.constraints)}]",
+        f"goals = [{', '.join(terms.goals)}]",
+        f"constraints = [{', '.join(terms.constraints)}]",
     ]
     return HEAD.format(title=title, imports=imports) + "\n".join(lines)
 
 
-def begun(figure: Body, rng: np.random.Generator) -> Array:
+def start_posture(figure: Body, rng: np.random.Generator) -> Array:
     """Return a posture (nq,) to start from: a named one, or one at random."""
     names = figure.figure.postures
     q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
@@ -139,55 +139,55 @@ def _clear(figure: Body, witness: Array, things: list[Thing], clearance: float) 
     return all(placed.distance(thing.shape, thing.placement, 0) > clearance for thing in things)
 
 
-def wishes(figure: Body, start: Array, witness: Array | None, rng: np.random.Generator) -> Asked:
+def random_terms(figure: Body, start: Array, witness: Array | None, rng: np.random.Generator) -> Terms:
     """Return goals and constraints: what the witness fits, what is out of reach, what contradicts."""
-    asked, model = Asked(), figure.figure.model
+    terms, model = Terms(), figure.figure.model
     data, before = model.createData(), model.createData()
     pin.framesForwardKinematics(model, before, start)
     shown = start if witness is None else witness
     pin.framesForwardKinematics(model, data, shown)
     pin.centerOfMass(model, data, shown)
-    mood = rng.choice(["fits", "far", "contradicts", "nothing"], p=[0.68, 0.15, 0.13, 0.04])
+    aim = rng.choice(["fits", "far", "contradicts", "nothing"], p=[0.68, 0.15, 0.13, 0.04])
     frames = list(rng.permutation(figure.frames))
-    for name in map(str, frames[: int(rng.integers(1, 4))] if mood != "nothing" else []):
-        asked.goals.append(_goal(name, data.oMf[model.getFrameId(name)], data.com[0], shown, rng))
-    if mood == "far":
+    for name in map(str, frames[: int(rng.integers(1, 4))] if aim != "nothing" else []):
+        terms.goals.append(_goal(name, data.oMf[model.getFrameId(name)], data.com[0], shown, rng))
+    if aim == "far":
         way = rng.normal(size=3)
         way *= figure.size * float(rng.choice([0.02, 0.3, 1.0, 5.0, 40.0])) / np.linalg.norm(way)
         place = np.clip(data.oMf[model.getFrameId(str(frames[0]))].translation + way, -FARTHEST, FARTHEST)
-        asked.goals.append(f"wb.Point({str(frames[0])!r}, {three(place)})")
-        asked.can = False
-    if mood == "contradicts":
-        asked.can = False
+        terms.goals.append(f"wb.Point({str(frames[0])!r}, {number_text(place)})")
+        terms.feasible = False
+    if aim == "contradicts":
+        terms.feasible = False
         place = data.oMf[model.getFrameId(str(frames[0]))].translation
         for sign in (-1.0, 1.0):
-            asked.goals.append(f"wb.Point({str(frames[0])!r}, {three(place + sign * 0.1 * figure.size)})")
+            terms.goals.append(f"wb.Point({str(frames[0])!r}, {number_text(place + sign * 0.1 * figure.size)})")
         if rng.random() < 0.5:
-            asked.constraints.append(f"wb.Hold({str(frames[0])!r}, {three(place + 0.3 * figure.size)})")
-    _hold(figure, start, witness, before, data, asked, rng)
-    return asked
+            terms.constraints.append(f"wb.Hold({str(frames[0])!r}, {number_text(place + 0.3 * figure.size)})")
+    _hold(figure, start, witness, before, data, terms, rng)
+    return terms
 
 
 def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generator) -> str:
     kind = rng.choice(["Point", "Point", "Point", "Frame", "Orientation", "Axis", "CenterOfMass", "Posture"])
     weight = f", weight={float(np.exp(rng.uniform(-4.0, 4.0)))!r}" if rng.random() < 0.2 else ""
     if kind == "Frame":
-        return f"wb.Frame({name!r}, {seven(at)}{weight})"
+        return f"wb.Frame({name!r}, {xyzquat(at)}{weight})"
     if kind == "Orientation":
-        return f"wb.Orientation({name!r}, {seven(at)[3:]}{weight})"
+        return f"wb.Orientation({name!r}, {xyzquat(at)[3:]}{weight})"
     if kind == "Axis":
         axis = rng.normal(size=3)
-        return f"wb.Axis({name!r}, {three(axis)}, direction={three(at.rotation @ axis)}{weight})"
+        return f"wb.Axis({name!r}, {number_text(axis)}, direction={number_text(at.rotation @ axis)}{weight})"
     if kind == "CenterOfMass":
         axes = ("xy", "xyz")[int(rng.integers(2))]
-        return f"wb.CenterOfMass({three(mass)}, axes={axes!r}{weight})"
+        return f"wb.CenterOfMass({number_text(mass)}, axes={axes!r}{weight})"
     if kind == "Posture" and rng.random() < 0.3:
         return f"wb.Posture(np.array({q.tolist()!r}){weight})"
-    return f"wb.Point({name!r}, {three(at.translation)}{weight})"
+    return f"wb.Point({name!r}, {number_text(at.translation)}{weight})"
 
 
 def _hold(
-    figure: Body, start: Array, witness: Array | None, before: pin.Data, data: pin.Data, asked: Asked,
+    figure: Body, start: Array, witness: Array | None, before: pin.Data, data: pin.Data, terms: Terms,
     rng: np.random.Generator,
 ) -> None:  # fmt: skip
     """Add constraints: mostly those that the witness fits, for it does not move what they keep."""
@@ -196,26 +196,28 @@ def _hold(
         number = model.getFrameId(name)
         still = witness is not None and np.allclose(before.oMf[number].homogeneous, data.oMf[number].homogeneous)
         if still or rng.random() < 0.1:
-            asked.constraints.append(f"wb.Hold({name!r}{', orientation=False' if rng.random() < 0.3 else ''})")
-            asked.can &= bool(still)
+            terms.constraints.append(f"wb.Hold({name!r}{', orientation=False' if rng.random() < 0.3 else ''})")
+            terms.feasible &= bool(still)
     if rng.random() < 0.15:
         name = str(rng.permutation(figure.frames)[0])
         normal = rng.normal(size=3)
         place = data.oMf[model.getFrameId(name)].translation
         side = ("on", "above")[int(rng.integers(2))]
-        asked.constraints.append(f"wb.Plane({name!r}, {three(normal)}, point={three(place)}, side={side!r})")
+        terms.constraints.append(
+            f"wb.Plane({name!r}, {number_text(normal)}, point={number_text(place)}, side={side!r})"
+        )
     joints = figure.figure.joints
     if rng.random() < 0.15 and len(joints) > 1:
         chosen = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]
         way = pin.difference(model, start, start if witness is None else witness)
-        asked.can &= not way[figure.figure.dofs(chosen)].any()
-        asked.constraints.append(f"wb.Freeze(*{chosen!r})")
+        terms.feasible &= not way[figure.figure.dofs(chosen)].any()
+        terms.constraints.append(f"wb.Freeze(*{chosen!r})")
     if figure.people and rng.random() < 0.1:
-        asked.can = False  # whether the witness balances is not looked at
-        asked.constraints.append("wb.Balance()" if rng.random() < 0.7 else "wb.ReachCones()")
+        terms.feasible = False  # whether the witness balances is not looked at
+        terms.constraints.append("wb.Balance()" if rng.random() < 0.7 else "wb.ReachCones()")
 
 
-def three(values: Array) -> str:
+def number_text(values: Array) -> str:
     """Return three numbers as Python."""
     return repr(tuple(float(x) for x in values))
 

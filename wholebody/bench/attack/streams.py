@@ -12,8 +12,8 @@ from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs, judge
-from wholebody.bench.attack.solves import Asked, opening, three
-from wholebody.bench.attack.things import Thing, clear, seven
+from wholebody.bench.attack.solves import Terms, number_text, script_head
+from wholebody.bench.attack.things import Thing, clear, xyzquat
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.errors import WholebodyError
 from wholebody.problem import Problem
@@ -113,22 +113,22 @@ def written(rng: np.random.Generator) -> Written:
     things = _things(figure, figure_start, rng)
     dt = float(STEPS[int(rng.integers(len(STEPS)))])
     speed = float(rng.choice([np.inf, np.inf, 1.0, 10.0]))
-    asked = Asked(constraints=[f"wb.StepLimit({speed!r})"] if np.isfinite(speed) else [])
+    terms = Terms(constraints=[f"wb.StepLimit({speed!r})"] if np.isfinite(speed) else [])
     if rng.random() < 0.3:
-        asked.constraints.append(f"wb.Hold({str(rng.choice(figure.frames))!r})")
+        terms.constraints.append(f"wb.Hold({str(rng.choice(figure.frames))!r})")
     if figure.figure.root == "free" and np.isfinite(speed):
-        asked.constraints.append(f"wb.StepLimit({speed!r}, root_velocity={speed!r}, root_turn={speed!r})")
+        terms.constraints.append(f"wb.StepLimit({speed!r}, root_velocity={speed!r}, root_turn={speed!r})")
     clearance = float(rng.choice([0.0, 0.002, 0.005])) * min(1.0, figure.size)
     method = "step" if rng.random() < 0.7 else str(rng.choice(["qp", "qp", "newton", "ccd"]))
     frame = str(rng.choice(figure.frames))
     targets = _targets(figure, figure_start, frame, int(rng.integers(*FRAMES)), rng)
-    asked.goals.append(f"wb.Point({frame!r}, {targets[0]})")
+    terms.goals.append(f"wb.Point({frame!r}, {targets[0]})")
     frames = []
     for target in targets:
         goals = target if method != "step" else f"[{_goal(figure, frame, target, rng)}]"
         frames.append(f"    ({goals}, {_moved(things, figure.size, rng)!r}),\n")
-    text = opening(
-        f"{figure.figure.name}: {len(targets)} frames by {method}", figure, figure_start, things, asked, "streams"
+    text = script_head(
+        f"{figure.figure.name}: {len(targets)} frames by {method}", figure, figure_start, things, terms, "streams"
     )
     text += f"\nframes = [\n{''.join(frames)}]"
     values = {"clearance": clearance, "speed": speed if np.isfinite(speed) else 1e300, "dt": dt, "method": method}
@@ -148,10 +148,10 @@ def _targets(figure: Body, start: Array, frame: str, count: int, rng: np.random.
     places = [figure.figure.placement(q, frame).translation for q in postures]
     places[2] = places[2] + rng.normal(size=3) * figure.size * float(rng.choice([0.0, 0.3]))
     if rng.random() < 0.3:
-        return [three(places[int(rng.integers(3))]) for _ in range(count)]
+        return [number_text(places[int(rng.integers(3))]) for _ in range(count)]
     stations = np.linspace(0.0, 2.0, count)
     return [
-        three(np.clip(places[int(s)] + (s - int(s)) * (places[min(int(s) + 1, 2)] - places[int(s)]), -99.0, 99.0))
+        number_text(np.clip(places[int(s)] + (s - int(s)) * (places[min(int(s) + 1, 2)] - places[int(s)]), -99.0, 99.0))
         for s in stations
     ]
 
@@ -180,4 +180,4 @@ def _moved(things: list[Thing], size: float, rng: np.random.Generator) -> list[t
     number = int(rng.integers(len(things)))
     place = things[number].placement
     place.translation = np.clip(place.translation + rng.normal(size=3) * 0.1 * size, -99.0, 99.0)
-    return [(f"thing {number}", seven(place))]
+    return [(f"thing {number}", xyzquat(place))]

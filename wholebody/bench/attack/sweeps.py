@@ -9,7 +9,7 @@ from wholebody.arrays import Array
 from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
-from wholebody.bench.attack.solves import Asked, opening
+from wholebody.bench.attack.solves import Terms, script_head
 from wholebody.bench.attack.things import clear, inside
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
@@ -49,7 +49,9 @@ def written(rng: np.random.Generator) -> Written:
             thing = clear(rng, placed, figure.size, 0.0, [1])
         if thing is not None and np.abs(thing.at[:3]).max() < 99.0:
             things.append(thing)
-    text = opening(f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Asked(), "sweeps")
+    text = script_head(
+        f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Terms(), "sweeps"
+    )
     return Written(text + TAIL.format(end=end.tolist()), figure.files)
 
 

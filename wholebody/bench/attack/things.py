@@ -107,7 +107,7 @@ def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, 
         made, call = shape(rng, size)
         at = somewhere(rng, placed, size)
         if all(placed.distance(made, at, posture) > room for posture in postures):
-            return Thing(made, call, seven(at))
+            return Thing(made, call, xyzquat(at))
     return None
 
 
@@ -136,10 +136,10 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
     place = at(near)
     if np.abs(place.translation).max() > FAR:
         return None
-    return Thing(made, call, seven(place))
+    return Thing(made, call, xyzquat(place))
 
 
-def seven(at: pin.SE3) -> tuple[float, ...]:
+def xyzquat(at: pin.SE3) -> tuple[float, ...]:
     """Return a placement as seven numbers."""
     return tuple(float(x) for x in pin.SE3ToXYZQUAT(at))
 
