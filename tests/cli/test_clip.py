@@ -58,6 +58,49 @@ def test_play_writes_a_page(walk: Path, tmp_path: Path) -> None:
     assert page.stat().st_size > 100_000
 
 
+def test_a_strip_has_the_ghost_of_each_of_its_frames(
+    walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: dict[str, Any] = {}
+
+    def strip(_: Any, postures: Any, out: Path, *, ghosts: Any) -> Path:
+        drawn.update(postures=postures, ghosts=ghosts)
+        return out
+
+    monkeypatch.setattr("wholebody.view.filmstrip.write_filmstrip", strip)
+    clip = wb.read_clip(walk, wb.load("human"))
+    before = clip.with_q(clip.q[::-1]).write(tmp_path / "before.npz")
+    given = ["clip", "play", str(walk), "--out", str(tmp_path / "strip.png"), "--pictures", "3"]
+    assert main([*given, "--ghost", str(before)]) == 0
+    assert np.array(drawn["postures"]) == pytest.approx(clip.q[[0, 6, 11]])
+    assert np.array(drawn["ghosts"]) == pytest.approx(clip.q[[11, 5, 0]])
+    assert main(given) == 0
+    assert drawn["ghosts"] is None
+
+
+@pytest.mark.browser
+def test_a_ghost_in_a_strip_is_seen(tmp_path: Path) -> None:
+    from PIL import Image
+
+    from wholebody.view.browser import find_chromium
+    from wholebody.view.filmstrip import write_filmstrip
+
+    if find_chromium() is None:
+        pytest.skip("there is no Chromium")
+    human = wb.load("human")
+    aside = human.neutral.copy()
+    aside[1] += 0.7
+    pictures = []
+    with view.Viewer(wb.Scene(human)) as viewer:
+        viewer.look((4.0, 0.0, 1.2), (0.0, 0.3, 1.0))
+        for ghosts in (None, [aside]):
+            made = write_filmstrip(viewer, [human.neutral], tmp_path / "strip.png", (160, 120), ghosts=ghosts)
+            pictures.append(np.asarray(Image.open(made).convert("RGB"), dtype=int))
+    other = np.abs(pictures[0] - pictures[1]).max(axis=2) > 8
+    assert other.sum() > 100
+    assert np.flatnonzero(other.any(axis=0)).mean() > 80  # on the right, where +y is seen from in front
+
+
 def test_play_shows_what_the_body_wears_on_a_floor_below_it(
     walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
