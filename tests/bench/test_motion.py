@@ -122,9 +122,21 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "| bisection | hands on the weapon" not in text
     assert "| trajectory | hands on the weapon within 1 mm | 1 of 1 |  |" in text
     assert "| trajectory | hands within 1 mm along the weapon too | 0 of 1 | walk, pack: 1.4 mm |" in text
+    assert "that is asked: 2 lines</summary>" in text
+    assert "| fade | no frame deeper than 0.1 mm | walk | pack | 3 frames |" in text
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000
+
+
+def test_every_case_that_misses_something_is_named() -> None:
+    """The line above names three of them."""
+    bisection, *others = rows()
+    slow = [dataclasses.replace(bisection, clip=f"walk {k}", seconds=2.0 + k) for k in range(1, 7)]
+    text = report.report([*slow, *others], {"wholebody": "0"})
+    assert "| bisection | at most 1 s a second of motion | 0 of 6 | walk 6, pack: 4 s; walk 5, pack: 3.5 s;" in text
+    for k in range(1, 7):
+        assert f"| bisection | at most 1 s a second of motion | walk {k} | pack | {1.0 + k / 2:.3g} s |" in text
 
 
 def test_the_nearest_frames_stand_beside_what_deviates_by_more_than_is_asked() -> None:
