@@ -129,6 +129,25 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
         assert path.stat().st_size > 1000
 
 
+def test_the_camera_sees_who_lies_from_the_side_with_the_head_in_the_picture() -> None:
+    human = wb.load("human")
+    q = human.neutral.copy()
+    # on the belly, the head towards +y
+    q[3:7] = pin.Quaternion(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])).coeffs()
+    clip = wb.Clip(human, [q], 0.1)  # type: ignore[arg-type]
+    eye, target = figures.camera(clip, 0, figures.SIDE)
+    state = wb.Scene(human).state(clip.q[0])
+    head, toes = (np.array(state.frame(human.frame_id(name)).translation) for name in ("head", "left_toe_tip"))
+    along = (head - toes) / np.linalg.norm(head - toes)
+    assert along[1] > 0.99
+    towards = (eye - target) / np.linalg.norm(eye - target)
+    assert abs(towards @ along) < 0.2
+    assert np.linalg.norm(head - target) < 0.6 * np.linalg.norm(head - toes)
+    standing = wb.Clip(human, [human.neutral], 0.1)  # type: ignore[arg-type]
+    eye, target = figures.camera(standing, 0, figures.FRONT)
+    assert (eye - target)[0] > 3.0
+
+
 def test_every_case_that_misses_something_is_named() -> None:
     """The line above names three of them."""
     bisection, *others = rows()
