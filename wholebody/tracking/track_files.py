@@ -95,11 +95,11 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     if len(late):
         line_number = places[int(late[0]) + 1]
         raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")
-    wrong = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
-    if len(wrong):
-        row, column = (int(k) for k in wrong[0])
+    broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
+    if len(broken):
+        row, column = (int(k) for k in broken[0])
         raise FileFormatError(
-            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(wrong)} values are not "
+            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
             f"finite or beyond {LARGEST_VALUE:g}; mend or cut those frames"
         )
     track = Track.of(figure, table[:, order[1:]], dt, path.name)

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from wholebody.arrays import Array
 
 LOCKED = 1e-6
-"""Radians from gimbal lock: with six digits of a degree, as BVH has, the first and the third angle say nothing there."""
+"""Radians from gimbal lock: six digits of a degree, as BVH has, say nothing there of the first and the third angle."""
 
 
 def angles_about(turned: Rotation, axes: Array) -> Array:
