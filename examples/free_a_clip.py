@@ -93,8 +93,8 @@ def film(scene: wb.Scene, before: wb.Clip, after: wb.Clip, out: Path) -> None:
     frames = most_changed(before.q, after.q)
     root = after.q[frames, :3]
     with wb.Viewer(scene, title="free_a_clip") as viewer:
-        away = _facing(after.q[frames[0]]) @ np.array([1.2, 2.2, 0.6])
-        middle = (float(root[0, 0]), float(root[0, 1]), 0.95)
+        away = _facing(after.q[frames[0]]) @ np.array([1.6, 3.0, 0.8])
+        middle = (float(root[0, 0]), float(root[0, 1]), 0.9)
         viewer.look(eye=tuple(np.add(middle, away).tolist()), target=middle)
         viewer.play(after, ghost=before.q)
         print(f"  {viewer.save(out / 'free_a_clip.html')}")

@@ -122,9 +122,40 @@ def test_the_report_has_every_method(tmp_path: Path) -> None:
     assert "| bisection | hands on the weapon" not in text
     assert "| trajectory | hands on the weapon within 1 mm | 1 of 1 |  |" in text
     assert "| trajectory | hands within 1 mm along the weapon too | 0 of 1 | walk, pack: 1.4 mm |" in text
+    assert "that is asked: 2 lines</summary>" in text
+    assert "| fade | no frame deeper than 0.1 mm | walk | pack | 3 frames |" in text
     assert "nan" not in text
     for path in (*report.chart(rows(), tmp_path / "motion"), *report.check_chart(rows(), tmp_path / "check")):
         assert path.stat().st_size > 1000
+
+
+def test_the_camera_sees_who_lies_from_the_side_with_the_head_in_the_picture() -> None:
+    human = wb.load("human")
+    q = human.neutral.copy()
+    # on the belly, the head towards +y
+    q[3:7] = pin.Quaternion(np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])).coeffs()
+    clip = wb.Clip(human, [q], 0.1)  # type: ignore[arg-type]
+    eye, target = figures.camera(clip, 0, figures.SIDE)
+    state = wb.Scene(human).state(clip.q[0])
+    head, toes = (np.array(state.frame(human.frame_id(name)).translation) for name in ("head", "left_toe_tip"))
+    along = (head - toes) / np.linalg.norm(head - toes)
+    assert along[1] > 0.99
+    towards = (eye - target) / np.linalg.norm(eye - target)
+    assert abs(towards @ along) < 0.2
+    assert np.linalg.norm(head - target) < 0.6 * np.linalg.norm(head - toes)
+    standing = wb.Clip(human, [human.neutral], 0.1)  # type: ignore[arg-type]
+    eye, target = figures.camera(standing, 0, figures.FRONT)
+    assert (eye - target)[0] > 3.0
+
+
+def test_every_case_that_misses_something_is_named() -> None:
+    """The line above names three of them."""
+    bisection, *others = rows()
+    slow = [dataclasses.replace(bisection, clip=f"walk {k}", seconds=2.0 + k) for k in range(1, 7)]
+    text = report.report([*slow, *others], {"wholebody": "0"})
+    assert "| bisection | at most 1 s a second of motion | 0 of 6 | walk 6, pack: 4 s; walk 5, pack: 3.5 s;" in text
+    for k in range(1, 7):
+        assert f"| bisection | at most 1 s a second of motion | walk {k} | pack | {1.0 + k / 2:.3g} s |" in text
 
 
 def test_the_nearest_frames_stand_beside_what_deviates_by_more_than_is_asked() -> None:

@@ -52,10 +52,92 @@ def test_retarget_writes_a_clip_of_the_figure(walk: Path, tmp_path: Path) -> Non
     assert np.degrees(values) == pytest.approx(np.linspace(10.0, 120.0, 12), abs=6.0)
 
 
+def test_a_robot_goes_about_where_that_is_asked(walk: Path, tmp_path: Path) -> None:
+    inertia = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    link = f"<link name='{{0}}'>{inertia}</link>"
+    joint = "<joint name='{0}' type='revolute'><parent link='{1}'/><child link='{2}'/><origin xyz='{3}'/>\
+<axis xyz='0 1 0'/><limit lower='-2' upper='2' effort='1' velocity='1'/></joint>"
+    parts = [link.format("base")]
+    for side, away in (("left", 0.1), ("right", -0.1)):
+        above = "base"
+        for part, at in (("hip", f"0 {away} 0"), ("knee", "0 0 -0.4"), ("ankle", "0 0 -0.4")):
+            parts += [
+                link.format(f"{side}_{part}_link"),
+                joint.format(f"{side}_{part}", above, f"{side}_{part}_link", at),
+            ]
+            above = f"{side}_{part}_link"
+    (tmp_path / "legs.urdf").write_text(f"<robot name='legs'>{''.join(parts)}</robot>")
+    human = wb.load("human")
+    clip = wb.read_clip(walk, human)
+    gone = clip.q.copy()
+    gone[:, 0] += np.linspace(0.0, 0.5, len(gone))
+    pytest.importorskip("pybvh")
+    clip.with_q(gone).write(tmp_path / "walk.bvh")
+    out = tmp_path / "legs.npz"
+    given = ["clip", "retarget", str(tmp_path / "walk.bvh"), str(out), "--figure", str(tmp_path / "legs.urdf")]
+    assert main([*given, "--root", "free"]) == 0
+    way = wb.read_clip(out, wb.load(tmp_path / "legs.urdf", root="free")).q[:, 0]
+    assert way[-1] - way[0] == pytest.approx(0.5 * 0.8 / _leg(human), abs=0.05)
+    assert main(given) == 0
+    assert wb.read_clip(out, wb.load(tmp_path / "legs.urdf")).q.shape == (12, 6)
+
+
+def _leg(human: wb.Figure) -> float:
+    """Length of thigh and shank, metres."""
+    state = wb.Scene(human).state(human.neutral)
+    hip, knee, ankle = (
+        np.array(state.frame(human.frame_id(f"left_{part}")).translation) for part in ("hip", "knee", "ankle")
+    )
+    return float(np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle))
+
+
 def test_play_writes_a_page(walk: Path, tmp_path: Path) -> None:
     page = tmp_path / "bend.html"
     assert main(["clip", "play", str(walk), "--ghost", str(walk), "--out", str(page)]) == 0
     assert page.stat().st_size > 100_000
+
+
+def test_a_strip_has_the_ghost_of_each_of_its_frames(
+    walk: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    drawn: dict[str, Any] = {}
+
+    def strip(_: Any, postures: Any, out: Path, *, ghosts: Any) -> Path:
+        drawn.update(postures=postures, ghosts=ghosts)
+        return out
+
+    monkeypatch.setattr("wholebody.view.filmstrip.write_filmstrip", strip)
+    clip = wb.read_clip(walk, wb.load("human"))
+    before = clip.with_q(clip.q[::-1]).write(tmp_path / "before.npz")
+    given = ["clip", "play", str(walk), "--out", str(tmp_path / "strip.png"), "--pictures", "3"]
+    assert main([*given, "--ghost", str(before)]) == 0
+    assert np.array(drawn["postures"]) == pytest.approx(clip.q[[0, 6, 11]])
+    assert np.array(drawn["ghosts"]) == pytest.approx(clip.q[[11, 5, 0]])
+    assert main(given) == 0
+    assert drawn["ghosts"] is None
+
+
+@pytest.mark.browser
+def test_a_ghost_in_a_strip_is_seen(tmp_path: Path) -> None:
+    from PIL import Image
+
+    from wholebody.view.browser import find_chromium
+    from wholebody.view.filmstrip import write_filmstrip
+
+    if find_chromium() is None:
+        pytest.skip("there is no Chromium")
+    human = wb.load("human")
+    aside = human.neutral.copy()
+    aside[1] += 0.7
+    pictures = []
+    with view.Viewer(wb.Scene(human)) as viewer:
+        viewer.look((4.0, 0.0, 1.2), (0.0, 0.3, 1.0))
+        for ghosts in (None, [aside]):
+            made = write_filmstrip(viewer, [human.neutral], tmp_path / "strip.png", (160, 120), ghosts=ghosts)
+            pictures.append(np.asarray(Image.open(made).convert("RGB"), dtype=int))
+    other = np.abs(pictures[0] - pictures[1]).max(axis=2) > 8
+    assert other.sum() > 100
+    assert np.flatnonzero(other.any(axis=0)).mean() > 80  # on the right, where +y is seen from in front
 
 
 def test_play_shows_what_the_body_wears_on_a_floor_below_it(

@@ -334,6 +334,20 @@ def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.
     assert "does not take dynamics" in told.err + told.out
 
 
+@pytest.mark.parametrize(
+    ("options", "said"), [(["--out", "arm.fbx"], "cannot be written as .fbx"), (["--jobs", "0"], "--jobs is 0; give")]
+)
+def test_the_command_refuses_before_it_frees(
+    options: list[str], said: str, tmp_path: Path, human: Figure, capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    arm_into_trunk(human, 4).write(tmp_path / "arm.npz")
+    monkeypatch.setattr("wholebody.motion.avoidance.avoid", lambda *_, **__: pytest.fail("it was freed"))
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), *options]) == 2
+    assert said in capsys.readouterr().err
+    assert [path.name for path in tmp_path.iterdir()] == ["arm.npz"]
+
+
 def test_an_answer_is_told_in_three_lines() -> None:
     human = wb.load("human")
     standing = human.posture("standing")

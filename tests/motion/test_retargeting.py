@@ -172,6 +172,93 @@ def test_a_robot_follows(human: Figure, tmp_path: Path) -> None:
     assert clip.q[:, 1] == pytest.approx(np.zeros(10), abs=0.02)
 
 
+def test_feet_that_stand_move_with_the_pelvis_of_a_fixed_figure(tmp_path: Path) -> None:
+    """The pelvis goes forward over feet that stand; where it cannot move, the legs go back below it."""
+    still, turn = person(20), np.linspace(-0.3, 0.3, 20)
+    local = np.tile(np.eye(3), (20, len(still.names), 1, 1))
+    for side in ("left", "right"):
+        for k, angle in enumerate(turn):
+            local[k, still.names.index(f"{side}_hip")] = pin.utils.rotate("y", angle)
+            local[k, still.names.index(f"{side}_ankle")] = pin.utils.rotate("y", -angle)
+    leg = 0.83
+    root = np.array([[leg * np.sin(angle), 0.0, 0.11 + leg * np.cos(angle)] for angle in turn])
+    motion = SkeletonMotion.moved(still.names, still.parents, still.offsets, local, root, 1 / 30)
+    feet = motion.positions[:, motion.names.index("left_ankle")]
+    assert np.ptp(feet, axis=0).max() < 1e-12
+    inertia = """<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>"""
+    parts = [f"<link name='base'>{inertia}</link>"]
+    for side, away in (("left", 0.09), ("right", -0.09)):
+        above = "base"
+        for part, at in (("hip", f"0 {away} -0.05"), ("knee", "0 0 -0.42"), ("ankle", "0 0 -0.41")):
+            parts.append(f"<link name='{side}_{part}_link'>{inertia}</link>")
+            parts.append(
+                f"<joint name='{side}_{part}' type='revolute'><parent link='{above}'/>"
+                f"<child link='{side}_{part}_link'/><origin xyz='{at}'/><axis xyz='0 1 0'/>"
+                "<limit lower='-2' upper='2' effort='1' velocity='1'/></joint>"
+            )
+            above = f"{side}_{part}_link"
+    (tmp_path / "legs.urdf").write_text(f"<robot name='legs'>{''.join(parts)}</robot>")
+    clip = wb.retarget(motion, wb.load(tmp_path / "legs.urdf"))
+    for side in SIDES:
+        way = motion.positions[:, motion.names.index(f"{side}_ankle")]
+        way = way - motion.positions[:, motion.names.index(f"{side}_hip")]
+        assert angles(places(clip, f"{side}_ankle") - places(clip, f"{side}_hip"), way).max() < 5.0
+
+
+CONVENTIONS = {
+    "Mixamo": {
+        "pelvis": "mixamorig:Hips", "spine3": "mixamorig:Spine2", "neck": "mixamorig:Neck", "head": "mixamorig:Head",
+        "hip": "mixamorig:{}UpLeg", "knee": "mixamorig:{}Leg", "ankle": "mixamorig:{}Foot",
+        "foot": "mixamorig:{}ToeBase", "shoulder": "mixamorig:{}Arm", "elbow": "mixamorig:{}ForeArm",
+        "wrist": "mixamorig:{}Hand",
+    },
+    "LAFAN1": {
+        "pelvis": "Hips", "spine3": "Spine2", "neck": "Neck", "head": "Head", "hip": "{}UpLeg", "knee": "{}Leg",
+        "ankle": "{}Foot", "foot": "{}Toe", "shoulder": "{}Arm", "elbow": "{}ForeArm", "wrist": "{}Hand",
+    },
+    "CMU": {
+        "pelvis": "root", "spine3": "thorax", "neck": "lowerneck", "head": "head", "hip": "{}femur", "knee": "{}tibia",
+        "ankle": "{}foot", "foot": "{}toes", "shoulder": "{}humerus", "elbow": "{}radius", "wrist": "{}wrist",
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("convention", CONVENTIONS)
+def test_skeletons_of_other_names_are_the_same_motion(convention: str, human: Figure) -> None:
+    motion, table = person(6), CONVENTIONS[convention]
+
+    def named(joint: str) -> str:
+        side, _, part = joint.rpartition("_")
+        said = {"left": "l", "right": "r"}.get(side, "") if convention == "CMU" else side.capitalize()
+        return table[part].format(said)
+
+    names = tuple(map(named, motion.names))
+    other = SkeletonMotion(names, motion.parents, motion.offsets, motion.rotations, motion.positions, motion.dt)
+    assert furthest(wb.retarget(other, human), wb.retarget(motion, human)) < 1e-9
+
+
+def test_bones_that_all_rest_along_one_axis_are_the_same_motion(human: Figure) -> None:
+    """As LAFAN1 has it: where nothing turns, all bones lie along x, so that nothing stands."""
+    motion = person(8)
+    turned = np.tile(np.eye(3), (len(motion.names), 1, 1))
+    for joint, parent in enumerate(motion.parents):
+        way = motion.offsets[joint]
+        if parent > 0 and np.linalg.norm(way) > 0.0:
+            turned[parent] = pin.Quaternion.FromTwoVectors(np.array([1.0, 0.0, 0.0]), way).toRotationMatrix()
+    offsets = np.array(motion.offsets)
+    for joint, parent in enumerate(motion.parents):
+        offsets[joint] = turned[parent].T @ motion.offsets[joint] if parent >= 0 else 0.0
+    lying = SkeletonMotion(
+        motion.names, motion.parents, offsets, motion.rotations @ turned, motion.positions, motion.dt
+    )
+    clip = wb.retarget(lying, human)
+    joint = motion.names.index
+    for side in SIDES:
+        for first, second in BONES:
+            way = motion.positions[:, joint(f"{side}_{second}")] - motion.positions[:, joint(f"{side}_{first}")]
+            assert angles(bone(clip, f"{side}_{first}", f"{side}_{second}"), way).max() < 12.0, (side, first)
+
+
 @pytest.mark.parametrize(
     ("text", "sentence"),
     [

@@ -102,7 +102,13 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),
         (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is no number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
-        (lambda lines: lines[:2], "at least two frames"),
+        (lambda lines: lines[:2], "line 2: .*at least two frames"),
+        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step is 0 s; give a positive one"),
+        (lambda lines: [lines[0], *lines[:0:-1]], "line 3: the time step is -"),
+        (
+            lambda lines: [*lines[:3], "", lines[3].rsplit(",", 1)[0] + ",nan", *lines[4:]],
+            "line 5: right_thumb_ip_flexion is nan; 1 values",
+        ),
         (
             lambda lines: [lines[0].replace("right_thumb_ip_flexion", "root_x"), *lines[1:]],
             "line 1: the column root_x stands there twice",
@@ -113,7 +119,7 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
             lambda lines: [*lines[:2], *(f"1e999,{line.partition(',')[2]}" for line in lines[2:])],
             "line 3: the time is inf",
         ),
-        (lambda lines: [lines[0], *(line.rsplit(",", 1)[0] + ",1e200" for line in lines[1:])], "beyond 1e"),
+        (lambda lines: [lines[0], *(line.rsplit(",", 1)[0] + ",1e200" for line in lines[1:])], "line 2: .*beyond 1e"),
     ],
 )
 def test_broken_files_are_named_by_line(hand: wb.Figure, tmp_path: Path, change: Any, message: str) -> None:

@@ -49,6 +49,10 @@ def test_mistakes_are_named() -> None:
         board_and_pin().posture({"board": (0, 0, 0)})
     with pytest.raises(wb.InputError, match="at least one posture"):
         write_filmstrip(wb.Viewer(board_and_pin()), [], "strip.png")
+    parts = board_and_pin()
+    q = parts.posture({"board": (0, 0, 0), "pin": (0, 0, 0)})
+    with pytest.raises(wb.InputError, match="2 ghosts for 1 postures; give one for each"):
+        write_filmstrip(wb.Viewer(parts), [q], "strip.png", ghosts=[q, q])
 
 
 @pytest.mark.browser

@@ -135,8 +135,10 @@ class Clip:
         Raises:
             InputError: a time outside of the clip.
         """
-        slack = ROUNDING * self.dt * max(1, len(self))
-        t = number(t, f"{self.name}: t", -slack, self.duration + slack, "s")
+        t = number(t, f"{self.name}: t", -np.inf, np.inf, "s")
+        slack = ROUNDING * self.dt * len(self)
+        if not -slack <= t <= self.duration + slack:
+            raise InputError(f"{self.name}: t is {t:g} s; give a time from 0 to {self.duration:g} s")
         return self._between(t / self.dt)
 
     def _between(self, place: float) -> Array:
@@ -181,7 +183,7 @@ class Clip:
         Raises:
             InputError: the other has other joints or another time step.
         """
-        other = instance(other, Clip, f"{self.name}: joined", "a clip")
+        other = instance(other, Clip, f"{self.name}: joined: other", "give a clip with the same joints and time step")
         if other.names != self.names or other.q.shape[1] != self.q.shape[1]:
             raise InputError(f"{self.name}: {other.name} has other joints; join clips of one figure")
         if abs(other.dt - self.dt) > ROUNDING * self.dt:

@@ -72,7 +72,7 @@ def retarget(
     check_figure(figure, "retarget")
     function(progress, "progress")
     roles = matched(motion.names, figure, names)
-    steps = footfalls(motion, roles)
+    steps = footfalls(motion, roles) if figure.root == "free" else Footfalls({}, {})  # no floor moves with a pelvis
     wanted = targets(motion, figure, roles, steps)
     if not wanted.points:
         raise InputError(

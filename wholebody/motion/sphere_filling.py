@@ -104,8 +104,9 @@ class SphereFilling:
     def __str__(self) -> str:
         """Return one line."""
         what = "the convex envelope" if self.envelope else "the solid"
+        count = len(self.shape.radii)
         return (
-            f"{len(self.shape.radii)} spheres: {100 * self.uncovered:.1f} % of {what} uncovered, at most "
+            f"{count} sphere{'s' * (count > 1)}: {100 * self.uncovered:.1f} % of {what} uncovered, at most "
             f"{1e3 * self.uncovered_depth:.1f} mm deep; protrusion {1e3 * self.protrusion:.1f} mm"
         )
 

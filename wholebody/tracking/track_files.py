@@ -10,11 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.checks import instance, is_number, known, shown
+from wholebody.checks import TIME_STEP, instance, is_number, known, shown
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
 from wholebody.files import read_text, write
+from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
 from wholebody.tracking.tracks import Track, check_figure
 
 ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "root_qw")
@@ -45,10 +46,10 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     """Read a track of a figure; its columns may have any order.
 
     Raises:
-        FileFormatError: the file cannot be read, a line has another length, a value is no number, or the time step
-            changes; the line is named.
+        FileFormatError: the file cannot be read, a line has another length, a value is no finite number, or the time
+            step changes or is not positive; the line is named.
         UnknownNameError: a column that is no joint of the figure.
-        InputError: joints are missing, or a value is not finite; the frame is named.
+        InputError: joints are missing, or a quaternion is not of unit length; the frame is named.
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_track")
@@ -78,7 +79,9 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
             raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
         places.append(number)
     if len(rows) < 2:
-        raise FileFormatError(f"{path.name}: a track has a line of names and at least two frames")
+        raise FileFormatError(
+            f"{path.name}, line {number}: a track has a line of names and at least two frames; the file is cut off"
+        )
     table = np.array(rows)
     order = [names.index(name) for name in wanted]
     time = table[:, order[0]]
@@ -86,10 +89,19 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         bad = int(np.flatnonzero(~(np.abs(time) < LATEST))[0])
         raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
     dt = float(time[1] - time[0])
+    if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
+        raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; give a positive one")
     late = np.flatnonzero(np.abs(np.diff(time) - dt) > EVEN * abs(dt))
     if len(late):
         line_number = places[int(late[0]) + 1]
         raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")
+    broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
+    if len(broken):
+        row, column = (int(k) for k in broken[0])
+        raise FileFormatError(
+            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
+            f"finite or beyond {LARGEST_VALUE:g}; mend or cut those frames"
+        )
     track = Track.of(figure, table[:, order[1:]], dt, path.name)
     track.check(figure)
     return track

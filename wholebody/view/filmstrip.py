@@ -24,6 +24,8 @@ def write_filmstrip(
     postures: Sequence[ArrayLike],
     path: str | os.PathLike[str],
     size: tuple[int, int] = (400, 560),
+    *,
+    ghosts: Sequence[ArrayLike] | None = None,
 ) -> Path:
     """Write postures as one PNG, the first one left; the camera should have been set with `viewer.look`.
 
@@ -32,12 +34,14 @@ def write_filmstrip(
         postures: each (nq,).
         path: of the file.
         size: width and height of each picture, pixels.
+        ghosts: as many postures, each (nq,), shown transparent beside the others; those of the viewer stay if left out.
 
     Returns:
         The path.
 
     Raises:
-        InputError: there is no posture, one has the wrong shape, or the file cannot be written.
+        InputError: there is no posture, one has the wrong shape, there are more or less ghosts, or the file cannot be
+            written.
         MissingPackageError: there is no Chromium.
     """
     from PIL import Image
@@ -47,11 +51,16 @@ def write_filmstrip(
     postures = listed(postures, "postures", "[q], each of shape (nq,)")
     if not postures:
         raise InputError("a filmstrip has at least one posture; give a list of postures, each of shape (nq,)")
+    beside = None if ghosts is None else listed(ghosts, "ghosts", "[q], each of shape (nq,)")
+    if beside is not None and len(beside) != len(postures):
+        raise InputError(f"{len(beside)} ghosts for {len(postures)} postures; give one for each")
     width, height = check_size(size)
     strip = Image.new("RGB", (len(postures) * (width + GAP) - GAP, height), "white")
     place = check_writable(checked_path(path, "path"))
     with Scratch() as folder:
         for number, q in enumerate(postures):
+            if beside is not None:
+                viewer.ghosts([beside[number]])
             viewer.show(q)
             with Image.open(viewer.picture(folder / "one.png", size, legend=False)) as picture:
                 strip.paste(picture, (number * (width + GAP), 0))

@@ -249,6 +249,33 @@ def test_what_is_written_as_bvh_moves_as_pinocchio_does(human: Figure, tmp_path:
     assert np.abs(np.diff(read.joint_angles, axis=0)).max() < 1.6  # no flip of half a turn
 
 
+@pytest.mark.parametrize("ending", ["bvh", "txt"])
+@pytest.mark.parametrize("middle", [0, 4, 8])
+def test_an_arm_straight_out_to_the_side_keeps_its_angles(
+    ending: str, middle: int, human: Figure, tmp_path: Path
+) -> None:
+    """There the first and the third angle of a shoulder turn about one axis; so do those of the file's elbow."""
+    if ending == "bvh":
+        pytest.importorskip("pybvh")
+    ways = np.radians(90.0 + 6.0 * (np.arange(9.0) - middle))
+    q = np.array(
+        [
+            human.with_joints(
+                human.neutral,
+                {"left_shoulder_flexion": 0.3, "left_shoulder_abduction": way, "left_shoulder_rotation": 0.5,
+                 "left_elbow_flexion": way},
+            )
+            for way in ways
+        ]
+    )  # fmt: skip
+    q[:, 3:7] = pin.Quaternion(pin.utils.rotate("x", 0.2) @ pin.utils.rotate("y", np.pi / 2)).coeffs()
+    clip = wb.Clip(human, q, 0.1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", UserWarning)
+        read = wb.read_clip(clip.write(tmp_path / f"a.{ending}"), human)
+    assert furthest(read, clip) < 1e-5
+
+
 BVH = """HIERARCHY
 ROOT hips
 {

@@ -197,9 +197,7 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
     with Viewer(scene, contact_distance=0.0) as viewer, Scratch() as scratch:
         for row, line in enumerate(tiles):
             for column, (frame, view, freed) in enumerate(line):
-                middle = before.q[frame][:3]
-                away = _facing(before.q[0]) @ np.array(view)
-                viewer.look(middle + AWAY * away / np.linalg.norm(view), middle)
+                viewer.look(*camera(before, frame, view))
                 viewer.ghosts([before.q[frame]] if freed else [])
                 viewer.show(after.q[frame] if freed else before.q[frame])
                 with Image.open(viewer.picture(scratch / "one.png", TILE, legend=False)) as picture:
@@ -209,11 +207,28 @@ def _strip(drawing: Drawing, scene: Scene, before: Clip, after: Clip, path: Path
     return write(path, made.getvalue())
 
 
+def camera(clip: Clip, frame: int, view: View) -> tuple[Array, Array]:
+    """Where the camera of a picture is, and what it looks at, metres: the middle of the box around the joints.
+
+    Args:
+        clip: that is drawn; in its first frame it faces forward.
+        frame: of the picture.
+        view: direction to the camera: forward, to the left, up.
+    """
+    model, data = clip.figure.model, clip.figure.model.createData()
+    pin.forwardKinematics(model, data, clip.q[frame])
+    places = np.array([at.translation for at in data.oMi][1:])
+    middle: Array = 0.5 * (places.min(axis=0) + places.max(axis=0))
+    away = _facing(clip.q[0]) @ np.array(view)
+    return middle + AWAY * away / np.linalg.norm(view), middle
+
+
 def _facing(q: Array) -> Array:
-    """Rotation about z to where the root faces; none where it lies."""
-    forward = pin.Quaternion(np.array(q[3:7])).matrix()[:2, 0]
+    """Rotation about z to where the root faces, or to where its head is if it lies."""
+    turn = pin.Quaternion(np.array(q[3:7])).matrix()
+    forward = turn[:2, 0]
     if np.linalg.norm(forward) < 0.5:
-        return np.eye(3)
+        forward = turn[:2, 2]
     c, s = forward / np.linalg.norm(forward)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

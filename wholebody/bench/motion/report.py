@@ -176,6 +176,7 @@ def bounds(rows: Sequence[MotionRow]) -> list[Bound]:
 
 def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
     """The tables as Markdown."""
+    found = lines(rows)
     return render(
         "motion.md",
         standings=[each for each in standings(rows) if each.method not in BESIDE],
@@ -185,7 +186,8 @@ def report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
         ratio=against_bisection(rows),
         asked=ASKED,
         deep=DEEP,
-        lines=lines(rows),
+        lines=found,
+        misses=sum(len(line.short) for line in found),
         bounds=bounds(rows),
         of_bisection=OF_BISECTION,
         facts=facts,

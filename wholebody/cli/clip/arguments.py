@@ -33,6 +33,9 @@ def add_command(
         "--figure", default="human", metavar="FIGURE", help="human (default), avatar, hand, or the path of a URDF"
     )
     add_person(figure)
+    figure.add_argument(
+        "--root", choices=("fixed", "free"), help="of a robot: whether it goes about (default: as its file says)"
+    )
     return parser
 
 
@@ -85,7 +88,8 @@ def figure_of(arguments: argparse.Namespace) -> Figure:
     """
     from wholebody.figures import load
 
-    return load(arguments.figure, **person_options(arguments))
+    root = {} if arguments.root is None else {"root": arguments.root}
+    return load(arguments.figure, **person_options(arguments), **root)
 
 
 def clip_of(arguments: argparse.Namespace) -> Clip:

@@ -72,11 +72,13 @@ def run(arguments: argparse.Namespace) -> int:
 
     from wholebody.files import check_writable
     from wholebody.motion.avoidance import avoid
+    from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
 
     (file,) = arguments.files
-    out = check_writable(arguments.out or file.with_name(f"{file.stem}-free.npz"))
+    jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
+    out = check_writable(check_ending(arguments.out or file.with_name(f"{file.stem}-free.npz")))
     method, figure = _method(methods[0], arguments), figure_of(arguments)
     scene, clip = dressed(figure, worn[0]), read_clip(file, figure)
     with bar(clip.name) as tell:

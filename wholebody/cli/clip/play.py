@@ -75,7 +75,8 @@ def run(arguments: argparse.Namespace) -> int:
             viewer.look(tuple(middle + away * np.array(VIEW)), tuple(middle))
         if out is not None and out.suffix.lower() == ".png":
             frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
-            print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out)}")
+            beside = None if ghost is None else list(ghost.q[frames])
+            print(f"wrote {write_filmstrip(viewer, list(clip.q[frames]), out, ghosts=beside)}")
             return 0
         viewer.play(clip, ghost=ghost, repeat=math.inf if out is None else 1)
         if out is None:

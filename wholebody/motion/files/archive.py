@@ -59,6 +59,9 @@ def read(path: Path, figure: Figure) -> Frames:
     missing = [name for name in ("q", "dt", "name", "joints") if name not in arrays]
     if missing:
         raise FileFormatError(f"{path.name}: the arrays lack {', '.join(missing)}; write the clip anew")
+    if arrays["wholebody_clip"].tolist() != VERSION:
+        version = one_line(str(arrays["wholebody_clip"].tolist()), 20)
+        raise FileFormatError(f"{path.name}: its layout is {version}, and {VERSION} is known; update wholebody")
     q, dt, joints = arrays["q"], arrays["dt"], [str(joint) for joint in np.atleast_1d(arrays["joints"])]
     if q.dtype.kind not in "fiu" or q.ndim != 2 or dt.dtype.kind not in "fiu" or dt.shape != ():
         raise FileFormatError(f"{path.name}: q of shape {q.shape} and dt of shape {dt.shape} are no clip")

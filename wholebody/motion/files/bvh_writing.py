@@ -15,6 +15,7 @@ from wholebody.files import Scratch
 from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.files.bvh import pybvh
+from wholebody.motion.files.euler import angles_about
 from wholebody.motion.files.nodes import OFF, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
 
@@ -92,7 +93,8 @@ def _depth_first(node: Any) -> list[Any]:
 def _angles(local: Array) -> Array:
     """Euler angles (n, nodes, 3), radians, without flips: of the two solutions the one nearer to the frame before."""
     frames, count = local.shape[:2]
-    first = Rotation.from_matrix(local.reshape(-1, 3, 3)).as_euler(ORDER).reshape(frames, count, 3)
+    axes = np.eye(3)[["XYZ".index(axis) for axis in ORDER]]
+    first = np.stack([angles_about(Rotation.from_matrix(local[:, node]), axes) for node in range(count)], axis=1)
     other = first * (1.0, -1.0, 1.0) + np.pi
     found = np.array(first)
     for k in range(1, frames):

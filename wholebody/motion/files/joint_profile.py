@@ -19,6 +19,7 @@ from wholebody.figures.figure import Figure
 from wholebody.files import read_text
 from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
+from wholebody.motion.files.euler import angles_about
 from wholebody.motion.files.text import LARGEST_FILE, number, table
 from wholebody.tracking.tracks import MOST_FRAMES, ROOT_SIZE
 
@@ -36,7 +37,7 @@ def write(motion: Motion, path: Path) -> Path:
         InputError: the figure has no free root, a joint of several degrees of freedom, or the file cannot be written.
     """
     _check_figure(motion.figure)
-    angles = np.unwrap(Rotation.from_quat(motion.q[:, 3:ROOT_SIZE]).as_euler("XYZ"), axis=0)
+    angles = np.unwrap(angles_about(Rotation.from_quat(motion.q[:, 3:ROOT_SIZE]), np.eye(3)), axis=0)
     rows = np.hstack([motion.q[:, :3], angles, motion.q[:, ROOT_SIZE:]])
     joints = motion.q.shape[1] - ROOT_SIZE
     names = [*(f"G{k + 1}" for k in range(GLOBAL)), *(f"Q{k + 1}" for k in range(joints))]

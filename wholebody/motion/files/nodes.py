@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.motion.files.euler import angles_about
 
 SAME_PLACE = 1e-9
 """Metres between joints that are at one place."""
@@ -154,7 +155,7 @@ def _angles(figure: Figure, node: Node, turns: Array) -> Array | None:
         choices = angle[:, None][None]
     else:
         axes = node.axes if count == 3 else np.vstack([node.axes, np.cross(node.axes[0], node.axes[1])])
-        first = turned.as_davenport(axes, "intrinsic")
+        first = angles_about(turned, axes)
         mirrored = -1.0 if abs(axes[0] @ axes[2]) > 0.5 else 1.0  # axes as Z X Z, or as Z X Y
         other = first * (1.0, -mirrored, 1.0) + (np.pi, np.pi if mirrored > 0.0 else 0.0, np.pi)
         off = np.abs(wrapped(first[:, 2])) if count == 2 else np.zeros(len(first))
