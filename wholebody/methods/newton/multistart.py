@@ -12,7 +12,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
-from wholebody.methods.conclusion import Ending, concluded, counted
+from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.newton.feasibility import FeasibilityResult, reach
 from wholebody.methods.newton.figure_system import FigureSystem
@@ -38,9 +38,9 @@ class Settings(NamedTuple):
     inequalities: Kind
 
     @property
-    def counted(self) -> float:
+    def assessed_tolerance(self) -> float:
         """Error below which an assessment counts as good."""
-        return counted(self.tolerance)
+        return assessed_tolerance(self.tolerance)
 
 
 class Found(NamedTuple):
@@ -86,7 +86,9 @@ class Search:
                 found = self._go(start, how, min(TRIAL, self.settings.iterations))
                 if self._better(found, best) and not found.reached.stationary and not self._serves(found):
                     found = self._go(found.q, how, self.settings.iterations)
-                minima.add(max(_broken(found), self.settings.counted) + _missed(found), found.reached.stationary)
+                minima.add(
+                    max(_broken(found), self.settings.assessed_tolerance) + _missed(found), found.reached.stationary
+                )
                 if self._better(found, best):
                     best = found
                 if self._serves(best):
@@ -99,7 +101,7 @@ class Search:
                     break
         if self.active_system.control.over:
             return best
-        if not best.judgement.holds(self.settings.counted) and not hopeless:
+        if not best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
             best = self._least_violation(best, q)
         if self._serves(best) and self.active_system.objective.minimised:
             best = self._refined(best)
@@ -173,11 +175,11 @@ class Search:
         return Found(q, assess(self.active_system.problem, q), reached, how)
 
     def _serves(self, found: Found) -> bool:
-        return found.judgement.holds(self.settings.counted) and found.judgement.met(self.settings.counted)
+        return meets(found.judgement, self.settings.tolerance)
 
     def _better(self, one: Found, other: Found) -> bool:
         """Whether one result is better: in the violation, then in the goal errors, then in the measures."""
-        enough = self.settings.counted
+        enough = self.settings.assessed_tolerance
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
             left, right = max(left, enough), max(right, enough)
             if abs(left - right) > max(enough, ALIKE * min(left, right)):
