@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 
 from wholebody.arrays import Array
 from wholebody.figures.anthropometry import Body, design_cases
-from wholebody.figures.human import human_spec
+from wholebody.figures.human.spec import human_spec
 from wholebody.figures.measuring import ansur, measure
 from wholebody.view.surface.fields import Field, union
 from wholebody.view.surface.profile import piece_field

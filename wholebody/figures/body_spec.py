@@ -114,7 +114,7 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
 
     Args:
         spec: the body.
-        extension: text of an element at the end of the file, see `wholebody.figures.urdf_extension`.
+        extension: text of an element at the end of the file, see `wholebody.figures.urdf.extension`.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',

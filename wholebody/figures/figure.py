@@ -13,7 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
-from wholebody.figures.grounding import Among, grounded
+from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.reduction import reduced_parts
 from wholebody.records import as_dict
 
@@ -335,7 +335,7 @@ class Figure(checks.Settled):
         q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
         return q
 
-    def grounded(self, q: Array, scene: Among) -> Array:
+    def grounded(self, q: Array, scene: SceneLike) -> Array:
         """Return a copy of q moved vertically until the lowest segments stand on the things of a scene.
 
         Args:

@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.figures import human_capsules
 from wholebody.figures.anthropometry import FOLDER, Body, design_cases, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import capsules
 from wholebody.figures.measuring import ansur, measure
 from wholebody.files import write
 
@@ -104,12 +104,12 @@ def fit() -> tuple[list[list[str]], list[list[str]]]:
 
 def measured(person: Body, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
     """Return the dimensions of a person, metres, with some of the fitted sizes changed."""
-    from wholebody.figures.human import human_spec
+    from wholebody.figures.human.spec import human_spec
 
     person = Body(person.sex, person.stature, person.mass, deviations)
     spec: BodySpec = human_spec(person)
     model = model_of(spec)
-    geometry = geometry_of(model, human_capsules.solids(Dimensions(person)), ())
+    geometry = geometry_of(model, capsules.solids(Dimensions(person)), ())
 
     def with_joints(q: Array, values: Mapping[str, float]) -> Array:
         q = q.copy()

@@ -227,22 +227,48 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
 
 
 def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
-    order = list(FINGERS)
     tested, excluded = [], []
     for a, b in combinations([solid.name for solid in solids], 2):
-        first, second = a.split("_")[1:], b.split("_")[1:]
-        if first == ["hand"]:
-            reason = "neighbours that overlap at their joint" if second[1] == "proximal" else ""
-        elif first[0] == second[0]:
-            reason = "neighbours that overlap at their joint"
-        else:
-            beside = abs(order.index(first[0]) - order.index(second[0])) == 1 and "thumb" not in (first[0], second[0])
-            reason = "fingers rest side by side" if beside else ""
+        reason = finger_pair(a.partition("_")[2], b.partition("_")[2])
         if reason:
             excluded.append(ExcludedPair(a, b, reason))
         else:
             tested.append((a, b))
     return tuple(tested), tuple(excluded)
+
+
+def is_finger(segment: str) -> bool:
+    """Whether a segment without its side, such as "index_middle", is of a finger."""
+    return segment.partition("_")[0] in FINGERS
+
+
+def finger_pair(a: str, b: str) -> str | None:
+    """Why two segments of one hand are not tested against each other; None if they are.
+
+    Args:
+        a: segment without its side, such as "hand" or "index_middle".
+        b: the other one.
+    """
+    first, second = sorted((a, b), key=_order)
+    finger, _, part = second.partition("_")
+    if finger not in FINGERS:
+        return None
+    if first in ("hand", "forearm"):
+        near = part == "metacarpal" or (part == "proximal" and first == "hand")
+        return "neighbours that overlap at their joint" if near else None
+    other, _, _ = first.partition("_")
+    if other not in FINGERS:
+        return None
+    if other == finger:
+        return "neighbours that overlap at their joint"
+    order = list(FINGERS)
+    beside = abs(order.index(other) - order.index(finger)) == 1 and "thumb" not in (other, finger)
+    return "fingers rest side by side" if beside else None
+
+
+def _order(segment: str) -> int:
+    finger = segment.partition("_")[0]
+    return list(FINGERS).index(finger) if finger in FINGERS else -1
 
 
 def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.human_fingers import finger_angles
+from wholebody.figures.human.fingers import finger_angles
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.grasp import Grasp

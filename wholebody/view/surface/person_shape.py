@@ -11,8 +11,8 @@ from wholebody.arrays import Array
 from wholebody.figures.anthropometry import Body
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.dimensions import Dimensions
-from wholebody.figures.human import human_spec
-from wholebody.figures.human_figure import figure_of
+from wholebody.figures.human.figure import figure_of
+from wholebody.figures.human.spec import human_spec
 from wholebody.view.surface.fields import (
     Field,
     ball,

@@ -16,7 +16,7 @@ from wholebody.arrays import Array
 from wholebody.figures.anthropometry import Body
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS
-from wholebody.figures.human import human_spec
+from wholebody.figures.human.spec import human_spec
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.view.surface.borders import Bound, divided
 from wholebody.view.surface.garments import Garment, Part, bounds, made

@@ -10,19 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from wholebody.checks import known
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures import human_capsules, human_fingers, human_hulls, human_spheres
 from wholebody.figures.anthropometry import Body, body, describe, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
+from wholebody.figures.hand import palm_axes
+from wholebody.figures.human import capsules, fingers, hulls, spheres
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
-    "spheres": human_spheres.solids,
-    "capsules": human_capsules.solids,
-    "hulls": human_hulls.solids,
+    "spheres": spheres.solids,
+    "capsules": capsules.solids,
+    "hulls": hulls.solids,
 }
 
 
@@ -43,11 +42,11 @@ def human_spec(person: Body | None = None, detail: str = "capsules", hands: str 
         InputError: fingers in spheres.
     """
     person = person or body()
-    known(hands, human_fingers.HANDS, "kind of hands", "human")
+    known(hands, fingers.HANDS, "kind of hands", "human")
     if hands == "fingers" and detail == "spheres":
         raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
     spec = _spec(person, detail)
-    return human_fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+    return fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
 
 
 def _spec(person: Body, detail: str) -> BodySpec:
@@ -141,8 +140,7 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
         Landmark("gaze", "head", place(size.eye_x, 0.0, size.eye_z)),
     ]
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        # Hanging hand: fingers -z, palm towards the thigh, which is -y on the left.
-        palm = np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
+        palm = palm_axes(side)
         length, thick, index, thumb = size.palm_length, size.palm_half_thickness, size.index, size.thumb
         marks += [
             Landmark(f"{side}_palm", f"{side}_hand", place(0.0, -sign * thick, -0.6 * length, palm)),
