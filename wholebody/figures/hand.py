@@ -17,7 +17,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Body, body, describe, keyed
+from wholebody.figures.anthropometry import Person, describe, keyed, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
 from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
@@ -54,7 +54,7 @@ POSTURES: dict[str, dict[str, float]] = {
 }
 
 
-def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
+def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
     """Return the specification of a hand.
 
     Args:
@@ -66,7 +66,7 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
     """
     if side not in ("left", "right"):
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
-    person = person or body()
+    person = person or make_person()
     size = Dimensions(person)
     palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, part_radii(size, "palm")))
     solids, joints, virtual = [palm], [], []
@@ -100,10 +100,10 @@ def hand_figure(
     percentile: float | None = None,
 ) -> Figure:
     """Return a hand with a free root at the wrist; arguments as for `hand_spec` and the person."""
-    return hand_figure_of(body(sex, stature, mass, percentile), side)
+    return hand_figure_of(make_person(sex, stature, mass, percentile), side)
 
 
-def hand_figure_of(person: Body, side: str) -> Figure:
+def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)

@@ -10,7 +10,7 @@ from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import make_folder, write
 
 if TYPE_CHECKING:
-    from wholebody.figures.anthropometry import Body
+    from wholebody.figures.anthropometry import Person
 
 
 def urdf_folder() -> Path:
@@ -52,7 +52,7 @@ def task_paths() -> dict[str, Path]:
     raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
 
 
-def write_human(path: str | os.PathLike[str], person: Body, hands: str = "rigid") -> None:
+def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:
     """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`."""
     from wholebody.figures.body_spec import urdf_text
     from wholebody.figures.human.figure import figure_of

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from wholebody.figures import postures
-from wholebody.figures.anthropometry import Body, body, table
+from wholebody.figures.anthropometry import Person, make_person, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
@@ -54,7 +54,7 @@ def human_figure(
         InputError: an impossible body, or fingers in spheres.
         UnknownNameError: an unknown detail or dimension, or other hands.
     """
-    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
@@ -156,9 +156,9 @@ RIGID = ("spine", "neck2", "left_clavicle", "right_clavicle")
 """Beginnings of the names of the joints that the avatar does not have."""
 
 
-def avatar_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+def avatar_spec(person: Person | None = None, detail: str = "capsules") -> BodySpec:
     """Return the specification of an avatar; arguments as for the person."""
-    person = person or body()
+    person = person or make_person()
     whole = human_spec(person, detail)
     joints = tuple(with_values(joint, axis=None) if joint.name.startswith(RIGID) else joint for joint in whole.joints)
     return replace(whole, name="avatar", joints=joints)
@@ -178,5 +178,5 @@ def avatar_figure(
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
     return figure_of(avatar_spec(person, detail), detail)
