@@ -66,7 +66,7 @@ def spread(
             parallel = joblib.Parallel(
                 n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs + 1
             )  # fmt: skip
-            with _deaf():
+            with _ctrl_c_ignored():
                 answers = parallel(joblib.delayed(function)(argument) for argument in arguments)
             try:
                 yield from answers
@@ -77,7 +77,7 @@ def spread(
 
 
 @contextmanager
-def _deaf() -> Iterator[None]:
+def _ctrl_c_ignored() -> Iterator[None]:
     """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good, and print no traceback while they begin.
 
     The one who began them ends them. Only the main thread hears Ctrl-C.

@@ -38,7 +38,7 @@ _ARGUMENTS: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 
 
-class Problem(checks.Settled):
+class Problem(checks.FixedAttributes):
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
     Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
@@ -56,6 +56,7 @@ class Problem(checks.Settled):
         defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
+        touching: pairs of segment or object names whose clearance is zero.
         clearances: (pairs,) least distance of each collision pair of the scene, metres; may be changed between runs.
 
     `start`, `clearances` and resolved terms of another problem may be set; `retarget` takes new goals. The other
@@ -66,7 +67,7 @@ class Problem(checks.Settled):
     """
 
     _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})
-    _mend = "state another problem with wb.Problem(...)"
+    _correction = "state another problem with wb.Problem(...)"
 
     def __init__(
         self,
@@ -155,7 +156,7 @@ class Problem(checks.Settled):
         terms = _checked(value, _KINDS[name], name)
         for number, term in enumerate(terms):
             if is_dataclass(term) and not all(hasattr(term, field.name) for field in fields(term)):
-                mend = "give it to problem.retarget([...])" if name == "goals" else self._mend
+                mend = "give it to problem.retarget([...])" if name == "goals" else self._correction
                 raise InputError(f"{name}[{number}] is a {type(term).__name__} that is not resolved; {mend}")
         return tuple(terms)
 

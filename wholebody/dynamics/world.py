@@ -31,7 +31,7 @@ from wholebody.moving_things import Collision
 from wholebody.scene import Scene
 from wholebody.tracking.frame import Frame
 from wholebody.tracking.loop import FrameLoop, unreadable
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 FRAME = 1.0 / 60.0  # s: frame time of a screen
 
@@ -68,7 +68,7 @@ class WorldFrame(NamedTuple):
     note: str
 
 
-class World(OfOneRun):
+class World(NotCopyable):
     """A figure that follows a tracker among things, some of which move by themselves.
 
     Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`). The

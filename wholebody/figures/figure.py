@@ -74,7 +74,7 @@ def check_model(model: pin.Model, name: str) -> None:
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
-class Figure(checks.Settled):
+class Figure(checks.FixedAttributes):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
     It never changes, so any number of scenes and threads may share one. It can be pickled and copied.
@@ -105,7 +105,7 @@ class Figure(checks.Settled):
     """
 
     _settable = frozenset({"loaded_as"})
-    _mend = "a figure never changes: load another one with wb.load(...)"
+    _correction = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
         self,

@@ -41,6 +41,9 @@ class State:
     The object is re-used: `update` overwrites everything that was read from it before.
 
     Attributes:
+        model: Pinocchio's model.
+        data: Pinocchio's data at the posture.
+        q: (nq,) the posture.
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
         columns: (n, 6) the same, transposed.

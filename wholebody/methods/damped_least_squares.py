@@ -92,10 +92,10 @@ class DampedLeastSquares(SolvesAnew):
         began = time.perf_counter()
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             descent = _Descent(problem, self, workspace.state, control)
-            rested = descent.run()
+            converged = descent.run()
         ending = Ending(
             descent.best,
-            rested,
+            converged,
             descent.steps,
             tuple(descent.trace),
             f"in {descent.steps} steps",

@@ -34,7 +34,7 @@ from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
 from wholebody.tracking.recording import Recording
 from wholebody.tracking.scripts import FRAME
 from wholebody.tracking.tracks import UNIT_TOLERANCE, Track
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 OVERLAPS = ("qp", "ccd")
 
@@ -51,7 +51,7 @@ def check_scene(scene: object, what: str) -> None:
     instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
-class FrameLoop(OfOneRun):
+class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with

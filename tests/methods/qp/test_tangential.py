@@ -77,7 +77,7 @@ def gone(ahead: Extrapolation, sizes: list[float]) -> None:
     for size in sizes:
         split = Parts(np.array([0.0, size**2]), np.array([size, 0.0]))
         ahead.propose(split, free_program(2))
-        ahead.went(split, split.normal + split.tangential, False)
+        ahead.record(split, split.normal + split.tangential, False)
 
 
 def test_steps_that_shrink_by_a_factor_are_taken_to_their_limit():
@@ -124,5 +124,5 @@ def test_a_proposal_that_would_be_the_own_step_is_not_made():
     gone(ahead, [0.1, 0.13])
     split = Parts(np.zeros(2), np.array([0.169, 0.0]))
     assert ahead.propose(split, free_program(2)) is None
-    ahead.went(split, split.normal + split.tangential, False)
+    ahead.record(split, split.normal + split.tangential, False)
     assert ahead.propose(Parts(np.zeros(2), np.array([0.2, 0.0])), free_program(2))[0] / 0.2 == pytest.approx(2.0)

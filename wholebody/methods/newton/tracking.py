@@ -23,7 +23,7 @@ from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
@@ -47,7 +47,7 @@ class NewtonStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class NewtonTracker(OfOneRun):
+class NewtonTracker(NotCopyable):
     """Follows the goals of one problem, frame by frame.
 
     Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker

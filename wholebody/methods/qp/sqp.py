@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.methods.control import Control
@@ -72,7 +72,7 @@ class Iterate(NamedTuple):
     at: Linearisation
     rows: Rows
     violation: Violation
-    placed: Placed
+    placed: QueryResult
     longest: float = np.inf
 
 
@@ -308,7 +308,7 @@ class SQP:
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
         if step.parts is not None and not step.flat:
-            self._ahead.went(step.parts, way, way is not step.dq)
+            self._ahead.record(step.parts, way, way is not step.dq)
         self._anchor = None
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
@@ -336,7 +336,7 @@ class SQP:
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within), longest)
+        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""

@@ -73,9 +73,9 @@ class Extrapolation:
             fast = min(ALONG, self._longest) * plain
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
-    def went(self, parts: Parts, way: Array, extrapolated: bool) -> None:
+    def record(self, parts: Parts, way: Array, extrapolated: bool) -> None:
         """Remember the way (n,) that was gone after the last proposal, and whether it was the proposed one."""
-        self._memory.went(way - parts.normal)
+        self._memory.record(way - parts.normal)
         if extrapolated or self._as_plain:
             self._longest = min(LONGER * self._longest, STRETCH)
 

@@ -49,7 +49,7 @@ def solve(
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
-        value: (g + c,) errors of goals and values of constraints; see `linearisation.Passing`, like the next seven.
+        value: (g + c,) errors of goals and values of constraints; see `PackedLinearisation`, like the next seven.
         jacobian: (g + c + r, n).
         gap: (r,).
         gap_contact: (r,).

@@ -13,7 +13,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.linearisation import Passing
+from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.qp.subproblem import Rows
 from wholebody.workspace import Workspace
 
@@ -40,7 +40,7 @@ class Turning:
         self._twists = np.empty((3, workspace.model.njoints, 6))
         self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
 
-    def bent(self, at: Passing, rows: Rows, displacement: Array) -> float:
+    def bent(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
 
         Args:

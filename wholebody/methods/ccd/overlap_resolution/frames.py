@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
 from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
@@ -134,7 +134,7 @@ class FrameResolver:
         self._swept = shown is not None and not pushed
         return self._result(q if shown is None else shown)
 
-    def _approach(self, q: Array, wanted: Array, before: Placed, rng: np.random.Generator) -> list[Array]:
+    def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
         """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
@@ -195,7 +195,7 @@ class FrameResolver:
         self._resolver.query(result)
         return result
 
-    def _passes_through(self, before: Placed, q0: Array, q1: Array) -> bool:
+    def _passes_through(self, before: QueryResult, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then the first contact."""
         hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, PASSED)
         if hit is not None:
