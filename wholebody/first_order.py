@@ -19,7 +19,7 @@ import pinocchio as pin
 from wholebody.all_pairs import AllPairs, Label, NearPairs, all_pairs
 from wholebody.arrays import Array, Mask
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
@@ -121,14 +121,12 @@ class FirstOrder:
             yield pairs.state.update(self._q)
 
 
-def _dense(part: Wrench | Array, state: State) -> Array:
-    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
-
-
 def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     """What is left of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
-    goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in asked.goals]
+    goals = [
+        (np.atleast_1d(goal.error(state)), state.dense_jacobian(goal.jacobian(state)), goal) for goal in asked.goals
+    ]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
     signed, one_sided = active.signed, active.one_sided
     if met:
@@ -162,14 +160,14 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
         if np.abs(missed).max(initial=0.0) > MET:
             violated["constraint", (asked.names[number],)] = float(np.abs(missed).max())
-            gradient += missed @ _dense(constraint.jacobian(state), state)
+            gradient += missed @ state.dense_jacobian(constraint.jacobian(state))
     if violated:
         for row, number in zip(rows, numbers, strict=True):
             gradient -= violated.get(near.label(number), 0.0) * row
         signed, one_sided = _without(signed, violated), _without(one_sided, violated)
     else:
         for goal in asked.goals:
-            gradient += goal.weight * np.atleast_1d(goal.error(state)) @ _dense(goal.jacobian(state), state)
+            gradient += goal.weight * np.atleast_1d(goal.error(state)) @ state.dense_jacobian(goal.jacobian(state))
     multipliers, _ = _balanced(gradient, signed, one_sided)
     found: dict[Label, float] = {}
     for label, size in zip([*signed.labels, *one_sided.labels], multipliers.tolist(), strict=True):
@@ -216,7 +214,7 @@ def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
     one_sided.add(gaps, [near.label(number) for number in contacts])
     for number, constraint in enumerate(asked.constraints):
         value = np.atleast_1d(constraint.value(state))
-        jacobian = _dense(constraint.jacobian(state), state)
+        jacobian = state.dense_jacobian(constraint.jacobian(state))
         low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
         label: Label = ("constraint", (asked.names[number],))
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))

@@ -65,7 +65,7 @@ class Workspace(NotCopyable):
         self.owners = built.owners
         self.state = State(built.model)
         self.moved: dict[str, tuple[pin.SE3, pin.SE3]] = {}
-        self._stuck: tuple[str, ...] = ()
+        self._inside: tuple[str, ...] = ()
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
         self._depths: dict[float, SweptDepth] = {}
@@ -77,7 +77,7 @@ class Workspace(NotCopyable):
         self.proximity.reset()
         self.refresh()
         self.moved.clear()
-        self._stuck = ()
+        self._inside = ()
 
     def refresh(self) -> None:
         """See things where they are now; `moved` has those that moved there."""
@@ -99,15 +99,15 @@ class Workspace(NotCopyable):
 
         Things are where it ends.
         """
-        if not (self.moved or self._stuck):
+        if not (self.moved or self._inside):
             return None
-        moved = {name: (self.where(name),) * 2 for name in self._stuck} | self.moved
+        moved = {name: (self.where(name),) * 2 for name in self._inside} | self.moved
         self.moved.clear()
         return self.frame(moved)
 
     def keep(self, motion: FrameMotion, collisions: Collection[Collision]) -> None:
         """Let the next frame look after the things of this one too, if it could not keep them out of the figure."""
-        self._stuck = tuple(motion.names) if collisions else ()
+        self._inside = tuple(motion.names) if collisions else ()
 
     def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
         """A frame in which these things move, from one placement to another in the frame of their joint."""

@@ -146,6 +146,10 @@ class State:
             moved = moved - self.support[wrench.against]
         return self.folded(np.dot(wrench.rows, self.jacobian) * moved)  # twice as fast as @ for so few rows
 
+    def dense_jacobian(self, part: Wrench | Array) -> Array:
+        """Jacobian (m, nv) of a term that gave a `Wrench` or the rows themselves, one row or several."""
+        return self.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
+
     def folded(self, rows: Array) -> Array:
         """Rows (k, nv) of rows (k, n) over the columns of `jacobian`: joints that follow another move with it."""
         if self._columns is None:

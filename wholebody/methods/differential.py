@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.assessment import goal_errors, largest_violation
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
@@ -188,12 +189,5 @@ class Iteration:
     def _look(self) -> tuple[float, float]:
         """The largest error of a goal and of a constraint, metres or radians."""
         state = self._state.update(self.q)
-        errors, violations = [0.0], [0.0]
-        for goal in self._problem.goals:
-            error = np.atleast_1d(goal.error(state))
-            angular = np.broadcast_to(goal.angular, error.shape)
-            errors += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
-        for term in self._problem.constraints:
-            value = np.atleast_1d(term.value(state))
-            violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
-        return max(errors), max(violations)
+        distance, angle, _ = goal_errors(self._problem, state)
+        return max(distance, angle), largest_violation(self._problem, state)

@@ -26,11 +26,11 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
 from wholebody.workspace import NotCopyable, Workspace
 
-FRAME = 1.0 / 60.0  # s: frame time of a screen
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 

@@ -103,7 +103,7 @@ def test_a_refused_proposal_shortens_the_next_ones():
         gone(ahead, [0.1, 0.13])
         split = Parts(np.zeros(2), np.array([0.169, 0.0]))
         factors.append(float(ahead.propose(split, free_program(2))[0] / 0.169))
-        ahead.refused()
+        ahead.rejected()
     assert factors == pytest.approx([3.0, 2.0])
 
 
@@ -120,7 +120,7 @@ def test_a_proposal_that_would_be_the_own_step_is_not_made():
     for _ in range(2):
         gone(ahead, [0.1, 0.13])
         ahead.propose(Parts(np.zeros(2), np.array([0.169, 0.0])), free_program(2))
-        ahead.refused()
+        ahead.rejected()
     gone(ahead, [0.1, 0.13])
     split = Parts(np.zeros(2), np.array([0.169, 0.0]))
     assert ahead.propose(split, free_program(2)) is None

@@ -203,9 +203,9 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._tolerance):
                 best = trial
-            if self._serves(best):
+            if self._solves(best):
                 self.contradictions = ()
-            if self._serves(best) or self._control.over:
+            if self._solves(best) or self._control.over:
                 break
             if attempt == 0:
                 self.contradictions = contradictions(self._problem, self._workspace)
@@ -227,7 +227,7 @@ class _Search:
                 break
         return out
 
-    def _serves(self, trial: _Trial) -> bool:
+    def _solves(self, trial: _Trial) -> bool:
         return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._tolerance
 
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
@@ -252,7 +252,7 @@ class _Search:
             gained = best is None or trial.better(best, self._tolerance)
             if gained:
                 best = trial
-            if self._serves(trial) or not gained or self._control.over:
+            if self._solves(trial) or not gained or self._control.over:
                 break
         assert best is not None
         return best

@@ -83,8 +83,8 @@ class Placo(SolvesAnew):
             MissingPackageError: placo is not installed.
         """
         check_problem(problem, "Placo.prepare: problem")
-        with problem.borrow() as workspace, problem.scene.built.pool(_Room, _Room).borrow() as room:
-            room.robot(problem, workspace, self.pairs(problem))
+        with problem.borrow() as workspace, problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
+            cache.robot(problem, workspace, self.pairs(problem))
 
     def pairs(self, problem: Problem) -> Indices:
         """Numbers (pairs,) of the scene's pairs that placo is given: all of them."""
@@ -106,10 +106,10 @@ class Placo(SolvesAnew):
         began = time.perf_counter()
         with (
             problem.borrow() as workspace,
-            problem.scene.built.pool(_Room, _Room).borrow() as room,
+            problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache,
             Control(self.time_limit, progress) as control,
         ):
-            robot = room.robot(problem, workspace, self.pairs(problem))
+            robot = cache.robot(problem, workspace, self.pairs(problem))
             stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])
             settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
             run = Iteration(problem, workspace, stepper, settings, control)
@@ -119,7 +119,7 @@ class Placo(SolvesAnew):
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
 
-class _Room:
+class _RobotCache:
     """Keeps the robot of one solve for the next solve on the same scene, which may have a similar problem."""
 
     def __init__(self) -> None:

@@ -94,7 +94,7 @@ class Search:
     def run(self, begin: Array | None = None) -> LocalSolution:
         """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found."""
         self._try_ways(begin)
-        self._settle()
+        self._come_nearest()
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than what is asked
         if self._out_of_reach:  # which is known, although a nearer posture may be near
@@ -191,7 +191,7 @@ class Search:
             self.control,
         )  # fmt: skip
 
-    def _settle(self) -> None:
+    def _come_nearest(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         tolerance = self.settings.tolerance
         if self.control.over:

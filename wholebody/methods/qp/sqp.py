@@ -225,7 +225,7 @@ class SQP:
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
-            saved = self.subproblem.bending(program, here.rows, parts.tangential)
+            saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
             multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
@@ -259,7 +259,7 @@ class SQP:
             if acceptance.accepted and not self._jumps(here, leap):
                 self._record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
-            self._ahead.refused()
+            self._ahead.rejected()
         dq = step.dq
         there = self._moved(here, dq)
         acceptance = self._judge(here, there, step)

@@ -79,7 +79,7 @@ class Extrapolation:
         if extrapolated or self._as_plain:
             self._longest = min(LONGER * self._longest, STRETCH)
 
-    def refused(self) -> None:
+    def rejected(self) -> None:
         """Go less far the next time, from what is learnt from now on."""
         self._memory.forget()
         self._longest = max(SHORTER * self._longest, 1.0)

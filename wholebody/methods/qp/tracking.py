@@ -274,10 +274,12 @@ class QPTracker(NotCopyable):
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
             bent = (
-                self._turning.bent(at, program.rows(at), displacement) if curved > least_unseen(answer.asked) else 0.0
+                self._turning.linearisation_error(at, program.rows(at), displacement)
+                if curved > least_unseen(answer.asked)
+                else 0.0
             )
             if bent > 0.0:
-                displacement, share, following = self._looked_after(at, displacement, share, bent > MIDWAY)
+                displacement, share, following = self._corrected(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
@@ -289,7 +291,7 @@ class QPTracker(NotCopyable):
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
-    def _looked_after(
+    def _corrected(
         self, at: PackedLinearisation, displacement: Array, share: float, midway: bool
     ) -> tuple[Array, float, Array]:
         """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
