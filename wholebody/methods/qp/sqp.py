@@ -225,10 +225,13 @@ class SQP:
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
+            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
+            if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
+                saved = self.subproblem.saving(program, here.rows, parts.tangential)
+                saved -= multipliers.change(program, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
-            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
         return Step(x, parts, flat, answer.x, predicted, multipliers)

@@ -273,11 +273,9 @@ class QPTracker(NotCopyable):
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
-            bent = (
-                self._turning.linearisation_error(at, program.rows(at), displacement)
-                if curved > least_unseen(answer.asked)
-                else 0.0
-            )
+            bent = 0.0
+            if curved > least_unseen(answer.asked):
+                bent = self._turning.linearisation_error(at, program.rows(at), displacement)
             if bent > 0.0:
                 displacement, share, following = self._corrected(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
