@@ -11,7 +11,14 @@ import pytest
 
 import wholebody as wb
 from wholebody import motion_assessment
-from wholebody.motion_assessment import assess_motion, deepened, dip, pairs_along, passed, velocities
+from wholebody.motion_assessment import (
+    assess_motion,
+    deepened,
+    depth_between,
+    frames_passed_through,
+    pairs_along,
+    velocities,
+)
 
 Arms = Callable[..., wb.Figure]
 
@@ -48,12 +55,12 @@ def test_a_way_through_a_plate_is_seen_though_both_ends_are_free(beside_a_plate:
     judged = assess_motion(beside_a_plate, motion, 0.1)
     assert judged.depth.max() == 0.0
     assert judged.overlapping.max() == 0
-    assert passed(beside_a_plate, motion, 1e-3) == (1,)
+    assert frames_passed_through(beside_a_plate, motion, 1e-3) == (1,)
     assert deepened(beside_a_plate, motion).tolist() == [np.inf, motion_assessment.DEPTHS[0]]
-    depth, what = dip(beside_a_plate, before, after, 1e-3)
+    depth, what = depth_between(beside_a_plate, before, after, 1e-3)
     assert depth > 0.01
     assert "plate" in what
-    assert dip(beside_a_plate, after, after, 1e-3) == (0.0, "")
+    assert depth_between(beside_a_plate, after, after, 1e-3) == (0.0, "")
 
 
 def test_limits_speeds_and_jerk_of_a_known_motion(planar_arm: Arms) -> None:

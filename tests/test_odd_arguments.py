@@ -521,7 +521,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assembly.retarget", Call(goals.retarget, {"goal": 0, "target": at}, solve_parts)
     yield "Assembly.goal_index", Call(goals.goal_index, {"goal": 0})
     yield "Assembly.goal_error", Call(goals.goal_error, {"goal": 0})
-    yield "Assembly.aim_between", Call(goals.aim_between, {"goal": 0, "share": 0.5, "target": at}, solve_parts)
+    yield (
+        "Assembly.interpolate_goal",
+        Call(goals.interpolate_goal, {"goal": 0, "share": 0.5, "target": at}, solve_parts),
+    )
     yield "Assembly.step", Call(goals.step, {"tolerance": 1e-4})
     placed = assembly()
     yield "Assembly.place", Call(placed.place, {"variables": placed.variables()}, solve_parts)
@@ -832,6 +835,7 @@ DERIVATIVES = (
     "bounds",
     "parts",
     "rows",
+    "dense_jacobian",
     "wrench_jacobian",
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""

@@ -88,7 +88,7 @@ def test_importing_loads_nothing_heavy() -> None:
 def test_what_is_used_most_loads_no_library_that_few_of_its_calls_need() -> None:
     """Solving, following, freeing a clip and a world: scipy.stats alone takes longer to load than many of these."""
     rare = ("scipy.stats", "scipy.signal", "scipy.optimize", "scipy.sparse", "scipy.special", "matplotlib", "rich")
-    used = ("figures.human_figure", "taskfile", "methods.qp.method", "tracking", "motion.avoidance", "dynamics.world")
+    used = ("figures.human.figure", "taskfile", "methods.qp.method", "tracking", "motion.avoidance", "dynamics.world")
     code = f"import sys, {', '.join('wholebody.' + name for name in used)}; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split()
     assert not [name for name in rare if name in loaded]

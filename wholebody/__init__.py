@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from wholebody.ergonomics.vision import FieldOfView, Sight, sight
     from wholebody.ergonomics.work import Work
     from wholebody.figures import Figure, load
-    from wholebody.figures.human_fingers import finger_angles
+    from wholebody.figures.human.fingers import finger_angles
     from wholebody.geometry.shapes import (
         Box,
         Capsule,
@@ -268,7 +268,7 @@ _MODULES = {
     "wholebody.assessment": "Assessment assess",
     "wholebody.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
-    "wholebody.figures.human_fingers": "finger_angles",
+    "wholebody.figures.human.fingers": "finger_angles",
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
     "wholebody.dynamics.coupling": "Spring",
     "wholebody.dynamics.world": "World",

@@ -126,9 +126,9 @@ def assess(problem: Problem, q: Array) -> Assessment:
 def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assessment:
     pairs.move(q)
     state = pairs.state
-    distance, angle, each = _goal_errors(problem, state)
+    distance, angle, each = goal_errors(problem, state)
     violation = float((problem.clearances - pairs.distance).max(initial=0.0))
-    missed = _constraint_violation(problem, state)
+    missed = largest_violation(problem, state)
     fits = max(distance, angle, violation, missed) <= MET
     return Assessment(
         goal_error=distance,
@@ -145,7 +145,8 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     )
 
 
-def _goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:
+def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[float, ...]]:
+    """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
     distances, angles, each = [0.0], [0.0], []
     for goal in problem.goals:
         error = np.atleast_1d(goal.error(state))
@@ -162,7 +163,8 @@ def _limit_violation(problem: Problem, q: Array) -> float:
     return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
 
 
-def _constraint_violation(problem: Problem, state: State) -> float:
+def largest_violation(problem: Problem, state: State) -> float:
+    """The largest violation of a constraint, metres or radians."""
     worst = 0.0
     for constraint in problem.constraints:
         value = np.atleast_1d(constraint.value(state))

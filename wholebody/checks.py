@@ -67,21 +67,21 @@ def some(names: Iterable[str]) -> str:
     return ", ".join(listed[:SHOWN_NAMES]) + more
 
 
-def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, mend: str) -> _T:
+def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, correction: str) -> _T:
     """A value of a type, or of one of several.
 
     Args:
         value: the argument.
         kind: the type.
         what: its name in the message.
-        mend: the correction, such as "load one with wb.load('human')".
+        correction: such as "load one with wb.load('human')".
 
     Raises:
         InputError: it is of another type.
     """
     if not isinstance(value, kind):
         wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
-        raise InputError(f"{what} is {a(type(value))}, not {wanted}; {mend}")
+        raise InputError(f"{what} is {a(type(value))}, not {wanted}; {correction}")
     return value
 
 
@@ -98,7 +98,7 @@ def number(value: object, what: str, low: float, high: float, unit: str = "") ->
         else:
             odd = isinstance(value, float) and not math.isfinite(value)
             wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
-        slip = slipped(found, low, high) if unit == "m" and found is not None else ""
+        slip = unit_hint(found, low, high) if unit == "m" and found is not None else ""
         raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}{slip}")
     return found
 
@@ -111,7 +111,7 @@ def warn(told: str) -> None:
     warnings.warn(told, stacklevel=level)
 
 
-def slipped(value: float, low: float, high: float) -> str:
+def unit_hint(value: float, low: float, high: float) -> str:
     """A hint that a length out of a range [m] may be in millimetres or centimetres; empty if it is in neither."""
     fits = [
         f"{value * factor:.6g} if it is in {unit}"
@@ -219,7 +219,7 @@ def listed(value: object, what: str, example: str) -> list[Any]:
     raise InputError(f"{what} is {shown(value)}, not a list; give one, such as {example}")
 
 
-class Settled:
+class FixedAttributes:
     """Base of objects whose public attributes are decided when they are made.
 
     Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks. Methods and
@@ -227,13 +227,13 @@ class Settled:
     """
 
     _settable: ClassVar[frozenset[str]] = frozenset()
-    _mend: ClassVar[str] = "make another one"
+    _correction: ClassVar[str] = "make another one"
 
     def __setattr__(self, name: str, value: Any) -> None:
         given = name in vars(self)
         if not name.startswith("_") and (given or isinstance(getattr(type(self), name, None), property)):
             if name not in self._settable:
-                raise InputError(f"{name} of a {type(self).__name__} cannot be set; {self._mend}")
+                raise InputError(f"{name} of a {type(self).__name__} cannot be set; {self._correction}")
             value = self._checked_value(name, value)
         object.__setattr__(self, name, value)
 

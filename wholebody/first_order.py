@@ -19,7 +19,7 @@ import pinocchio as pin
 from wholebody.all_pairs import AllPairs, Label, NearPairs, all_pairs
 from wholebody.arrays import Array, Mask
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 
@@ -27,7 +27,7 @@ ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as ac
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
-MOST_CHANGES = 20  # times the number of rows: changes of the set that pushes, at the most
+MOST_CHANGES = 20  # times the number of rows: changes of the passive set, at the most
 WORTH = 0.05  # share of the largest push from which on something counts as being in the way
 
 
@@ -121,14 +121,12 @@ class FirstOrder:
             yield pairs.state.update(self._q)
 
 
-def _dense(part: Wrench | Array, state: State) -> Array:
-    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
-
-
 def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     """What is left of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
-    goals = [(np.atleast_1d(goal.error(state)), _dense(goal.jacobian(state), state), goal) for goal in asked.goals]
+    goals = [
+        (np.atleast_1d(goal.error(state)), state.dense_jacobian(goal.jacobian(state)), goal) for goal in asked.goals
+    ]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
     signed, one_sided = active.signed, active.one_sided
     if met:
@@ -152,7 +150,7 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
     """
     nv = state.model.nv
     signed, one_sided, rows, numbers = _active(asked, state, near)
-    pull = np.zeros(nv)
+    gradient = np.zeros(nv)
     violated: dict[Label, float] = {}
     violation = clearances - near.found[:, 0]
     for row in np.flatnonzero(violation > MET).tolist():
@@ -162,17 +160,17 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
         if np.abs(missed).max(initial=0.0) > MET:
             violated["constraint", (asked.names[number],)] = float(np.abs(missed).max())
-            pull += missed @ _dense(constraint.jacobian(state), state)
+            gradient += missed @ state.dense_jacobian(constraint.jacobian(state))
     if violated:
         for row, number in zip(rows, numbers, strict=True):
-            pull -= violated.get(near.label(number), 0.0) * row
+            gradient -= violated.get(near.label(number), 0.0) * row
         signed, one_sided = _without(signed, violated), _without(one_sided, violated)
     else:
         for goal in asked.goals:
-            pull += goal.weight * np.atleast_1d(goal.error(state)) @ _dense(goal.jacobian(state), state)
-    push, _ = _balanced(pull, signed, one_sided)
+            gradient += goal.weight * np.atleast_1d(goal.error(state)) @ state.dense_jacobian(goal.jacobian(state))
+    multipliers, _ = _balanced(gradient, signed, one_sided)
     found: dict[Label, float] = {}
-    for label, size in zip([*signed.labels, *one_sided.labels], push.tolist(), strict=True):
+    for label, size in zip([*signed.labels, *one_sided.labels], multipliers.tolist(), strict=True):
         found[label] = found.get(label, 0.0) + size
     most, deepest = max(found.values(), default=0.0), max(violated.values(), default=0.0)
     frames: dict[Label, str | None] = {
@@ -216,7 +214,7 @@ def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
     one_sided.add(gaps, [near.label(number) for number in contacts])
     for number, constraint in enumerate(asked.constraints):
         value = np.atleast_1d(constraint.value(state))
-        jacobian = _dense(constraint.jacobian(state), state)
+        jacobian = state.dense_jacobian(constraint.jacobian(state))
         low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
         label: Label = ("constraint", (asked.names[number],))
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))
@@ -241,12 +239,14 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
     """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
-    equal, pushing = np.vstack(signed.rows), np.vstack(one_sided.rows)
+    equal, one_way = np.vstack(signed.rows), np.vstack(one_sided.rows)
     basis = _row_space(equal)
     room = objective - objective @ basis.T @ basis
-    push, left = nonnegative_least_squares(pushing - pushing @ basis.T @ basis, room, np.linalg.norm(pushing, axis=1))
-    turned = np.linalg.lstsq(equal.T, objective - push @ pushing, rcond=None)[0] if len(equal) else np.zeros(0)
-    sizes = [np.abs(turned) * np.linalg.norm(equal, axis=1), push * np.linalg.norm(pushing, axis=1)]
+    multipliers, left = nonnegative_least_squares(
+        one_way - one_way @ basis.T @ basis, room, np.linalg.norm(one_way, axis=1)
+    )
+    turned = np.linalg.lstsq(equal.T, objective - multipliers @ one_way, rcond=None)[0] if len(equal) else np.zeros(0)
+    sizes = [np.abs(turned) * np.linalg.norm(equal, axis=1), multipliers * np.linalg.norm(one_way, axis=1)]
     return np.concatenate([sizes[0][: len(signed.labels)], sizes[1]]), left
 
 
@@ -262,7 +262,7 @@ def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tupl
     """The nonnegative combination of rows (m, n) that is nearest to a right side (n,), and what it leaves (n,).
 
     Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
-    joins those that push, and rows leave whose share would turn negative. scipy's does the same, but loading
+    joins the passive set, and rows whose share would turn negative leave it. scipy's does the same, but loading
     scipy.optimize takes longer than a whole solve.
 
     Args:
@@ -278,44 +278,44 @@ def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tupl
     scale = np.where(counts, norms, 1.0)
     units = np.where(counts[:, None], rows / scale[:, None], 0.0)
     products = units @ units.T
-    share, pushing, barred = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
+    share, passive, excluded = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
     left, enough = right, INDEPENDENT * float(np.linalg.norm(right))
     for _ in range(MOST_CHANGES * len(rows)):
-        agrees = np.where(pushing | barred, -np.inf, units @ left)
+        agrees = np.where(passive | excluded, -np.inf, units @ left)
         new = int(agrees.argmax())
         if agrees[new] <= enough:
             break
-        before = share.copy(), pushing.copy()
-        pushing[new] = True
-        trial = _shares(units, products, right, pushing)
-        if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of those that push
-            pushing[new], barred[new] = False, True
+        before = share.copy(), passive.copy()
+        passive[new] = True
+        trial = _least_squares_on(units, products, right, passive)
+        if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of the passive rows
+            passive[new], excluded[new] = False, True
             continue
-        for _ in range(int(pushing.sum())):  # each time at least one row leaves
-            if trial is None or not (falling := pushing & (trial <= 0.0)).any():
+        for _ in range(int(passive.sum())):  # each time at least one row leaves
+            if trial is None or not (falling := passive & (trial <= 0.0)).any():
                 break
             part, way = np.full(len(rows), np.inf), share[falling] - trial[falling]
             part[falling] = share[falling] / np.where(way > 0.0, way, 1.0)  # 0 for a share that is 0 and stays 0
             share += part.min() * (trial - share)
-            pushing[part <= part.min()] = False
-            share[~pushing] = 0.0
-            trial = _shares(units, products, right, pushing)
+            passive[part <= part.min()] = False
+            share[~passive] = 0.0
+            trial = _least_squares_on(units, products, right, passive)
         share = share if trial is None else trial
         rest = right - share @ units
         if np.linalg.norm(rest) < np.linalg.norm(left):
-            left, barred = rest, ~counts
+            left, excluded = rest, ~counts
         else:  # rows that nearly depend: what rounding leaves would join and leave in turn for ever
-            share, pushing = before
-            barred[new] = True
+            share, passive = before
+            excluded[new] = True
     return share / scale, left
 
 
-def _shares(units: Array, products: Array, right: Array, pushing: Mask) -> Array | None:
-    """Shares (m,) of the rows that push in the combination nearest to a right side, any sign; None: they depend."""
-    share, rows, square = np.zeros(len(units)), units[pushing], products[np.ix_(pushing, pushing)]
+def _least_squares_on(units: Array, products: Array, right: Array, passive: Mask) -> Array | None:
+    """Shares (m,) of the passive rows in the combination nearest to a right side, any sign; None: they depend."""
+    share, rows, square = np.zeros(len(units)), units[passive], products[np.ix_(passive, passive)]
     try:
         first = np.linalg.solve(square, rows @ right)
-        share[pushing] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # refined once
+        share[passive] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # refined once
     except np.linalg.LinAlgError:
         return None
     return share

@@ -49,7 +49,7 @@ class Linearisation(NamedTuple):
         lower, upper: (nv,) bounds on dq.
         squares: (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative
             S' S.
-        squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; empty without rows.
+        squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; zero without rows.
     """
 
     q: Array
@@ -81,8 +81,8 @@ _NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
 _NO_WRENCHES, _NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
 
 
-class Passing(NamedTuple):
-    """A linearisation in as few arrays as can be; `Linearisation` says what they mean.
+class PackedLinearisation(NamedTuple):
+    """A linearisation in as few arrays as can be, which the next one overwrites; `Linearisation` says what they mean.
 
     Attributes:
         q: (nq,) the posture.
@@ -120,7 +120,7 @@ class Lineariser:
     def __init__(
         self,
         workspace: Workspace,
-        limits: Any,
+        limits: Limits,
         goals: Sequence[Goal],
         constraints: Sequence[Constraint],
         bounds: Sequence[Bound],
@@ -149,7 +149,7 @@ class Lineariser:
         self.goals: Sequence[Goal] = goals
         self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
         self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
-        self._passing: Passing | None = None
+        self._packed: PackedLinearisation | None = None
         self._grow(64)
         self._approach = self._largest_approach()
         self._most: Array | None = None
@@ -167,7 +167,7 @@ class Lineariser:
         if goals is not self.goals:
             before, self._plan = self._plan, self._again(self._plan, goals)
             if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
-                self._term_wrench, self._passing = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
+                self._term_wrench, self._packed = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
         self.goals, self.clearances = goals, clearances
         self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
         if self._approach is not None:
@@ -220,28 +220,28 @@ class Lineariser:
             measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared,
         )  # fmt: skip
 
-    def passing(self, q: Array, within: float) -> Passing:
+    def packed(self, q: Array, within: float) -> PackedLinearisation:
         """What `at` returns, in arrays that the next call of this overwrites.
 
         Raises:
             InputError: as for `at`.
         """
-        contacts, clearance, count = self._contacts(self.workspace.passing, q, within)
-        if self._passing is None or len(self._passing.jacobian) < len(self._passing.value) + count:
-            self._passing = self._made()
-        room = self._passing
+        contacts, clearance, count = self._contacts(self.workspace.near_views, q, within)
+        if self._packed is None or len(self._packed.jacobian) < len(self._packed.value) + count:
+            self._packed = self._buffers()
+        room = self._packed
         jacobian = room.jacobian[: len(room.value) + count]
         self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
         contact = self._contact[:count]
-        return Passing(
+        return PackedLinearisation(
             self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
             room.measure, room.box,
         )  # fmt: skip
 
-    def _made(self) -> Passing:
+    def _buffers(self) -> PackedLinearisation:
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         none = np.zeros(0)
-        return Passing(
+        return PackedLinearisation(
             none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
@@ -294,7 +294,7 @@ class Lineariser:
         rows = contacts * (1 + MOST_ENDS)
         self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
         self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
-        self._passing = None
+        self._packed = None
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""

@@ -123,7 +123,7 @@ def root_mean_square(values: Array) -> Array:
     return np.asarray(np.sqrt((values**2).sum(axis=1) / max(1, values.shape[1])))
 
 
-def passed(
+def frames_passed_through(
     scene: Scene, q: Array, depth: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
 ) -> tuple[int, ...]:
     """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it.
@@ -161,7 +161,7 @@ def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
     return np.inf
 
 
-def dip(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
+def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
     """Depth of the motion between two postures (nq,), metres, and the names of the pair; things stay in place.
 
     The sweep tests whether the motion gets deeper than `depth`, however thin the thing; the depth is measured at

@@ -38,7 +38,7 @@ _ARGUMENTS: dict[str, tuple[type, ...]] = {
 }  # fmt: skip
 
 
-class Problem(checks.Settled):
+class Problem(checks.FixedAttributes):
     """Scene, start, goals, constraints and measures, in the same form for every method.
 
     Joint limits and non-penetration are part of every problem. A person keeps its `RangeOfMotion` and `ReachCones`, and
@@ -56,6 +56,8 @@ class Problem(checks.Settled):
         defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
+        touching: pairs of segment or object names whose clearance is zero.
+        range_of_motion, balance: as they were given.
         clearances: (pairs,) least distance of each collision pair of the scene, metres; may be changed between runs.
 
     `start`, `clearances` and resolved terms of another problem may be set; `retarget` takes new goals. The other
@@ -66,7 +68,7 @@ class Problem(checks.Settled):
     """
 
     _settable = frozenset({"start", "goals", "constraints", "bounds", "measures", "measures_given", "clearances"})
-    _mend = "state another problem with wb.Problem(...)"
+    _correction = "state another problem with wb.Problem(...)"
 
     def __init__(
         self,
@@ -105,20 +107,19 @@ class Problem(checks.Settled):
         terms = [*_checked(goals, _ARGUMENTS["goals"], "goals")]
         given = [*_checked(constraints, _ARGUMENTS["constraints"], "constraints")]
         self.measures_given = measures is not None
-        moving = checks.flag(range_of_motion, "range_of_motion")
-        usual = default_measures(scene, ranges=moving)
+        self.range_of_motion = checks.flag(range_of_motion, "range_of_motion")
+        self.balance = balance if balance is None else checks.flag(balance, "balance")
+        usual = default_measures(scene, ranges=self.range_of_motion)
         measured = usual if measures is None else _checked(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
         self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
-        if balance is not None:
-            checks.flag(balance, "balance")
         self.bounds: tuple[Bound, ...] = tuple(
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
         added = default_constraints(
-            scene, self.start, stated, self.bounds, self.goals, ranges=range_of_motion, balance=balance
+            scene, self.start, stated, self.bounds, self.goals, ranges=self.range_of_motion, balance=self.balance
         )
         self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)
         self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
@@ -155,7 +156,7 @@ class Problem(checks.Settled):
         terms = _checked(value, _KINDS[name], name)
         for number, term in enumerate(terms):
             if is_dataclass(term) and not all(hasattr(term, field.name) for field in fields(term)):
-                mend = "give it to problem.retarget([...])" if name == "goals" else self._mend
+                mend = "give it to problem.retarget([...])" if name == "goals" else self._correction
                 raise InputError(f"{name}[{number}] is a {type(term).__name__} that is not resolved; {mend}")
         return tuple(terms)
 

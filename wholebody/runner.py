@@ -33,7 +33,7 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
 BY_THE_CLOCK = 10.0  # a deadline by the clock in units of that of the processor: others use the machine too
 ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
-LONGEST_WORDS = 200  # most characters kept of the last line that a process wrote
+LONGEST_LINE = 200  # most characters kept of the last line that a process wrote
 
 _START = (
     "import sys; sys.path[:] = [{root!r}, *filter(None, sys.path)]; from wholebody.runner import serve; "
@@ -110,8 +110,8 @@ class Child:
         """
         self._environment, self._forked = dict(environment or {}), forked
         self._process: subprocess.Popen[bytes] | BaseProcess | None = None
-        self._words: IO[bytes] | None = None
-        self._ear: Connection | None = None
+        self._output: IO[bytes] | None = None
+        self._connection: Connection | None = None
         self._job: Job | None = None
         self._notes: list[Any] = []
 
@@ -121,10 +121,10 @@ class Child:
         return None if self._process is None else self._process.pid
 
     @property
-    def ear(self) -> Connection:
+    def connection(self) -> Connection:
         """The connection that becomes readable when a job sent something; see `multiprocessing.connection.wait`."""
-        assert self._ear is not None
-        return self._ear
+        assert self._connection is not None
+        return self._connection
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
         """Do a job, and wait for its answer.
@@ -148,7 +148,7 @@ class Child:
         if self._process is None:
             self._start()
         try:
-            self.ear.send((job.seconds, packed((job.function, job.arguments))))
+            self.connection.send((job.seconds, packed((job.function, job.arguments))))
         except (BrokenPipeError, ConnectionResetError):
             return  # the process ended after its last job: `listen` reports it
 
@@ -156,7 +156,7 @@ class Child:
         """Wait for the next message of a job: its outcome, or None after a note."""
         assert self._job is not None
         try:
-            last, value = self.ear.recv()
+            last, value = self.connection.recv()
         except (EOFError, ConnectionResetError):
             return Outcome(self._job, tuple(self._notes), None, self._ended())
         if not last:
@@ -176,10 +176,10 @@ class Child:
         if self._process is not None:
             self._process.kill()
             _wait_for(self._process)
-        for stream in (self._ear, self._words):
+        for stream in (self._connection, self._output):
             if stream is not None:
                 stream.close()
-        self._process = self._words = self._ear = None
+        self._process = self._output = self._connection = None
 
     def _start(self) -> None:
         """Start an interpreter that reads jobs."""
@@ -187,22 +187,22 @@ class Child:
 
         ours, theirs = socket.socketpair()
         root = str(Path(wholebody.__file__).parents[1])
-        self._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+        self._output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno(), parent=os.getpid())],
                 stdin=subprocess.DEVNULL,
-                stdout=self._words,
-                stderr=self._words,
+                stdout=self._output,
+                stderr=self._output,
                 pass_fds=[theirs.fileno()],
                 env=os.environ | self._environment,
             )
-        self._ear = Connection(ours.detach())
+        self._connection = Connection(ours.detach())
 
     def _fork(self, job: Job) -> None:
         """Fork a process for the job."""
         context = multiprocessing.get_context("fork")
-        self._ear, theirs = context.Pipe()
+        self._connection, theirs = context.Pipe()
         self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
         self._process.start()
         theirs.close()
@@ -210,10 +210,10 @@ class Child:
     def _ended(self) -> EndedError:
         assert self._process is not None
         code, said = _wait_for(self._process), ""
-        if self._words is not None:
-            self._words.seek(0)
-            lines = self._words.read().decode("utf-8", errors="replace").strip().splitlines()
-            said = lines[-1].strip()[:LONGEST_WORDS] if lines else ""
+        if self._output is not None:
+            self._output.seek(0)
+            lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
+            said = lines[-1].strip()[:LONGEST_LINE] if lines else ""
         self.close()
         return EndedError(code, said)
 
@@ -233,8 +233,8 @@ def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> I
                 busy[-1].begin(job)
             if not busy:
                 return
-            ready = wait([child.ear for child in busy])
-            for child in [child for child in busy if child.ear in ready]:
+            ready = wait([child.connection for child in busy])
+            for child in [child for child in busy if child.connection in ready]:
                 outcome = child.listen()
                 if outcome is not None:
                     busy.remove(child)
@@ -308,9 +308,9 @@ def serve(descriptor: int, parent: int) -> None:
     end_with(parent)
     try:
         while True:
-            seconds, packed = _parent.recv()
+            seconds, sent = _parent.recv()
             allow(seconds)
-            function, arguments = pickle.loads(packed)
+            function, arguments = pickle.loads(sent)
             answer = function(*arguments)
             allow(0.0)
             _parent.send((True, answer))
@@ -352,10 +352,8 @@ def _memory(process: int | None) -> float:
 
 
 def packed(value: Any) -> bytes:
-    """Pickle by cloudpickle, which includes code that is not importable; by pickle if cloudpickle is missing."""
-    try:
-        import cloudpickle
-    except ImportError:
-        return pickle.dumps(value)
+    """Pickle by cloudpickle, which includes code that is not importable."""
+    import cloudpickle
+
     made: bytes = cloudpickle.dumps(value)
     return made

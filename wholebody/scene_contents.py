@@ -32,14 +32,14 @@ WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
 
-class SceneContents(checks.Settled):
+class SceneContents(checks.FixedAttributes):
     """A figure and its things, which can be added, moved and removed.
 
     The geometry model is built when it is first needed, and again after things were added or removed. Moving a thing
     keeps it.
     """
 
-    _mend = "make another with wb.Scene(figure), or change its things by add, move and remove"
+    _correction = "make another with wb.Scene(figure), or change its things by add, move and remove"
 
     def __init__(self, figure: Figure) -> None:
         """Make a scene with the figure alone.
@@ -160,7 +160,9 @@ class SceneContents(checks.Settled):
                 raise InputError(f"{name!r} has a body and a material; give the body's: wb.Body(material=...)")
             mass_properties(checks.instance(shape, Shape, repr(name), SHAPES), body, name)
         made_of = DEFAULT if material is None else to_material(material, f"{name!r}: material")
-        return self._put(name, shape, at, color, body=body, material=made_of if body is None else body.stuff)
+        return self._put(
+            name, shape, at, color, body=body, material=made_of if body is None else body.resolved_material
+        )
 
     def attach(
         self,

@@ -75,11 +75,14 @@ class SceneGeometry:
     changes come from `pool`.
 
     Attributes:
+        model: Pinocchio's model of the figure.
+        geometry: the geometry model of all pieces and pairs.
         table: pieces and pairs as arrays.
         rows: builds contact rows.
         owners: name of the segment or object that each piece is part of.
         pieces_of: object to its pieces: index, and placement in the object.
         lock: held while pieces are placed, and while more than one placement is copied.
+        moves: how often a thing was placed.
     """
 
     def __init__(
@@ -115,7 +118,9 @@ class SceneGeometry:
                 self.geometry.geometryObjects[index].placement = base * local
                 self._moved_at[index] = self.moves
 
-    def bring(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]] | None = None) -> int:
+    def update_placements(
+        self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]] | None = None
+    ) -> int:
         """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
 
         Args:

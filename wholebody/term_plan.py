@@ -7,7 +7,7 @@ says in which rows they stand. `term_kernel` evaluates a plan.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from wholebody import tasks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
+from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.records import with_values
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
@@ -127,7 +128,7 @@ class TermPlan(NamedTuple):
 
 
 def make_plan(
-    limits: Any,
+    limits: Limits,
     goals: Sequence[Goal],
     constraints: Sequence[Constraint],
     bounds: Sequence[Bound],

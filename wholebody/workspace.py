@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from wholebody.moving_things import Collision, FrameMotion, MovingThings
 
 
-class OfOneRun:
+class NotCopyable:
     """What belongs to the run that made it, and is neither pickled nor copied."""
 
     def __reduce__(self) -> NoReturn:
@@ -39,7 +39,7 @@ class OfOneRun:
         )
 
 
-class Workspace(OfOneRun):
+class Workspace(NotCopyable):
     """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.
 
     A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the
@@ -65,23 +65,23 @@ class Workspace(OfOneRun):
         self.owners = built.owners
         self.state = State(built.model)
         self.moved: dict[str, tuple[pin.SE3, pin.SE3]] = {}
-        self._stuck: tuple[str, ...] = ()
+        self._inside: tuple[str, ...] = ()
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
         self._depths: dict[float, SweptDepth] = {}
         self._moving: MovingThings | None = None
-        self._seen = built.bring(self.proximity, -1)
+        self._seen = built.update_placements(self.proximity, -1)
 
     def begin(self) -> None:
         """Forget what was asked before, and see things where they are now."""
         self.proximity.reset()
         self.refresh()
         self.moved.clear()
-        self._stuck = ()
+        self._inside = ()
 
     def refresh(self) -> None:
         """See things where they are now; `moved` has those that moved there."""
-        self._seen = self._built.bring(self.proximity, self._seen, self.moved)
+        self._seen = self._built.update_placements(self.proximity, self._seen, self.moved)
 
     def place(self, placements: Mapping[str, pin.SE3]) -> None:
         """See things at placements in their joints' frames; the scene keeps its own."""
@@ -99,15 +99,15 @@ class Workspace(OfOneRun):
 
         Things are where it ends.
         """
-        if not (self.moved or self._stuck):
+        if not (self.moved or self._inside):
             return None
-        moved = {name: (self.where(name),) * 2 for name in self._stuck} | self.moved
+        moved = {name: (self.where(name),) * 2 for name in self._inside} | self.moved
         self.moved.clear()
         return self.frame(moved)
 
     def keep(self, motion: FrameMotion, collisions: Collection[Collision]) -> None:
         """Let the next frame look after the things of this one too, if it could not keep them out of the figure."""
-        self._stuck = tuple(motion.names) if collisions else ()
+        self._inside = tuple(motion.names) if collisions else ()
 
     def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
         """A frame in which these things move, from one placement to another in the frame of their joint."""
@@ -143,9 +143,9 @@ class Workspace(OfOneRun):
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
         return self.proximity.query(self.state.update(q), within, most)
 
-    def passing(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+    def near_views(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """What `near` returns, in arrays that the next call of this overwrites."""
-        return self.proximity.passing(self.state.update(q), within, most)
+        return self.proximity.query_views(self.state.update(q), within, most)
 
     def largest_approach(self, most: Array) -> Array:
         """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).

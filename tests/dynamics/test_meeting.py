@@ -9,7 +9,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.dynamics.passing import Before, Way, way_of
+from wholebody.dynamics.passing import PassingCheck, StepStart, check_passing
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.rigid_bodies import RigidBodies
 
@@ -45,22 +45,22 @@ def test_a_frame_of_tumbling_boxes_takes_few_steps() -> None:
     assert steps < 450  # 160 and the stops at impacts; 574 where each overlap halved the step
 
 
-def way_between(scene: wb.Scene, steps: dict[str, tuple[pin.SE3, float]], margin: float = 1e-3) -> Way:
+def way_between(scene: wb.Scene, steps: dict[str, tuple[pin.SE3, float]], margin: float = 1e-3) -> PassingCheck:
     """What is known of the way on which bodies take steps, each given with the most that a point of it moves."""
     pieces = Pieces(scene)
     state, finder = BodiesState(scene, pieces), ContactFinder(pieces)
     count = len(pieces.names)
-    margins, ways = np.full(count, margin), np.zeros(count)
+    margins, travel = np.full(count, margin), np.zeros(count)
     near = finder.near(state.position, state.rotation, margins, pieces.dynamic)
-    before = Before(state, near, margins, finder)
+    before = StepStart(state, near, margins, finder)
     for name, (step, way) in steps.items():
         number = pieces.index[name]
         at = step * state.placement(number)
         state.spin[number] = pin.log3(at.rotation @ state.rotation[number].T)
         state.put(number, at)
-        ways[number] = way
+        travel[number] = way
     after = finder.near(state.position, state.rotation, margins, pieces.dynamic)
-    return way_of(state, before, after, margins, ways, 1.0, 0.0)
+    return check_passing(state, before, after, margins, travel, 1.0, 0.0)
 
 
 def crossed_planks() -> wb.Scene:
@@ -85,7 +85,7 @@ def test_planks_that_turn_together_do_not_meet() -> None:
     assert way_between(crossed_planks(), {"low": (step, 0.1), "high": (step, 0.1)}, 0.2).free
 
 
-def beside_a_plate(step: float) -> Way:
+def beside_a_plate(step: float) -> PassingCheck:
     """The way of a ball that a blow throws farther than was foreseen, beside or through a plate of 1 mm."""
     scene = wb.Scene(wb.load("hand")).add(wb.Box((0.001, 1.0, 1.0)), name="plate", at=(5.2, 0.0, 1.0))
     scene.add(wb.Sphere(0.05), name="ball", at=(5.0, 0.0, 1.0), body=wb.Body())

@@ -53,6 +53,17 @@ def test_a_thing_in_between_hides(person: wb.Figure) -> None:
     assert wb.sight(scene, q, point).seen
 
 
+@pytest.mark.parametrize("wall_first", [True, False])
+def test_the_first_thing_on_the_line_is_named(person: wb.Figure, wall_first: bool) -> None:
+    """Of a long wall and a ball on one line of sight, although the middle of the wall is far aside."""
+    q, scene, point = person.posture("standing"), wb.Scene(person), ahead(person, 0, -15, 2.0)
+    wall, ball = (0.5, 1.0) if wall_first else (1.5, 1.0)
+    x, y, z = ahead(person, 0, -15, wall)
+    scene.add(wb.Box((0.02, 6.0, 1.0)), name="wall", at=(x, y + 2.8, z))
+    scene.add(wb.Sphere(0.1), name="ball", at=ahead(person, 0, -15, ball))
+    assert wb.sight(scene, q, point).hidden_by == ("wall" if wall_first else "ball")
+
+
 def test_a_thing_does_not_hide_its_own_surface(person: wb.Figure) -> None:
     scene, point = wb.Scene(person), ahead(person, 0, -15)
     scene.add(wb.Sphere(0.05), name="ball", at=ahead(person, 0, -15, 1.05))

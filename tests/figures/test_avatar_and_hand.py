@@ -6,7 +6,7 @@ import pytest
 
 from wholebody.errors import InputError
 from wholebody.figures import load
-from wholebody.figures.anthropometry import body
+from wholebody.figures.anthropometry import make_person
 
 
 def frames(figure, q):
@@ -85,7 +85,7 @@ def test_hand_has_a_hands_length_mass_and_thumb():
     at = frames(hand, hand.posture("open"))
     reach = at["right_middle_tip"].translation[0] - at["right_hand"].translation[0]
     assert reach == pytest.approx(0.99 * 0.1101 * 1.755, rel=5e-3)  # ANSUR II: hand length 0.1101 of the stature
-    assert pin.computeTotalMass(hand.model) == pytest.approx(0.0061 * body().mass, rel=1e-3)
+    assert pin.computeTotalMass(hand.model) == pytest.approx(0.0061 * make_person().mass, rel=1e-3)
     # Palm down, fingers forward: the right thumb is on the left, and it hangs below the palm.
     thumb = at["right_thumb_tip"].translation - at["right_hand"].translation
     assert thumb[1] > 0.03

@@ -7,7 +7,7 @@ import pytest
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures import load
-from wholebody.figures.anthropometry import body, table
+from wholebody.figures.anthropometry import make_person, table
 from wholebody.figures.measuring import measure
 from wholebody.figures.proportions import dimension_names, residual_covariance
 
@@ -62,7 +62,7 @@ def test_the_conditional_mean_is_the_regression_of_the_covariance():
     which = [names.index("span"), names.index("sitting_height")]
     slopes = np.linalg.lstsq(people[:, which], people, rcond=None)[0]
     change = np.array([0.04, -0.02])
-    assert likely_change(body(), which, change) == pytest.approx(change @ slopes, abs=5e-4)
+    assert likely_change(make_person(), which, change) == pytest.approx(change @ slopes, abs=5e-4)
 
 
 def test_given_stature_and_mass_the_spreads_are_those_of_all_men():

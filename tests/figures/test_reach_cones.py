@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from wholebody.errors import InputError
 from wholebody.figures import ReachCone, load
-from wholebody.figures.human_figure import human_cones
+from wholebody.figures.human.figure import human_cones
 
 NAMES = ("left_shoulder", "right_shoulder", "left_hip", "right_hip")
 

@@ -60,9 +60,9 @@ def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh
         (
             lambda *_: os.kill(os.getpid(), signal.SIGSEGV),
             60.0,
-            "CoACD cannot cut it into convex pieces; mend the mesh",
+            "CoACD cannot cut it into convex pieces; repair the mesh",
         ),
-        (lambda *_: all(True for _ in count()), 2.0, "CoACD found no convex pieces in 2 s of the processor; mend"),
+        (lambda *_: all(True for _ in count()), 2.0, "CoACD found no convex pieces in 2 s of the processor; repair"),
     ],
     ids=["crashes", "hangs"],
 )

@@ -70,7 +70,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
             proximity = Proximity(scene.pair_table) if k == 0 else used
-            ask = proximity.passing if k % 2 else proximity.query
+            ask = proximity.query_views if k % 2 else proximity.query
             found = ask(scene.state(q), within)
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
@@ -143,11 +143,11 @@ def test_answers_are_kept_when_the_next_question_comes(free_bodies):
 def test_answers_in_passing_are_overwritten_and_take_no_memory(free_bodies):
     scene = wb.Scene(free_bodies(wb.Sphere(0.1), wb.Box((0.1, 0.1, 0.1))))
     workspace, q = scene.workspace(), scene.figure.neutral
-    first, kept = workspace.passing(q, 1.0), workspace.near(q, 1.0)
+    first, kept = workspace.near_views(q, 1.0), workspace.near(q, 1.0)
     for part, again in zip(first, kept, strict=True):
         assert np.array_equal(part, again)
     q[7:10] = 0.2, 0.1, 0.0
-    second = workspace.passing(q, 1.0)
+    second = workspace.near_views(q, 1.0)
     for before, after, same in zip(first, second, kept, strict=True):
         assert np.shares_memory(before, after)
         assert not np.shares_memory(after, same)

@@ -15,7 +15,7 @@ def run(matrix, start, count):
         step = matrix @ x - x
         fast = memory.propose(step)
         way = step if fast is None else fast
-        memory.went(way)
+        memory.record(way)
         x = x + way
         errors.append(float(np.abs(x).max()))
     return errors
@@ -43,7 +43,7 @@ def test_no_proposal_before_something_is_known_or_after_forgetting():
     for _ in range(2):
         for scale in (1.0, 0.5):
             assert memory.propose(np.array([scale, 0.0])) is None
-            memory.went(np.array([scale, 0.0]))
+            memory.record(np.array([scale, 0.0]))
         assert memory.propose(np.array([0.25, 0.0])) == pytest.approx([0.5, 0.0])  # 1/4 + 1/8 + ...
         memory.reset()
 
@@ -52,7 +52,7 @@ def test_a_proposal_is_bounded():
     memory = Anderson()
     for scale in (1.0, 0.999):
         memory.propose(np.array([scale, 0.0]))
-        memory.went(np.array([scale, 0.0]))
+        memory.record(np.array([scale, 0.0]))
     fast = memory.propose(np.array([0.998, 0.0]))
     assert np.abs(fast).max() == pytest.approx(STRETCH * 0.998)
 
@@ -61,7 +61,7 @@ def test_steps_that_repeat_say_nothing_and_break_nothing():
     memory = Anderson()
     for _ in range(5):
         fast = memory.propose(np.array([0.1, -0.2]))
-        memory.went(np.array([0.1, -0.2]))
+        memory.record(np.array([0.1, -0.2]))
     assert np.isfinite(fast).all()
 
 
@@ -69,7 +69,7 @@ def test_a_shorter_bound_holds_for_one_proposal():
     memory = Anderson()
     for scale in (1.0, 0.999):
         memory.propose(np.array([scale, 0.0]))
-        memory.went(np.array([scale, 0.0]))
+        memory.record(np.array([scale, 0.0]))
     assert np.abs(memory.propose(np.array([0.998, 0.0]), 2.0)).max() == pytest.approx(2.0 * 0.998)
 
 
@@ -78,19 +78,19 @@ def test_after_forgetting_the_last_step_still_counts():
     memory = Anderson()
     for scale in (8.0, 3.0):
         memory.propose(np.array([scale, 0.0]))
-        memory.went(np.array([scale, 0.0]))
+        memory.record(np.array([scale, 0.0]))
     memory.propose(np.array([1.0, 0.0]))
     memory.forget()
-    memory.went(np.array([1.0, 0.0]))
+    memory.record(np.array([1.0, 0.0]))
     assert memory.propose(np.array([0.5, 0.0])) is None
-    memory.went(np.array([0.5, 0.0]))
+    memory.record(np.array([0.5, 0.0]))
     assert memory.propose(np.array([0.25, 0.0])) == pytest.approx([0.5, 0.0])
 
 
 def test_a_way_that_was_not_proposed_for_is_not_remembered():
     memory = Anderson()
-    memory.went(np.array([5.0, 0.0]))
+    memory.record(np.array([5.0, 0.0]))
     for scale in (1.0, 0.5):
         assert memory.propose(np.array([scale, 0.0])) is None
-        memory.went(np.array([scale, 0.0]))
+        memory.record(np.array([scale, 0.0]))
     assert memory.propose(np.array([0.25, 0.0])) == pytest.approx([0.5, 0.0])

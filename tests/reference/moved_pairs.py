@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, Placed, distances
+from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, QueryResult, distances
 from wholebody.geometry.proximity import PairTable
 
 
-def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
+def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
     """Return what `far_moved` returns."""
     motion = _motion(table, before.placements, after.placements)
     pairs = table.pairs
@@ -31,7 +31,7 @@ def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
     return moved
 
 
-def parted(table: PairTable, before: Placed, after: Placed, contact: int, dip: float) -> bool:
+def separated(table: PairTable, before: QueryResult, after: QueryResult, contact: int, overlap: float) -> bool:
     """Whether the plane between two pieces before the motion, fixed to either, still separates them after it."""
     if contact < 0:
         return False
@@ -54,18 +54,18 @@ def parted(table: PairTable, before: Placed, after: Placed, contact: int, dip: f
         turned = after.placements[[carrier, other], :3] - before.placements[[carrier, other], :3]
         angle = float(np.sqrt(0.5 * np.einsum("ijk,ijk->i", turned, turned)).sum())
         arc = 0.125 * angle**2 * (swept.reach + float(np.linalg.norm(before.placements[other, 3] - point)))
-        if min(heights) - arc > -dip:
+        if min(heights) - arc > -overlap:
             return True
     return False
 
 
-def _apart(placed: Placed, count: int) -> Array:
+def _apart(placed: QueryResult, count: int) -> Array:
     """Signed distance (pairs,) of every pair, not less than zero; those that were not measured at their least."""
     apart: Array = np.maximum(distances(placed, count), 0.0)
     return apart
 
 
-def _spheres_apart(table: PairTable, placed: Placed, pairs: Indices) -> Array:
+def _spheres_apart(table: PairTable, placed: QueryResult, pairs: Indices) -> Array:
     """Distance of the bounding spheres of these pairs, or the distance above where it is larger."""
     first, second = table.pairs[pairs, 0], table.pairs[pairs, 1]
     between = placed.placements[first, 3] - placed.placements[second, 3]

@@ -63,6 +63,14 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
     assert (tmp_path / "task-rock_one.obj").exists()
 
 
+@pytest.mark.parametrize(
+    "asked", [{"range_of_motion": False}, {"balance": True}, {"range_of_motion": False, "balance": False}]
+)
+def test_what_a_person_keeps_by_default_goes_round(tmp_path: Path, asked: dict[str, bool]) -> None:
+    problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_palm", (0.4, -0.2, 1.2))], **asked)
+    same(problem, wb.read_task(wb.write_task(problem, tmp_path / "task.toml")).problem)
+
+
 def test_joints_of_things_go_round(tmp_path: Path) -> None:
     hinge = wb.Hinge((0.0, -0.4, 0.0), axis=(0.0, 0.3, 0.4))
     door = wb.Body(mass=12.0, joints=[hinge], angular_velocity=(0.0, 0.0, 1.5))

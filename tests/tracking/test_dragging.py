@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.tracking import Dragged, drag_along, judge_drag, spread
-from wholebody.tracking.dragging import goal_place, present_place
+from wholebody.tracking.dragging import present_position, target_position
 
 TOP = 0.74  # m: of the table
 
@@ -23,7 +23,7 @@ def problem() -> wb.Problem:
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_hand_that_is_dragged_into_a_table_stays_on_it_and_comes_back(problem: wb.Problem, method: str) -> None:
-    corners = [present_place(problem), (0.3, -0.25, 0.95), (0.4, -0.25, 0.80), (0.4, -0.25, 0.68), (0.4, -0.25, 0.9)]
+    corners = [present_position(problem), (0.3, -0.25, 0.95), (0.4, -0.25, 0.80), (0.4, -0.25, 0.68), (0.4, -0.25, 0.9)]
     places = spread(corners, 75)
     dragged = drag_along(problem, places, method)
     judged = judge_drag(problem, dragged)
@@ -46,12 +46,12 @@ def test_a_hand_that_is_dragged_into_a_table_stays_on_it_and_comes_back(problem:
         reached = data.oMi[frame.parentJoint].act(frame.placement.translation)
         assert reached[2] > TOP - 1e-3 or place[0] < 0.3
         assert np.linalg.norm(reached - place) == pytest.approx(error, abs=1e-9)
-    np.testing.assert_allclose(goal_place(problem), (0.4, -0.25, 0.9))  # the caller's goal stays
+    np.testing.assert_allclose(target_position(problem), (0.4, -0.25, 0.9))  # the caller's goal stays
 
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_drag_that_ends_inside_of_a_thing_ends_on_it(problem: wb.Problem, method: str) -> None:
-    corners = [present_place(problem), (0.3, -0.25, 0.95), (0.5, -0.1, 0.80), (0.5, -0.1, 0.66)]
+    corners = [present_position(problem), (0.3, -0.25, 0.95), (0.5, -0.1, 0.80), (0.5, -0.1, 0.66)]
     dragged = drag_along(problem, spread(corners, 60), method)
     judged = judge_drag(problem, dragged)
     assert dragged.end.status == "unreachable"
@@ -98,7 +98,7 @@ def test_a_frame_keeps_its_orientation() -> None:
         goals=[wb.Point("left_index_tip", (0.2, 0.4, 1.1)), wb.Frame("pelvis", (0.0, 0.0, 0.85, *turn.coeffs()))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot")],
     )
-    np.testing.assert_allclose(present_place(own, 1), own.start[:3])
+    np.testing.assert_allclose(present_position(own, 1), own.start[:3])
     dragged = drag_along(own, spread([own.start[:3], (0.02, 0.03, 0.86)], 30), "newton", goal=1)
     assert dragged.end.solved
     root = pin.XYZQUATToSE3(dragged.q[-1][:7])
@@ -110,6 +110,6 @@ def test_mistakes_are_named(problem: wb.Problem) -> None:
     with pytest.raises(wb.InputError, match="places"):
         drag_along(problem, [(0.0, 0.0)])
     with pytest.raises(wb.InputError, match="the number of the goal is 4"):
-        present_place(problem, 4)
+        present_position(problem, 4)
     with pytest.raises(wb.UnknownNameError, match="method"):
         drag_along(problem, [(0.4, -0.25, 0.9)], "jacobi")

@@ -70,6 +70,11 @@ def test_the_posture_is_a_task(drag: LiveDrag, tmp_path: Any) -> None:
     assert len(task.problem.constraints) - len(task.problem.defaults) == 2
 
 
+def test_a_figure_that_need_not_keep_its_ranges_is_dragged_without_them() -> None:
+    problem = wb.Problem(wb.Scene(wb.load("human")), range_of_motion=False, balance=False)
+    assert not LiveDrag(problem).stated().constraints
+
+
 def test_mistakes_are_named(drag: LiveDrag) -> None:
     with pytest.raises(wb.UnknownNameError, match="right_palm"):
         drag.take("right_plam")

@@ -12,7 +12,7 @@ from wholebody.bench.drag import DragFrameRow, DragRow, drag_frames, drag_summar
 from wholebody.bench.report import render
 from wholebody.problem import Problem
 from wholebody.taskfile import read_task
-from wholebody.tracking.dragging import Dragged, drag_along, judge_drag, present_place
+from wholebody.tracking.dragging import Dragged, drag_along, judge_drag, present_position
 from wholebody.tracking.paths import read_path, spread
 
 TASK = "sit_on_chair"
@@ -42,7 +42,7 @@ def measure(
     The task is sit_on_chair.toml, with its path beside it; `say` takes a line about each method.
     """
     problem = read_task(task).problem
-    places = spread(np.vstack([present_place(problem), read_path(task.with_suffix(".csv"))]), frames)
+    places = spread(np.vstack([present_position(problem), read_path(task.with_suffix(".csv"))]), frames)
     rows, every = [], {}
     for method in METHODS:
         dragged = drag_along(problem, places, method)

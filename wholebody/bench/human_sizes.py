@@ -11,8 +11,8 @@ import pinocchio as pin
 from scipy.spatial import ConvexHull
 
 from wholebody.arrays import Array
-from wholebody.figures.anthropometry import Body, design_cases
-from wholebody.figures.human import human_spec
+from wholebody.figures.anthropometry import Person, design_cases
+from wholebody.figures.human.spec import human_spec
 from wholebody.figures.measuring import ansur, measure
 from wholebody.view.surface.fields import Field, union
 from wholebody.view.surface.profile import piece_field
@@ -93,7 +93,7 @@ def circumferences(cases: Sequence[str]) -> list[DimensionRow]:
     return rows
 
 
-def _girths(person: Body, segment: str) -> list[float]:
+def _girths(person: Person, segment: str) -> list[float]:
     """Circumferences of a segment's pieces, metres, at levels along its pieces."""
     solids = [solid for solid in human_spec(person).solids if solid.segment == segment]
     whole = union([piece_field(solid) for solid in solids])

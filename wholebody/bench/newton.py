@@ -20,7 +20,7 @@ from wholebody.bench.newton_shapes import LINK, SHAPES, chain, four_bar, median_
 from wholebody.bench.report import render
 from wholebody.errors import WholebodyError
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.newton.feasibility import FeasibilityResult, reach
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.iteration import HARD_DAMPING
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
@@ -206,7 +206,7 @@ def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
 
 def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -> SolveRow:
     def once() -> FeasibilityResult:
-        return reach(active_system, x, tolerance=1e-5, iterations=50)
+        return satisfy(active_system, x, tolerance=1e-5, iterations=50)
 
     found, us = once(), median_us(once, repeats)
     return _solve_row(case, active_system.system.pattern, (found.iterations, found.systems), us, found.residuals)

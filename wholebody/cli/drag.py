@@ -179,19 +179,19 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
     from wholebody.errors import FileFormatError
     from wholebody.files import is_file
     from wholebody.tasks.inputs import point
-    from wholebody.tracking.dragging import goal_place, present_place
+    from wholebody.tracking.dragging import present_position, target_position
     from wholebody.tracking.paths import circle, read_path
 
     if arguments.path == "line":
-        end = goal_place(problem, goal) if arguments.to is None else point(arguments.to, "--to")
+        end = target_position(problem, goal) if arguments.to is None else point(arguments.to, "--to")
         way = end[None]
     elif arguments.path == "circle":
-        way = circle(goal_place(problem, goal), arguments.size, arguments.normal)
+        way = circle(target_position(problem, goal), arguments.size, arguments.normal)
     elif is_file(arguments.path):
         way = read_path(arguments.path)
     else:
         raise FileFormatError(f"--path: there is no file {arguments.path}; give line, circle or a file of places")
-    return np.vstack([present_place(problem, goal), way])
+    return np.vstack([present_position(problem, goal), way])
 
 
 def _animation(task: Task, dragged: Dragged, path: Path) -> None:

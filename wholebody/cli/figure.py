@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _write(name: str, options: dict[str, Any], out: Path) -> int:
     from wholebody.errors import InputError
-    from wholebody.figures.anthropometry import body
+    from wholebody.figures.anthropometry import make_person
     from wholebody.figures.packaged_urdf import write_human
     from wholebody.figures.proportions import proportioned
 
@@ -57,7 +57,7 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     if out.suffix != ".urdf":
         raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
     size = {name: value for name, value in options.items() if name not in ("proportions", "hands")}
-    person = proportioned(body(**size), options.get("proportions"))
+    person = proportioned(make_person(**size), options.get("proportions"))
     write_human(out, person, options.get("hands", "rigid"))
     print(f"wrote {out}: {person.sex}, {person.stature:.3f} m, {person.mass:.1f} kg")
     return 0

@@ -61,16 +61,16 @@ class BodiesState:
         self.spin[number] = pin.log3(after.rotation @ before.rotation.T) / time
         self.given[number] = bool(self.velocity[number].any() or self.spin[number].any())
 
-    def kept(self) -> tuple[Array, Array, Array]:
+    def copies(self) -> tuple[Array, Array, Array]:
         """Copies of positions, rotations and velocities."""
         return self.position.copy(), self.rotation.copy(), self.twist.copy()
 
     def restore(self, kept: tuple[Array, Array, Array]) -> None:
-        """Go back to what `kept` gave."""
+        """Go back to what `copies` gave."""
         self.position[:], self.rotation[:], self.twist[:] = kept
 
     def between(self, kept: tuple[Array, Array, Array], share: float) -> None:
-        """Go to where a share of the way from what `kept` gave has been covered; the velocities stay."""
+        """Go to where a share of the way from what `copies` gave has been covered; the velocities stay."""
         for number in np.flatnonzero(self.moving | self.given):
             turn = pin.log3(self.rotation[number] @ kept[1][number].T)
             self.rotation[number] = pin.exp3(share * turn) @ kept[1][number]

@@ -98,7 +98,7 @@ class FrameRecord:
         )  # fmt: skip
 
 
-def given_ways(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
+def given_placements(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
     """The placements before and after of what is moved in a frame, checked.
 
     Raises:
@@ -107,10 +107,10 @@ def given_ways(kinematic: object) -> dict[str, tuple[pin.SE3, pin.SE3]]:
     if kinematic is None:
         return {}
     given = checks.instance(kinematic, Mapping, "kinematic", "give {name: (placement before, after)}")
-    return {name: _ways(ways, name) for name, ways in given.items()}
+    return {name: _two_placements(ways, name) for name, ways in given.items()}
 
 
-def _ways(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
+def _two_placements(ways: object, name: str) -> tuple[pin.SE3, pin.SE3]:
     """Two placements; checking each of those that are pin.SE3 already would take a frame longer than its bodies."""
     if not isinstance(ways, (tuple, list)) or len(ways) != 2:
         raise InputError(

@@ -15,7 +15,7 @@ from wholebody.arrays import Array, Indices, Mask
 from wholebody.dynamics import contact_kernel, joint_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.pieces import Pieces
-from wholebody.matter.joints import Hinge
+from wholebody.matter.joints import BallJoint, Hinge
 from wholebody.scene import Scene
 
 CLOSED = 1e-9  # m: by which joint points may be apart at the end of a step
@@ -69,9 +69,9 @@ class Joints:
             np.arange(len(self.bodies)), self.bodies, pieces.dynamic, self._island
         )  # fmt: skip
 
-    def _points(self, number: int, joint: object) -> list[Array]:
+    def _points(self, number: int, joint: BallJoint) -> list[Array]:
         """Points of a joint in the thing's axes."""
-        at = np.array(joint.at)  # type: ignore[attr-defined]
+        at = np.array(joint.at)
         if not isinstance(joint, Hinge):
             return [at]
         axis, inertia = np.array(joint.axis), self._pieces.inertia[number]
@@ -93,7 +93,7 @@ class Joints:
         both = self._pieces.dynamic[self.bodies].all(axis=1) & ~self._world
         return self.bodies[both]
 
-    def off(self, state: BodiesState) -> Array:
+    def gaps(self, state: BodiesState) -> Array:
         """(j, 3) point of B seen from that of A, metres."""
         return self._place(state)[1]
 
@@ -102,7 +102,7 @@ class Joints:
         joint_kernel.place(self.bodies, self._anchor, self._world, state.position, state.rotation, lever, off)
         return lever, off
 
-    def lay(self, state: BodiesState, movable: Mask, rows: JointRows) -> None:
+    def write_rows(self, state: BodiesState, movable: Mask, rows: JointRows) -> None:
         """Write the rows of all joint points; `movable` (n,) are the bodies that joints move."""
         inverse_mass = np.where(movable, 1.0 / state.pieces.mass, 0.0)
         lever = self._place(state)[0]
@@ -110,7 +110,7 @@ class Joints:
             self.bodies, self._world, lever, inverse_mass, state.inverse_inertia(movable), *rows
         )  # fmt: skip
 
-    def keep(self, state: BodiesState, twist: Array, movable: Mask) -> None:
+    def project_velocities(self, state: BodiesState, twist: Array, movable: Mask) -> None:
         """Change velocities (n, 6) by impulses of the joints, so that all joint points stay together."""
         count = len(self)
         if not count:
@@ -118,7 +118,7 @@ class Joints:
         rows = JointRows(
             np.empty((count, 3, 2, 6)), np.empty((count, 3, 2, 6)), np.empty((count, 2)), np.empty((count, 3, 3))
         )
-        self.lay(state, movable, rows)
+        self.write_rows(state, movable, rows)
         none = np.zeros(0)
         solve_kernel.solve(
             np.arange(count), self.bodies, rows.jacobian, rows.answer, rows.mobility, none, none, rows.held,

@@ -20,7 +20,7 @@ DOUBTS = 50  # pairs that are looked at on their way, at most
 EARLIEST = 0.1  # share of a step: of meetings before it, the points are taken there
 
 
-class Before:
+class StepStart:
     """The start of a step.
 
     Attributes:
@@ -31,17 +31,17 @@ class Before:
 
     def __init__(self, state: BodiesState, near: Contacts, margin: Array, finder: ContactFinder) -> None:
         """Keep it."""
-        self.near, self.margin, self.kept = near, margin, state.kept()
+        self.near, self.margin, self.kept = near, margin, state.copies()
         self._finder, self._active = finder, state.moving | state.given
 
-    def widen(self, ways: Array) -> None:
-        """Let the margins be at least the ways (n,) of the bodies, metres: a blow may have made them faster."""
-        if (ways > self.margin).any():
-            self.margin = np.maximum(self.margin, ways)
+    def widen(self, travel: Array) -> None:
+        """Let the margins be at least the travel (n,) of the bodies, metres: a blow may have made them faster."""
+        if (travel > self.margin).any():
+            self.margin = np.maximum(self.margin, travel)
             self.near = self._finder.near(self.kept[0], self.kept[1], self.margin, self._active)
 
 
-class Way(NamedTuple):
+class PassingCheck(NamedTuple):
     """What is known of the way of a step.
 
     Attributes:
@@ -54,9 +54,9 @@ class Way(NamedTuple):
     meetings: tuple[float, ...] = ()
 
 
-def way_of(
-    state: BodiesState, before: Before, after: Contacts, margin: Array, ways: Array, time: float, gravity: float
-) -> Way:
+def check_passing(
+    state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
+) -> PassingCheck:
     """Whether pieces can have been deeper than `PASSING` in each other on the way, and where.
 
     A direction that has kept a pair apart all the time settles most pairs (`passing_kernel`). Others are looked at on
@@ -67,11 +67,11 @@ def way_of(
         before: the start.
         after: near pairs after it, within margins (n,) of both bodies.
         margin: (n,) metres.
-        ways: (n,) most that a point of each body has moved, metres.
+        travel: (n,) most that a point of each body has moved, metres.
         time: of the step, seconds.
         gravity: m/s2.
     """
-    before.widen(ways)
+    before.widen(travel)
     pieces, near = state.pieces, before.near
     bodies = pieces.body[near.pair]
     found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
@@ -88,17 +88,17 @@ def way_of(
         PASSING, *pieces.heights, doubts,
     )  # fmt: skip
     if count > DOUBTS:
-        return Way(False)
+        return PassingCheck(False)
     met = [
         _meeting(state, before, int(first), int(second), near.placements, angle, fall)
         for first, second in near.pair[doubts]
     ]
     shares = tuple(sorted({max(share, EARLIEST) for share in met if share is not None}))
-    return Way(not shares, shares)
+    return PassingCheck(not shares, shares)
 
 
 def _meeting(
-    state: BodiesState, before: Before, first: int, second: int, placements: Array, angle: Array, fall: float
+    state: BodiesState, before: StepStart, first: int, second: int, placements: Array, angle: Array, fall: float
 ) -> float | None:
     """The share of a step at which two pieces meet, or up to which they surely do not; None if they do not meet.
 

@@ -96,7 +96,7 @@ class Pieces:
             self.notes += (known.note,) if known.note else ()
         for name in segments:
             self._weigh_segment(scene, name)
-        self._lay_pieces(scene)
+        self._add_pieces(scene)
 
     @staticmethod
     def _segment(scene: Scene, piece: int) -> str:
@@ -113,7 +113,7 @@ class Pieces:
             inertia = frame.placement.actInv(carried)
             self._weigh(self.index[name], MassProperties(inertia.mass, inertia.lever, inertia.inertia))
 
-    def _lay_pieces(self, scene: Scene) -> None:
+    def _add_pieces(self, scene: Scene) -> None:
         built, objects = scene.built, scene.objects
         pieces, body, local, made_of = [], [], [], []
         local_of = {index: (name, at) for name, parts in built.pieces_of.items() for index, at in parts}
@@ -145,7 +145,7 @@ class Pieces:
         self.table = PairTable(pin.Model(), geometry)
         surfaces = self._surfaces(made_of)
         self.restitution, self.friction = surfaces[:, 0].copy(), surfaces[:, 1].copy()
-        self._lay_heights()
+        self._add_swept_points()
 
     def _surfaces(self, made_of: list[Material]) -> Array:
         known: dict[tuple[int, int], tuple[float, float]] = {}
@@ -157,7 +157,7 @@ class Pieces:
             found[number] = known[key]
         return found
 
-    def _lay_heights(self) -> None:
+    def _add_swept_points(self) -> None:
         """Arrays for `passing_kernel.highest`, and the distances of points from centres of mass."""
         swept = self.table.swept
         self.points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])

@@ -21,10 +21,10 @@ from wholebody.checks import TIME_STEP
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_ways
+from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
 from wholebody.dynamics.joints import CLOSED, Joints
 from wholebody.dynamics.loops import compiled_kernel
-from wholebody.dynamics.passing import Before, way_of
+from wholebody.dynamics.passing import StepStart, check_passing
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
@@ -49,7 +49,7 @@ FEW = 12  # ... while so many bodies move; fewer with more of them: each stop co
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 FASTEST = 1e3  # m/s2: of gravity
 STRONGEST = 1e6  # N s
-PARTINGS = 4  # rounds of parting pieces after a step
+SEPARATIONS = 4  # rounds of parting pieces after a step
 CLOSINGS = 6  # programs of a step with joints, at most: each closes what the one before left by bodies' turning
 FINE = 1e-5  # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity
 
@@ -85,9 +85,10 @@ class RigidBodies:
         self._sleepers = Sleepers(self.state, self._joints.together())
         self._falling = pieces.dynamic.copy()
         self._near: Contacts
-        self._look(SUBSTEP)
+        self._find_near(SUBSTEP)
         self._check_start()
-        self._joints.keep(self.state, self.state.twist, self.state.moving)  # given velocities may part joints
+        # given velocities may part joints
+        self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
 
     def _check_start(self) -> None:
         if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:
@@ -145,7 +146,7 @@ class RigidBodies:
             twist = np.zeros_like(self.state.twist)
             twist[number, axis] = 1.0 / self._pieces.mass[number]
             twist[number, 3:] = inverse @ lever[:, axis]
-            self._joints.keep(self.state, twist, movable)
+            self._joints.project_velocities(self.state, twist, movable)
             found[:, axis] = twist[number, :3] - lever @ twist[number, 3:]
         return found
 
@@ -166,7 +167,7 @@ class RigidBodies:
         self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
         self.state.moving |= self._joints.linked(number)
         if jointed:
-            self._joints.keep(self.state, self.state.twist, self.state.moving)
+            self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
             self._pushed += self.energy() - before
         else:  # along the mean of the velocities before and after
             self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
@@ -199,7 +200,7 @@ class RigidBodies:
             UnknownNameError: there is no such segment or thing.
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
-        state, given = self.state, {self._number(name): ways for name, ways in given_ways(kinematic).items()}
+        state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
@@ -207,7 +208,7 @@ class RigidBodies:
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
         record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
         self._pushed = 0.0
-        self._look(dt / count)
+        self._find_near(dt / count)
         for number in range(count):
             end = dt * (number + 1) / count
             while end - record.time > 1e-9 * dt:
@@ -216,7 +217,7 @@ class RigidBodies:
             state.put(number, after)
             state.twist[number] = 0.0
         state.given[:] = False
-        self._sleepers.look(self._near, dt)
+        self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
 
@@ -230,22 +231,22 @@ class RigidBodies:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
         if self._sleepers.wake(self._near):
-            self._look(SUBSTEP)  # what bears the woken ones was not looked at while all of it was still
+            self._find_near(SUBSTEP)  # what bears the woken ones was not looked at while all of it was still
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
         falling = self._falling
-        program.look(falling)
+        program.read_velocities(falling)
         together = record.stops <= 0 or not ended
         time, stopped = self._until_impact(program, time, together)
-        before = Before(state, self._near, self._margin, self._finder)
+        before = StepStart(state, self._near, self._margin, self._finder)
         start, weight = self._old, float(np.linalg.norm(self.gravity))
         halvings, foreseen = 0, 0
         while True:
             self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
             record.steps += 1
-            least = self._look(SUBSTEP)
+            least = self._find_near(SUBSTEP)
             if record.given_up >= GIVEN_UP:
                 break
             if halvings == HALVINGS:
@@ -253,16 +254,16 @@ class RigidBodies:
                 break
             shares: tuple[float, ...] = (1.0,)
             if least >= -(INSIDE if foreseen else SHALLOW):
-                free, shares = way_of(state, before, self._near, self._margin, self._ways(time), time, weight)
+                free, shares = check_passing(state, before, self._near, self._margin, self._travel(time), time, weight)
                 if free:
                     break
             start, met = program.remembered(time), bool(shares) and foreseen < FORESEEN
             if met:
-                self._meet(program, before, time, shares)
+                self._add_foreseen(program, before, time, shares)
                 foreseen += 1
             state.restore(before.kept)
             if met:
-                program.look(falling)
+                program.read_velocities(falling)
                 time, again = self._until_impact(program, time, together)
                 stopped |= again
             else:
@@ -272,7 +273,7 @@ class RigidBodies:
         self._old = program.remembered(time)
         work = program.work()
         record.work += float(work.sum())
-        self._joints.keep(state, state.twist, state.moving)
+        self._joints.project_velocities(state, state.twist, state.moving)
         program.settle(before.kept, work)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
@@ -280,7 +281,7 @@ class RigidBodies:
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
         if least < LEAST_GAP:
-            least = self._part(least)
+            least = self._separate(least)
         record.deepest = max(record.deepest, -least)
 
     @staticmethod
@@ -302,21 +303,21 @@ class RigidBodies:
             self._falling = ~pushed
             if not len(joints) or time < FINE or closing == CLOSINGS - 1:
                 return
-            off = joints.off(state)
+            off = joints.gaps(state)
             if np.abs(off).max() <= CLOSED:
                 return
             hold -= off / time
             start = program.remembered(time)
             state.restore(kept)
 
-    def _meet(self, program: StepProgram, before: Before, time: float, shares: tuple[float, ...]) -> None:
+    def _add_foreseen(self, program: StepProgram, before: StepStart, time: float, shares: tuple[float, ...]) -> None:
         """Let a program know the contact points where pieces are in each other at shares of its step."""
-        state, end = self.state, self.state.kept()
+        state, end = self.state, self.state.copies()
         for share in shares:
             if share < 1.0:
                 state.between(before.kept, share)
-                self._look(SUBSTEP)
-            program.meet(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
+                self._find_near(SUBSTEP)
+            program.add_points(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
             state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
@@ -343,32 +344,32 @@ class RigidBodies:
             state.moving, state.given, pushed, self.gravity, time,
         )  # fmt: skip
 
-    def _look(self, time: float) -> float:
+    def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""
         state = self.state
         active = state.moving | state.given
-        way = self._ways(time)
+        way = self._travel(time)
         self._margin = 1.5 * way + MARGIN
         self._near = self._finder.near(state.position, state.rotation, self._margin, active)
         return float(self._near.distance.min(initial=np.inf))
 
-    def _ways(self, time: float) -> Array:
+    def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
         state = self.state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.levers
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
-    def _part(self, least: float) -> float:
+    def _separate(self, least: float) -> float:
         """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
 
         Bodies that are lifted pay for it with their kinetic energy.
         """
         state = self.state
         before, position = self.energy(), state.position.copy()
-        for _ in range(PARTINGS):
+        for _ in range(SEPARATIONS):
             program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
-            motion_kernel.displace(state.position, state.rotation, program.parting(0.5 * SKIN), state.moving)
-            least = self._look(SUBSTEP)
+            motion_kernel.displace(state.position, state.rotation, program.separation(0.5 * SKIN), state.moving)
+            least = self._find_near(SUBSTEP)
             if least >= LEAST_GAP:
                 break
         gain = self.energy() - before

@@ -19,7 +19,8 @@ from wholebody.geometry.shapes import Box, Capsule, HalfSpace, Sphere
 from wholebody.matter.body import Body
 from wholebody.matter.joints import BallJoint, Hinge
 from wholebody.scene import Scene
-from wholebody.tracking.scripts import FRAME, Keys, Place, ScenePlan, standing_at
+from wholebody.tracking.frame import FRAME
+from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
 from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 TOP = 0.75  # m: of the table
@@ -113,8 +114,8 @@ def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float 
 def _table(scene: Scene) -> None:
     scene.add(Box(TABLE), name="table", at=(0.0, 0.0, TOP - 0.5 * TABLE[2]), color=OAK)
     leg = TOP - TABLE[2]
-    for number_, (x, y) in enumerate(((-0.35, -0.25), (-0.35, 0.25), (0.35, -0.25), (0.35, 0.25))):
-        scene.add(Box((0.05, 0.05, leg)), name=f"leg {number_ + 1}", at=(x, y, 0.5 * leg), color=OAK)
+    for number, (x, y) in enumerate(((-0.35, -0.25), (-0.35, 0.25), (0.35, -0.25), (0.35, 0.25))):
+        scene.add(Box((0.05, 0.05, leg)), name=f"leg {number + 1}", at=(x, y, 0.5 * leg), color=OAK)
 
 
 def _ball(scene: Scene, x: float, y: float, radius: float = BALL) -> None:
@@ -140,16 +141,16 @@ def _box_to_push(scene: Scene) -> None:
 
 def _dominoes(scene: Scene) -> None:
     _table(scene)
-    for number_ in range(DOMINOES):
-        at = (-0.05 + 0.028 * number_, 0.0, TOP + 0.5 * DOMINO[2] + GAP)
-        scene.add(Box(DOMINO), name=f"domino {number_ + 1}", at=at, color=BLUE, body=Body(density=700.0))
+    for number in range(DOMINOES):
+        at = (-0.05 + 0.028 * number, 0.0, TOP + 0.5 * DOMINO[2] + GAP)
+        scene.add(Box(DOMINO), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=700.0))
 
 
 def _stairs(scene: Scene) -> None:
     tread, width, rise = STEP
-    for number_ in range(STEPS):
-        height = rise * (STEPS - number_)
-        scene.add(Box((tread, width, height)), name=f"stair {number_ + 1}", at=(tread * number_, 0.0, 0.5 * height))
+    for number in range(STEPS):
+        height = rise * (STEPS - number)
+        scene.add(Box((tread, width, height)), name=f"stair {number + 1}", at=(tread * number, 0.0, 0.5 * height))
     body = Body(density=700.0, velocity=(0.6, 0.0, 0.0))
     scene.add(Sphere(0.06), name="ball", at=(0.0, 0.0, rise * STEPS + 0.06 + GAP), color=RED, body=body)
 

@@ -33,7 +33,7 @@ class Sleepers:
         touching: Indices = self._state.pieces.body[near.pair[near.distance < TOUCHING]]
         return np.concatenate([touching, self._together])
 
-    def look(self, near: Contacts, dt: float) -> None:
+    def update(self, near: Contacts, dt: float) -> None:
         """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
         state = self._state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers

@@ -52,7 +52,7 @@ class Impulses(NamedTuple):
         return with_values(self, impulse=share * self.impulse, held=share * self.held, time=time)
 
 
-class _Laid(NamedTuple):
+class _PointRows(NamedTuple):
     """What the loops need of all points, those of joints at the end; see `contact_kernel` and `solve_kernel`."""
 
     bodies: Indices
@@ -81,56 +81,56 @@ class StepProgram:
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
         self._touching = points.gap <= SKIN + TOUCH
         self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
-        self._laid = self._lay(state.moving)
+        self._rows = self._point_rows(state.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
         self._jammed = np.zeros(len(points.gap), dtype=bool)
         self._local = state.local(points.bodies[:, 0], points.point)
-        self.look(state.moving)
+        self.read_velocities(state.moving)
 
-    def look(self, falling: Mask) -> None:
+    def read_velocities(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
         self.speed = self._rates(self.state.twist)[: len(normal), 0]
         fall = (self.state.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
-        self.hits = times(self.points.gap - SKIN, self.speed, self._pull)
+        self.hits = impact_times(self.points.gap - SKIN, self.speed, self._pull)
         self.hits[(self.speed > -SLOW) | self._touching] = np.inf
 
     def _rates(self, twist: Array) -> Array:
         """Relative velocities (m + j, 3) along the axes of the points."""
-        found = np.empty((len(self._laid.bodies), 3))
-        contact_kernel.rates(self._laid.bodies, self._laid.jacobian, twist, found)
+        found = np.empty((len(self._rows.bodies), 3))
+        contact_kernel.rates(self._rows.bodies, self._rows.jacobian, twist, found)
         return found
 
-    def _lay(self, movable: Mask) -> _Laid:
+    def _point_rows(self, movable: Mask) -> _PointRows:
         state, points, joints = self.state, self.points, self.joints
         count, whole = len(points.gap), len(points.gap) + len(joints)
         bodies = np.concatenate([points.bodies, joints.bodies]) if len(joints) else points.bodies
-        laid = _Laid(
+        rows = _PointRows(
             bodies, np.empty((count, 3, 3)), np.empty((whole, 3, 2, 6)), np.empty((whole, 3, 2, 6)),
             np.empty((whole, 2)), np.empty((len(joints), 3, 3)),
         )  # fmt: skip
         contact_kernel.lay(
             points.bodies, points.normal, points.point, state.position, np.where(movable, 1.0 / state.pieces.mass, 0.0),
-            state.inverse_inertia(movable), laid.axes, laid.jacobian, laid.answer, laid.mobility,
+            state.inverse_inertia(movable), rows.axes, rows.jacobian, rows.answer, rows.mobility,
         )  # fmt: skip
         if len(joints):
-            own = (laid.jacobian[count:], laid.answer[count:], laid.mobility[count:], laid.held)
-            joints.lay(state, movable, JointRows(*own))
-        return laid
+            own = (rows.jacobian[count:], rows.answer[count:], rows.mobility[count:], rows.held)
+            joints.write_rows(state, movable, JointRows(*own))
+        return rows
 
-    def meet(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
+    def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
         """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
 
         Their gaps become those that lead there with the velocities after the step, of this time; they have to last for
         the share of it only.
         """
         late = StepProgram(self.state, points, self.gravity, self.joints)
-        late.look(~self.pushed())
+        late.read_velocities(~self.pushed())
         until = share * time
         gap = points.gap - until * late.speed + 0.5 * late._pull * until**2
-        count, own, laid = len(self.points.gap), late._laid, self._laid
+        count, own, rows = len(self.points.gap), late._rows, self._rows
         self._local = np.concatenate([self._local, late._local])
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
@@ -142,12 +142,12 @@ class StepProgram:
         bodies, jacobian, answer, mobility = (
             np.concatenate([one[:count], other[: len(gap)], one[count:]])
             for one, other in (
-                (laid.bodies, own.bodies), (laid.jacobian, own.jacobian), (laid.answer, own.answer),
-                (laid.mobility, own.mobility),
+                (rows.bodies, own.bodies), (rows.jacobian, own.jacobian), (rows.answer, own.answer),
+                (rows.mobility, own.mobility),
             )
         )  # fmt: skip
-        axes = np.concatenate([laid.axes, own.axes])
-        self._laid = _Laid(bodies.astype(np.intp), axes, jacobian, answer, mobility, laid.held)
+        axes = np.concatenate([rows.axes, own.axes])
+        self._rows = _PointRows(bodies.astype(np.intp), axes, jacobian, answer, mobility, rows.held)
         # what bears a body is known to the next points that join the step
         self.impulse = np.concatenate([self.impulse[:count], np.zeros((len(gap), 3)), self.impulse[count:]])
 
@@ -160,11 +160,11 @@ class StepProgram:
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
         weighed = state.given & np.isfinite(state.pieces.mass)
-        laid = self._lay(state.moving | weighed) if weighed.any() else self._laid
+        rows = self._point_rows(state.moving | weighed) if weighed.any() else self._rows
         twist, events = state.twist.copy(), np.zeros((MOST_EVENTS, 5))
         count, ended = impact_kernel.resolve(
-            np.flatnonzero(self._touching), points.pair, laid.bodies, laid.axes, laid.jacobian, laid.answer,
-            laid.mobility, self._restitution, self._friction, laid.held, self.joints.jointed, twist, SLOW, MOST_EVENTS,
+            np.flatnonzero(self._touching), points.pair, rows.bodies, rows.axes, rows.jacobian, rows.answer,
+            rows.mobility, self._restitution, self._friction, rows.held, self.joints.jointed, twist, SLOW, MOST_EVENTS,
             np.zeros_like(self.impulse), events,
         )  # fmt: skip
         state.twist[state.moving] = twist[state.moving]
@@ -206,7 +206,7 @@ class StepProgram:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
         state = self.state
         energy_kernel.restrain(
-            self._laid.bodies, self.impulse, self._rates(state.twist), target, UNSOLVED, state.moving, state.given,
+            self._rows.bodies, self.impulse, self._rates(state.twist), target, UNSOLVED, state.moving, state.given,
             self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation, began,
             state.twist, time * self.gravity, self._jammed,
         )  # fmt: skip
@@ -229,33 +229,33 @@ class StepProgram:
         state, given = self.state, self.state.given
         if len(self.joints) or given[self.points.bodies[self._bearing()]].any():
             energy_kernel.settle(
-                self._laid.bodies, self.impulse, work, len(self.points.gap), state.moving, given,
+                self._rows.bodies, self.impulse, work, len(self.points.gap), state.moving, given,
                 self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation,
                 state.twist, *before, np.array(self.gravity),
             )  # fmt: skip
 
     def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
-        state, points, laid, count = self.state, self.points, self._laid, len(self.points.gap)
+        state, points, rows, count = self.state, self.points, self._rows, len(self.points.gap)
         self.impulse[:] = 0.0
         if len(start.pair):
             head = np.full(len(state.pieces.table.pairs), -1, dtype=np.intp)
             contact_kernel.start_from(
-                start.pair, start.local, start.impulse, head, points.pair, self._local, laid.axes, SAME_POINT,
+                start.pair, start.local, start.impulse, head, points.pair, self._local, rows.axes, SAME_POINT,
                 self.impulse,
             )  # fmt: skip
         self.impulse[count:] = start.held
-        contact_kernel.apply(laid.bodies, laid.answer, state.twist, self.impulse)
+        contact_kernel.apply(rows.bodies, rows.answer, state.twist, self.impulse)
         solve_kernel.solve_islands(
-            laid.bodies, laid.jacobian, laid.answer, laid.mobility, self._friction, target, laid.held, hold,
+            rows.bodies, rows.jacobian, rows.answer, rows.mobility, self._friction, target, rows.held, hold,
             state.twist, self.impulse, TOLERANCE, VISITS, MOST,
         )  # fmt: skip
         self.residuals = solve_kernel.residuals(
-            laid.bodies, laid.jacobian, laid.mobility, self._friction, target, hold, state.twist, self.impulse
+            rows.bodies, rows.jacobian, rows.mobility, self._friction, target, hold, state.twist, self.impulse
         )
 
     def world_impulse(self) -> Array:
         """Impulses (m, 3) of the contacts on the second bodies, along the world's axes, N s."""
-        return np.asarray(np.einsum("cr,crk->ck", self.impulse[: len(self.points.gap)], self._laid.axes))
+        return np.asarray(np.einsum("cr,crk->ck", self.impulse[: len(self.points.gap)], self._rows.axes))
 
     def pushed(self) -> Mask:
         """Bodies (n,) on which a contact acts."""
@@ -278,18 +278,18 @@ class StepProgram:
         found: Mask = self.impulse[: len(self.points.gap), 0] > 0.0
         return found
 
-    def parting(self, gap: float) -> Array:
+    def separation(self, gap: float) -> Array:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
-        points, laid = self.points, self._laid
+        points, rows = self.points, self._rows
         way = np.zeros_like(self.state.twist)
         solve_kernel.solve_islands(
-            laid.bodies, laid.jacobian, laid.answer, laid.mobility, np.zeros(len(points.gap)), gap - points.gap,
-            laid.held, -self.joints.off(self.state), way, np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
+            rows.bodies, rows.jacobian, rows.answer, rows.mobility, np.zeros(len(points.gap)), gap - points.gap,
+            rows.held, -self.joints.gaps(self.state), way, np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
         )  # fmt: skip
         return way
 
 
-def times(gap: Array, speed: Array, pull: Array) -> Array:
+def impact_times(gap: Array, speed: Array, pull: Array) -> Array:
     """First time at which gap + speed t + pull t^2 / 2 is zero, for gaps above zero; infinite if there is none."""
     root = speed**2 - 2.0 * pull * gap
     found = np.full(len(gap), np.inf)

@@ -29,11 +29,9 @@ from wholebody.matter.materials import Surface, surface
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
 from wholebody.moving_things import Collision
 from wholebody.scene import Scene
-from wholebody.tracking.frame import Frame
-from wholebody.tracking.loop import FrameLoop, unreadable
-from wholebody.workspace import OfOneRun
-
-FRAME = 1.0 / 60.0  # s: frame time of a screen
+from wholebody.tracking.frame import FRAME, Frame
+from wholebody.tracking.loop import FrameLoop, invalid_reason
+from wholebody.workspace import NotCopyable
 
 
 class WorldFrame(NamedTuple):
@@ -68,7 +66,7 @@ class WorldFrame(NamedTuple):
     note: str
 
 
-class World(OfOneRun):
+class World(NotCopyable):
     """A figure that follows a tracker among things, some of which move by themselves.
 
     Things without a `wb.Body` are fixed; the user may move them between frames (`Scene.move` with `over=world.dt`). The
@@ -145,7 +143,7 @@ class World(OfOneRun):
         began, note = time.perf_counter(), ""
         if tracked is not None:
             goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
-            note = unreadable(self.scene, goal)
+            note = invalid_reason(self.scene, goal)
             self._tracked = self._tracked if note else np.array(pin.normalize(self.scene.model, goal))
         wanted = self._coupling.toward(self._tracked, self.dt)
         moved = self._user_moves()

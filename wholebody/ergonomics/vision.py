@@ -24,6 +24,7 @@ OWN = ("head", "neck")
 
 RAY = 1e-3  # m: radius of a line of sight
 NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
+HALVINGS = 16  # of a line of sight, to find where it meets a piece first: 0.2 mm of ten metres
 BLURRED = 0.05  # m: nearer points are not seen
 
 
@@ -132,20 +133,29 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float
     data = scene.model.createData()
     placed = pin.GeometryData(scene.geometry)
     pin.updateGeometryPlacements(scene.model, data, scene.geometry, placed, q)
-    turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (target - eyes) / distance)
-    ray, at = coal.Capsule(RAY, length), coal.Transform3s(turn.matrix(), 0.5 * (eyes + target))
-    spot, found, nearest = coal.Transform3s(np.eye(3), target), "", np.inf
+    ahead = (target - eyes) / distance
+    turn = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), ahead).matrix()
+
+    def meets(shape: Any, there: coal.Transform3s, reach: float) -> bool:
+        """Whether the first `reach` metres of the line of sight meet a piece."""
+        at = coal.Transform3s(turn, eyes + (NEAR + 0.5 * reach) * ahead)
+        return _meet(shape, there, coal.Capsule(RAY, reach), at)
+
+    spot, found, nearest = coal.Transform3s(np.eye(3), target), "", length
     pieces = [
-        (piece.geometry, owner, place, coal.Transform3s(place.rotation, place.translation))
+        (piece.geometry, owner, coal.Transform3s(place.rotation, place.translation))
         for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True)
         if owner not in OWN
     ]
-    looked_at = {owner for shape, owner, _, there in pieces if _meet(shape, there, coal.Sphere(RAY), spot)}
-    for shape, owner, place, there in pieces:
-        if owner not in looked_at and _meet(shape, there, ray, at):
-            away = float(np.linalg.norm(np.asarray(place.translation) - eyes))
-            if away < nearest:
-                found, nearest = owner, away
+    looked_at = {owner for shape, owner, there in pieces if _meet(shape, there, coal.Sphere(RAY), spot)}
+    for shape, owner, there in pieces:
+        if owner in looked_at or not meets(shape, there, nearest):
+            continue
+        free = 0.0
+        for _ in range(HALVINGS):
+            middle = 0.5 * (free + nearest)
+            free, nearest = (free, middle) if meets(shape, there, middle) else (middle, nearest)
+        found = owner
     return found
 
 

@@ -55,7 +55,7 @@ Row = dict[str, str]
 
 
 @dataclass(frozen=True)
-class Body:
+class Person:
     """One person; all other quantities follow from these.
 
     Attributes:
@@ -153,14 +153,14 @@ class Body:
         return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
 
 
-def body(
+def make_person(
     sex: str = "male",
     stature: float | None = None,
     mass: float | None = None,
     percentile: float | None = None,
     age: float | None = None,
-) -> Body:
-    """Return a checked `Body`.
+) -> Person:
+    """Return a checked `Person`.
 
     Args:
         sex: "male" or "female".
@@ -195,7 +195,7 @@ def body(
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
-    return Body(sex, height, weight, age=None if age is None else number(age, "age", *AGE_RANGE, "years"))
+    return Person(sex, height, weight, age=None if age is None else number(age, "age", *AGE_RANGE, "years"))
 
 
 def _percentile(column: str, dimension: str, percentile: float) -> float:
@@ -205,7 +205,7 @@ def _percentile(column: str, dimension: str, percentile: float) -> float:
     return float(np.interp(deviate[0], deviate[1:], [float(row[f"p{share:02d}"]) for share in known]))
 
 
-def describe(person: Body) -> str:
+def describe(person: Person) -> str:
     """Return one line on a person for the head of a file."""
     own = "" if person.age is None else f", {person.age:g} years"
     if person.deviations:
@@ -214,10 +214,10 @@ def describe(person: Body) -> str:
     return f"{person.sex}, {size}{own}; written by wholebody from its tables"
 
 
-def design_cases() -> Mapping[str, Body]:
+def design_cases() -> Mapping[str, Person]:
     """Small, median and large women and men (5th, 50th, 95th percentile of stature and mass): "F5" ... "M95"."""
     return {
-        row["case"]: body(
+        row["case"]: make_person(
             "male" if row["sex"] == "M" else "female", float(row["stature_m"]), float(row["mass_kg_same_percentile"])
         )
         for row in table("design_cases")

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.figures.anthropometry import Body
+from wholebody.figures.anthropometry import Person
 from wholebody.records import with_values
 
 
@@ -87,7 +87,7 @@ class BodySpec:
     joints: tuple[Joint, ...]
     landmarks: tuple[Landmark, ...]
     solids: tuple[Solid, ...]
-    person: Body | None = None
+    person: Person | None = None
 
 
 def place(x: float = 0.0, y: float = 0.0, z: float = 0.0, rotation: Array | None = None) -> pin.SE3:
@@ -114,7 +114,7 @@ def urdf_text(spec: BodySpec, extension: str = "") -> str:
 
     Args:
         spec: the body.
-        extension: text of an element at the end of the file, see `wholebody.figures.urdf_extension`.
+        extension: text of an element at the end of the file, see `wholebody.figures.urdf.extension`.
     """
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',

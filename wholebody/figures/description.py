@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
-from wholebody.figures.anthropometry import Body
+from wholebody.figures.anthropometry import Person
 from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
@@ -162,7 +162,7 @@ class Description(NamedTuple):
     ranges: Mapping[str, MotionRange] = MappingProxyType({})
     root_effort: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
-    person: Body | None = None
+    person: Person | None = None
 
 
 def limits_of(model: pin.Model) -> Limits:

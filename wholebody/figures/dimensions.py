@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from wholebody.figures.anthropometry import Body, keyed
+from wholebody.figures.anthropometry import Person, keyed
 
 RELAXED = 0.93
 """The arm's circumferences were measured flexed; relaxed they are 5 to 8 % less (estimate)."""
@@ -39,9 +39,9 @@ class Finger(NamedTuple):
 
 
 class Dimensions:
-    """Sizes of one `Body`."""
+    """Sizes of one `Person`."""
 
-    def __init__(self, person: Body) -> None:
+    def __init__(self, person: Person) -> None:
         """Compute the sizes of a person."""
         self.body = person
         height, column = person.stature, person.column

@@ -13,7 +13,7 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
-from wholebody.figures.grounding import Among, grounded
+from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.reduction import reduced_parts
 from wholebody.records import as_dict
 
@@ -74,7 +74,7 @@ def check_model(model: pin.Model, name: str) -> None:
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
-class Figure(checks.Settled):
+class Figure(checks.FixedAttributes):
     """An articulated body: Pinocchio's model and geometry, with named joint groups, chains, frames and postures.
 
     It never changes, so any number of scenes and threads may share one. It can be pickled and copied.
@@ -105,7 +105,7 @@ class Figure(checks.Settled):
     """
 
     _settable = frozenset({"loaded_as"})
-    _mend = "a figure never changes: load another one with wb.load(...)"
+    _correction = "a figure never changes: load another one with wb.load(...)"
 
     def __init__(
         self,
@@ -335,7 +335,7 @@ class Figure(checks.Settled):
         q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
         return q
 
-    def grounded(self, q: Array, scene: Among) -> Array:
+    def grounded(self, q: Array, scene: SceneLike) -> Array:
         """Return a copy of q moved vertically until the lowest segments stand on the things of a scene.
 
         Args:

@@ -20,10 +20,10 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.figures import human_capsules
-from wholebody.figures.anthropometry import FOLDER, Body, design_cases, table
+from wholebody.figures.anthropometry import FOLDER, Person, design_cases, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import capsules
 from wholebody.figures.measuring import ansur, measure
 from wholebody.files import write
 
@@ -102,14 +102,14 @@ def fit() -> tuple[list[list[str]], list[list[str]]]:
     return rows, residuals
 
 
-def measured(person: Body, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
+def measured(person: Person, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
     """Return the dimensions of a person, metres, with some of the fitted sizes changed."""
-    from wholebody.figures.human import human_spec
+    from wholebody.figures.human.spec import human_spec
 
-    person = Body(person.sex, person.stature, person.mass, deviations)
+    person = Person(person.sex, person.stature, person.mass, deviations)
     spec: BodySpec = human_spec(person)
     model = model_of(spec)
-    geometry = geometry_of(model, human_capsules.solids(Dimensions(person)), ())
+    geometry = geometry_of(model, capsules.solids(Dimensions(person)), ())
 
     def with_joints(q: Array, values: Mapping[str, float]) -> Array:
         q = q.copy()
@@ -153,27 +153,27 @@ def _fit_sex(sex: str) -> dict[str, tuple[float, float, float]]:
     return lines(least_squares(residuals, prior.ravel(), diff_step=1e-4, max_nfev=8).x)
 
 
-def _prior(name: str, person: Body) -> float:
+def _prior(name: str, person: Person) -> float:
     prior = PRIORS[name]
     return (prior.man if person.sex == "male" else prior.woman) * _variable(person, prior.thick)
 
 
-def _variable(person: Body, thick: bool) -> float:
+def _variable(person: Person, thick: bool) -> float:
     return math.sqrt(person.mass / person.stature) if thick else person.stature
 
 
-def _value(line: tuple[float, float, float], person: Body) -> float:
+def _value(line: tuple[float, float, float], person: Person) -> float:
     return line[0] + line[1] * _variable(person, True) + line[2] * person.stature
 
 
-def _through(first: Body, last: Body, low: float, high: float, thick: bool) -> tuple[float, float, float]:
+def _through(first: Person, last: Person, low: float, high: float, thick: bool) -> tuple[float, float, float]:
     """The line that has two values at two people."""
     a, b = _variable(first, thick), _variable(last, thick)
     slope = (high - low) / (b - a)
     return (low - slope * a, slope, 0.0) if thick else (low - slope * a, 0.0, slope)
 
 
-def _line(people: list[Body], values: list[float]) -> tuple[float, float, float]:
+def _line(people: list[Person], values: list[float]) -> tuple[float, float, float]:
     """The line in stature nearest to three values."""
     slope, start = np.polyfit([person.stature for person in people], values, 1)
     return float(start), 0.0, float(slope)

@@ -10,16 +10,17 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.swept_points import swept_points
+from wholebody.figures.postures import support
 
+DOWN = np.array((0.0, 0.0, -1.0))
 LOWEST = 0.03  # m: segments that reach as low as this above the lowest point are those that stand
 NEAR = 1e-7  # m: gap that counts as standing
 DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
 STEPS = 2000  # most steps; each goes down by the least distance, so none goes through anything
 
 
-class Among(Protocol):
-    """A scene."""
+class SceneLike(Protocol):
+    """The part of a scene that is asked for."""
 
     @property
     def geometry(self) -> Any:
@@ -30,7 +31,7 @@ class Among(Protocol):
         """The segment or thing that every piece is part of."""
 
 
-def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Among) -> Array:
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: SceneLike) -> Array:
     """Copy (nq,) of a posture whose root is moved vertically until its lowest segments touch the things below.
 
     Args:
@@ -47,7 +48,7 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Among
     own = set(segments)
     pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
     placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
-    body = [(shape, place, _lowest(shape, place)) for shape, place, owner in placed if owner in own]
+    body = [(shape, place, -support(shape, place, DOWN)) for shape, place, owner in placed if owner in own]
     things = [
         (shape, coal.Transform3s(place.rotation, place.translation))
         for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
@@ -68,13 +69,6 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Among
     result = np.array(q, dtype=float)
     result[2] += shift
     return result
-
-
-def _lowest(shape: Any, place: pin.SE3) -> float:
-    swept = swept_points(shape)
-    if not len(swept.points):
-        return float(place.translation[2] - np.linalg.norm(np.asarray(shape.radii) * place.rotation[2]))
-    return float((swept.points @ place.rotation[2]).min() + place.translation[2] - swept.radius)
 
 
 def _least(soles: list[tuple[Any, pin.SE3]], things: list[tuple[Any, Any]], shift: float) -> float:

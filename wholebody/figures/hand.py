@@ -17,7 +17,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures import hulls
-from wholebody.figures.anthropometry import Body, body, describe, keyed
+from wholebody.figures.anthropometry import Person, describe, keyed, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
 from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
@@ -54,7 +54,7 @@ POSTURES: dict[str, dict[str, float]] = {
 }
 
 
-def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
+def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
     """Return the specification of a hand.
 
     Args:
@@ -66,7 +66,7 @@ def hand_spec(side: str = "right", person: Body | None = None) -> BodySpec:
     """
     if side not in ("left", "right"):
         raise InputError(f"side is {side!r}; give 'left' or 'right'")
-    person = person or body()
+    person = person or make_person()
     size = Dimensions(person)
     palm = Solid(f"{side}_hand", f"{side}_hand", *_polyhedron(size, "palm"), (MESH, part_radii(size, "palm")))
     solids, joints, virtual = [palm], [], []
@@ -100,10 +100,10 @@ def hand_figure(
     percentile: float | None = None,
 ) -> Figure:
     """Return a hand with a free root at the wrist; arguments as for `hand_spec` and the person."""
-    return hand_figure_of(body(sex, stature, mass, percentile), side)
+    return hand_figure_of(make_person(sex, stature, mass, percentile), side)
 
 
-def hand_figure_of(person: Body, side: str) -> Figure:
+def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
@@ -227,22 +227,48 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
 
 
 def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
-    order = list(FINGERS)
     tested, excluded = [], []
     for a, b in combinations([solid.name for solid in solids], 2):
-        first, second = a.split("_")[1:], b.split("_")[1:]
-        if first == ["hand"]:
-            reason = "neighbours that overlap at their joint" if second[1] == "proximal" else ""
-        elif first[0] == second[0]:
-            reason = "neighbours that overlap at their joint"
-        else:
-            beside = abs(order.index(first[0]) - order.index(second[0])) == 1 and "thumb" not in (first[0], second[0])
-            reason = "fingers rest side by side" if beside else ""
+        reason = finger_pair(a.partition("_")[2], b.partition("_")[2])
         if reason:
             excluded.append(ExcludedPair(a, b, reason))
         else:
             tested.append((a, b))
     return tuple(tested), tuple(excluded)
+
+
+def is_finger(segment: str) -> bool:
+    """Whether a segment without its side, such as "index_middle", is of a finger."""
+    return segment.partition("_")[0] in FINGERS
+
+
+def finger_pair(a: str, b: str) -> str | None:
+    """Why two segments of one hand are not tested against each other; None if they are.
+
+    Args:
+        a: segment without its side, such as "hand" or "index_middle".
+        b: the other one.
+    """
+    first, second = sorted((a, b), key=_order)
+    finger, _, part = second.partition("_")
+    if finger not in FINGERS:
+        return None
+    if first in ("hand", "forearm"):
+        near = part == "metacarpal" or (part == "proximal" and first == "hand")
+        return "neighbours that overlap at their joint" if near else None
+    other, _, _ = first.partition("_")
+    if other not in FINGERS:
+        return None
+    if other == finger:
+        return "neighbours that overlap at their joint"
+    order = list(FINGERS)
+    beside = abs(order.index(other) - order.index(finger)) == 1 and "thumb" not in (other, finger)
+    return "fingers rest side by side" if beside else None
+
+
+def _order(segment: str) -> int:
+    finger = segment.partition("_")[0]
+    return list(FINGERS).index(finger) if finger in FINGERS else -1
 
 
 def _posture(figure: Articulated, side: str, degrees: dict[str, float]) -> Array:

@@ -41,9 +41,9 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
         FileFormatError: a file that cannot be read.
     """
     from wholebody.figures.hand import hand_figure
-    from wholebody.figures.human_figure import avatar_figure, human_figure
+    from wholebody.figures.human.figure import avatar_figure, human_figure
     from wholebody.figures.mjcf_figure import xml_figure
-    from wholebody.figures.urdf_figure import urdf_figure
+    from wholebody.figures.urdf.figure import urdf_figure
 
     if not isinstance(spec, (str, PathLike)):
         raise InputError(f"load: spec is {shown(spec)}; give 'human', 'avatar', 'hand', or the path of a URDF")

@@ -18,8 +18,8 @@ from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
-from wholebody.figures.urdf_figure import SAMPLES, urdf_figure
-from wholebody.figures.xml_reading import read_xml
+from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
+from wholebody.figures.urdf.xml_reading import read_xml
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes for the placement of a body; Pinocchio ignores them for a first body that is fixed."""

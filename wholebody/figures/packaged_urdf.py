@@ -10,7 +10,7 @@ from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import make_folder, write
 
 if TYPE_CHECKING:
-    from wholebody.figures.anthropometry import Body
+    from wholebody.figures.anthropometry import Person
 
 
 def urdf_folder() -> Path:
@@ -52,12 +52,12 @@ def task_paths() -> dict[str, Path]:
     raise WholebodyError(f"there are no examples in or beside {package}; install wholebody again")
 
 
-def write_human(path: str | os.PathLike[str], person: Body, hands: str = "rigid") -> None:
+def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:
     """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`."""
     from wholebody.figures.body_spec import urdf_text
-    from wholebody.figures.human import human_spec
-    from wholebody.figures.human_figure import figure_of
-    from wholebody.figures.urdf_extension import extension_text
+    from wholebody.figures.human.figure import figure_of
+    from wholebody.figures.human.spec import human_spec
+    from wholebody.figures.urdf.extension import extension_text
 
     spec = human_spec(person, hands=hands)
     _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
@@ -67,9 +67,9 @@ def packaged_files() -> dict[str, str]:
     """Return the text of every packaged file below ``urdf/``: the median man, his avatar and his right hand."""
     from wholebody.figures.body_spec import urdf_text
     from wholebody.figures.hand import MESH, hand_figure, hand_spec
-    from wholebody.figures.human import human_spec
-    from wholebody.figures.human_figure import avatar_figure, avatar_spec, human_figure
-    from wholebody.figures.urdf_extension import extension_text
+    from wholebody.figures.human.figure import avatar_figure, avatar_spec, human_figure
+    from wholebody.figures.human.spec import human_spec
+    from wholebody.figures.urdf.extension import extension_text
 
     return {
         "human.urdf": urdf_text(human_spec(), extension_text(human_figure())),

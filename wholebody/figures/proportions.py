@@ -3,7 +3,7 @@
 At a given stature and mass, dimensions differ from those of most people by a normal deviate of several variables, whose
 covariance is ANSUR II's: standard deviations of the whole survey, correlations of the table "correlations". The most
 likely other dimensions are the conditional mean (e.g. Eaton 1983, "Multivariate Statistics", section 3.4). Then the
-sizes of the body (`Body.fitted`) are changed until its dimensions, measured on the model, are those.
+sizes of the body (`Person.fitted`) are changed until its dimensions, measured on the model, are those.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import known, number, shown
 from wholebody.errors import InputError
-from wholebody.figures.anthropometry import Body, table
+from wholebody.figures.anthropometry import Person, table
 from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
 
 FARTHEST = 4.0
@@ -47,7 +47,7 @@ def dimension_names() -> tuple[str, ...]:
     return (*(row["name"] for row in table("dimensions")), *SIZES)
 
 
-def proportioned(person: Body, proportions: Mapping[str, float] | None) -> Body:
+def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Person:
     """Return a person with stated dimensions, of the same stature and mass.
 
     Args:
@@ -71,7 +71,7 @@ def proportioned(person: Body, proportions: Mapping[str, float] | None) -> Body:
 
 
 @lru_cache(maxsize=64)
-def _proportioned(person: Body, stated: tuple[tuple[str, float], ...]) -> Body:
+def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Person:
     names = dimension_names()
     usual = _usual(replace(person, age=None))
     which = [names.index(name) for name, _ in stated]
@@ -91,7 +91,7 @@ def _proportioned(person: Body, stated: tuple[tuple[str, float], ...]) -> Body:
     return made
 
 
-def likely_change(person: Body, which: list[int], change: Array) -> Array:
+def likely_change(person: Person, which: list[int], change: Array) -> Array:
     """Return by how much all dimensions differ from the usual ones, given the difference of some.
 
     Args:
@@ -167,22 +167,22 @@ def _spread(name: str, dimension: str, column: str) -> float:
 
 
 @lru_cache(maxsize=64)
-def _usual(person: Body) -> Mapping[str, float]:
+def _usual(person: Person) -> Mapping[str, float]:
     return _measured(person)
 
 
-def _measured(person: Body) -> dict[str, float]:
+def _measured(person: Person) -> dict[str, float]:
     return measured(person, person.deviations) | {name: person.fitted(size) for name, size in SIZES.items()}
 
 
-def _sized(person: Body, sizes: Mapping[str, float], wanted: Mapping[str, float], stated: set[str]) -> Body:
+def _sized(person: Person, sizes: Mapping[str, float], wanted: Mapping[str, float], stated: set[str]) -> Person:
     """The person whose measured dimensions are nearest to the wanted ones: Gauss and Newton with one Jacobian."""
     free = [name for name in PRIORS if name not in DIRECT]
     names = list(wanted)
     unit = np.array([STATED if name in stated else TOLERANCE for name in names])
     pull = np.diag([1.0 / PRIORS[name].spread for name in free])
 
-    def made(x: Array) -> Body:
+    def made(x: Array) -> Person:
         changes = {**sizes, **dict(zip(free, map(float, x), strict=True))}
         return replace(person, deviations=tuple((name, value) for name, value in changes.items() if value))
 

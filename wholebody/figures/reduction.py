@@ -13,6 +13,7 @@ from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
+from wholebody.figures.self_pairs import drop_pairs
 from wholebody.records import with_values
 
 _LOCKED = "locked together"
@@ -100,17 +101,12 @@ def _without_locked(axis: EllipseAxis, kept: set[str], values: Mapping[str, floa
 def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
     """Remove pairs of pieces on one joint from the geometry, since they never move against each other; return them."""
     pieces = geometry.geometryObjects
-    # Read all pairs first: Pinocchio's list hands out references, which move when an entry is removed.
-    pairs = [(pair.first, pair.second) for pair in geometry.collisionPairs]
-    geometry.removeAllCollisionPairs()
-    dropped = []
-    for first, second in pairs:
-        a, b = pieces[first], pieces[second]
-        if a.parentJoint == b.parentJoint:
-            dropped.append(ExcludedPair(a.name, b.name, _LOCKED))
-        else:
-            geometry.addCollisionPair(pin.CollisionPair(first, second))
-    return dropped
+    together = [
+        number
+        for number, pair in enumerate(geometry.collisionPairs)
+        if pieces[pair.first].parentJoint == pieces[pair.second].parentJoint
+    ]
+    return drop_pairs(geometry, together, _LOCKED)
 
 
 def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[str, tuple[str, ...]]:

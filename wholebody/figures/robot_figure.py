@@ -20,7 +20,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
 from wholebody.figures.self_pairs import choose_pairs
-from wholebody.figures.urdf_file import LinkVisual
+from wholebody.figures.urdf.file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import SMALLEST
 

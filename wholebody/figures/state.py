@@ -41,6 +41,9 @@ class State:
     The object is re-used: `update` overwrites everything that was read from it before.
 
     Attributes:
+        model: Pinocchio's model.
+        data: Pinocchio's data at the posture.
+        q: (nq,) the posture.
         jacobian: (6, n) columns of the joints, world frame. n is nv, and one more for each degree of freedom of a joint
             that follows another (mimic): `folded` and `spread` translate.
         columns: (n, 6) the same, transposed.
@@ -142,6 +145,10 @@ class State:
         if wrench.against:
             moved = moved - self.support[wrench.against]
         return self.folded(np.dot(wrench.rows, self.jacobian) * moved)  # twice as fast as @ for so few rows
+
+    def dense_jacobian(self, part: Wrench | Array) -> Array:
+        """Jacobian (m, nv) of a term that gave a `Wrench` or the rows themselves, one row or several."""
+        return self.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
 
     def folded(self, rows: Array) -> Array:
         """Rows (k, nv) of rows (k, n) over the columns of `jacobian`: joints that follow another move with it."""

@@ -208,7 +208,7 @@ def _thickened(points: Array, name: str, notes: list[str]) -> list[Piece]:
         return [hull_piece(thickened(points), name)]
 
 
-_MEND = "mend the mesh where it passes through itself, or place its hull with wb.Hull"
+_MEND = "repair the mesh where it passes through itself, or place its hull with wb.Hull"
 MOST_SECONDS = 40.0
 """Limit of CoACD for one part, seconds of the processor; the largest of real robots took a fraction of it."""
 

@@ -17,6 +17,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.geometry.memory_views import address
+
 REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
 SUPPORT_OFFSET = 24  # bytes from the guessed direction to the guessed vertices of the two shapes
 FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
@@ -57,19 +59,15 @@ def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | Non
     if count == 0:
         return np.zeros((0, 3)), np.zeros((0, 2), dtype=np.int32)
     direction, vertices = requests[0].cached_gjk_guess, requests[0].cached_support_func_guess
-    base = _address(direction)
+    base = address(direction)
     if vertices.dtype != np.int32 or vertices.shape != (2,) or direction.shape != (3,):
         return None
     for k in {0, count // 2, count - 1}:
-        if _address(requests[k].cached_gjk_guess) != base + REQUEST_STRIDE * k:
+        if address(requests[k].cached_gjk_guess) != base + REQUEST_STRIDE * k:
             return None
-        if _address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + SUPPORT_OFFSET:
+        if address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + SUPPORT_OFFSET:
             return None
     return (
         np.lib.stride_tricks.as_strided(direction, (count, 3), (REQUEST_STRIDE, 8)),
         np.lib.stride_tricks.as_strided(vertices, (count, 2), (REQUEST_STRIDE, 4)),
     )
-
-
-def _address(array: NDArray[Any]) -> int:
-    return int(array.__array_interface__["data"][0])

@@ -11,6 +11,7 @@ import ctypes
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 
@@ -22,7 +23,8 @@ RESULT_FIRST = RESULT_NORMAL // 8 - 1  # of these: distance, normal, nearest poi
 RESULT_FIELDS = 10
 
 
-def _address(array: Array) -> int:
+def address(array: NDArray[Any]) -> int:
+    """Where an array begins in memory."""
     return int(array.__array_interface__["data"][0])
 
 
@@ -36,12 +38,12 @@ def placement_view(placements: Any) -> Array | None:
     if count == 0:
         return np.zeros((0, 4, 3))
     first = placements[0].rotation
-    base = _address(first)
+    base = address(first)
     for i in {0, count // 2, count - 1}:
         placement = placements[i]
-        if _address(placement.rotation) != base + SE3_STRIDE * i:
+        if address(placement.rotation) != base + SE3_STRIDE * i:
             return None
-        if _address(placement.translation) != base + SE3_STRIDE * i + 72:
+        if address(placement.translation) != base + SE3_STRIDE * i + 72:
             return None
     return np.lib.stride_tricks.as_strided(first, (count, 4, 3), (SE3_STRIDE, 24, 8))
 
@@ -55,9 +57,9 @@ def result_view(results: Any) -> Array | None:
     count = len(results)
     if count == 0:
         return np.zeros((0, RESULT_DOUBLES))
-    base = _address(results[0].normal)
+    base = address(results[0].normal)
     for i in {0, count // 2, count - 1}:
-        if _address(results[i].normal) != base + RESULT_STRIDE * i:
+        if address(results[i].normal) != base + RESULT_STRIDE * i:
             return None
     buffer = (ctypes.c_char * (RESULT_STRIDE * count)).from_address(base - RESULT_NORMAL)
     view: Array = np.ndarray((count, RESULT_DOUBLES), float, buffer=memoryview(buffer))

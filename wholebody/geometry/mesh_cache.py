@@ -15,10 +15,11 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.geometry.hull import coal_convex
 from wholebody.geometry.pieces import Piece
@@ -256,8 +257,6 @@ def _unpacked(data: bytes) -> ConvexPieces:
     return ConvexPieces(pieces, float(added), tuple(notes))
 
 
-def _triangles(hull: object) -> np.ndarray[tuple[int, int], np.dtype[np.int64]]:
-    shape: object = hull
-    count = shape.num_polygons  # type: ignore[attr-defined]
-    polygons = (shape.polygons(k) for k in range(count))  # type: ignore[attr-defined]
+def _triangles(hull: Any) -> NDArray[np.int64]:
+    polygons = (hull.polygons(k) for k in range(hull.num_polygons))
     return np.array([[face[0], face[1], face[2]] for face in polygons], dtype=np.int64).reshape(-1, 3)

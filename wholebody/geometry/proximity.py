@@ -31,7 +31,7 @@ ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size
 
 
 class Contacts(NamedTuple):
-    """Pairs nearer than a query distance, nearest first. All arrays have k rows, and no gaps in memory.
+    """Pairs nearer than a query distance. All arrays have k rows, and no gaps in memory.
 
     Attributes:
         pair: (k, 2) indices of the two pieces in the geometry model.
@@ -71,7 +71,7 @@ class Contacts(NamedTuple):
         )  # fmt: skip
 
 
-class _Room:
+class _ContactBuffer:
     """Room for contacts.
 
     Attributes:
@@ -117,10 +117,12 @@ class PairTable:
         pairs: (pairs, 2) indices of the two pieces of every collision pair.
         joint: (n,) joint that carries each piece; 0 is the world.
         reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
+        half: (n, 3) half the size of a box about each piece's origin, along its own axes, metres.
         widths: (pairs,) width of both pieces together, metres.
         points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
         first_point: (n + 1,) where those of each piece begin.
         radius: (n,) around them, metres.
+        points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
@@ -190,7 +192,7 @@ class Proximity:
         self._marked, self._count = np.zeros(pairs, dtype=np.intp), 0
         self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
         self._endless = np.full(pairs, np.inf)
-        self._placed, self._room = np.zeros((count, 4, 3)), _Room(64)
+        self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
         self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
@@ -230,11 +232,11 @@ class Proximity:
         placements = self.placements(state)
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
-        contacts = self._gather(_Room(len(index)), placements, index, within, most)
+        contacts = self._gather(_ContactBuffer(len(index)), placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
-    def passing(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
+    def query_views(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
         began = time.perf_counter()
         if self._placements is None:
@@ -245,9 +247,9 @@ class Proximity:
             placements[:] = self._placements
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
-        if len(index) > self._room.size:
-            self._room = _Room(2 * len(index))
-        contacts = self._gather(self._room, placements, index, within, most)
+        if len(index) > self._buffer.size:
+            self._buffer = _ContactBuffer(2 * len(index))
+        contacts = self._gather(self._buffer, placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
@@ -283,7 +285,7 @@ class Proximity:
         self.results.deactivateAllCollisionPairs()
         self._count = 0
 
-    def _gather(self, room: _Room, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
+    def _gather(self, room: _ContactBuffer, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
         results, known = self._distances, self.table
         if results is None:
             results = np.zeros((len(known.pairs), RESULT_DOUBLES))

@@ -75,7 +75,7 @@ def least_separation(
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
     best = escapes[np.argmin((escapes**2).sum(axis=1))] if len(escapes) else None
-    best = _shorter(best, _dive(pairs, _ROOT))
+    best = _shorter(best, _depth_first(pairs, _ROOT))
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)
@@ -118,7 +118,7 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     return best, False
 
 
-def _dive(pairs: ObjectPair, node: _Node) -> Array | None:
+def _depth_first(pairs: ObjectPair, node: _Node) -> Array | None:
     """Follow the nearest child down to a translation without overlap."""
     for _ in range(10 * (len(pairs.a) + len(pairs.b))):
         found, depths, normals = pairs.overlapping(node.translation, TOUCHING)

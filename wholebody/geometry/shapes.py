@@ -53,7 +53,11 @@ __all__ = [
 
 
 class Shape(ABC):
-    """A solid, in its own axes, metres."""
+    """A solid, in its own axes, metres.
+
+    Raises:
+        InputError: a size that is no number or not within 0.1 mm and 10 km, as every shape raises it when it is made.
+    """
 
     @abstractmethod
     def pieces(self) -> tuple[Piece, ...]:

@@ -29,6 +29,10 @@ class Body:
         velocity: (3,) of the centre of mass at the start, m/s.
         angular_velocity: (3,) at the start about the world's axes, rad/s.
         joints: `wb.Hinge` and `wb.BallJoint` that hold it to other things or to the world.
+
+    Raises:
+        InputError: both a density and a mass, or a value that is not finite or out of range.
+        UnknownNameError: there is no such material.
     """
 
     density: float | None = None
@@ -57,6 +61,6 @@ class Body:
             object.__setattr__(self, name, tuple(float(x) for x in values))
 
     @property
-    def stuff(self) -> Material:
+    def resolved_material(self) -> Material:
         """The material itself, where it was given by name."""
         return material(self.material, "Body material")

@@ -34,6 +34,9 @@ class Material:
         name: such as "wood".
         against: name of the other material, or its own, to (restitution, friction).
         others: the same against materials that are not named, if they do not name this one either.
+
+    Raises:
+        InputError: a name that is no text, a restitution out of 0 to 1, or a friction out of 0 to 10.
     """
 
     name: str

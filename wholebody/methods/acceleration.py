@@ -20,7 +20,7 @@ STRETCH = 6.0  # an accelerated step is at most this many times the plain one
 
 
 class Anderson:
-    """Remembers plain steps and the ways actually gone."""
+    """Remembers plain steps and the displacements actually made."""
 
     def __init__(self) -> None:
         """Begin with nothing remembered."""
@@ -28,22 +28,22 @@ class Anderson:
 
     def reset(self) -> None:
         """Begin anew: after a rejected step, or far from the goals."""
-        self._step: Array | None = None  # of which the way is not known yet
+        self._step: Array | None = None  # whose displacement is not known yet
         self._steps: list[Array] = []
-        self._ways: list[Array] = []
+        self._displacements: list[Array] = []
 
     def propose(self, step: Array, stretch: float = STRETCH) -> Array | None:
         """The accelerated step for the plain one (k,), at most `stretch` times as long; None while too little is known.
 
-        The plain step is remembered once `went` tells the way.
+        The plain step is remembered once `record` gets the displacement.
         """
         self._step = step
         if len(self._steps) < 2:
             return None
-        steps, ways = np.array([*self._steps[-DEPTH:], step]), np.array(self._ways[-DEPTH:])
+        steps, displacements = np.array([*self._steps[-DEPTH:], step]), np.array(self._displacements[-DEPTH:])
         changes = steps[1:] - steps[:-1]
         coefficients = np.linalg.lstsq(changes.T, step, rcond=None)[0]
-        fast: Array = step - coefficients @ (ways + changes)
+        fast: Array = step - coefficients @ (displacements + changes)
         longest, size = stretch * float(np.abs(step).max()), float(np.abs(fast).max())
         if not isfinite(size):
             return None
@@ -52,11 +52,11 @@ class Anderson:
     def forget(self) -> None:
         """Forget all steps but the last that was proposed for: an accelerated one was rejected."""
         self._steps.clear()
-        self._ways.clear()
+        self._displacements.clear()
 
-    def went(self, way: Array) -> None:
-        """Remember the way that was gone after the last step was proposed."""
+    def record(self, displacement: Array) -> None:
+        """Remember the displacement (k,) that was made after the last step was proposed."""
         if self._step is not None:
             self._steps.append(self._step)
-            self._ways.append(way)
+            self._displacements.append(displacement)
             self._step = None

@@ -20,7 +20,7 @@ from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
-from wholebody.workspace import OfOneRun, Workspace
+from wholebody.workspace import NotCopyable, Workspace
 
 
 class Step(Protocol):
@@ -163,7 +163,7 @@ class SolvedStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class SolvingTracker(OfOneRun):
+class SolvingTracker(NotCopyable):
     """Follows goals by solving the problem anew at every step from the present posture, without velocity bounds.
 
     Attributes:

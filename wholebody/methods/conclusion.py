@@ -55,9 +55,15 @@ class Ending:
     programs: Mapping[str, int] = field(default_factory=dict)
 
 
-def counted(tolerance: float) -> float:
+def assessed_tolerance(tolerance: float) -> float:
     """Error [m, rad] up to which an assessment counts as good for a method with a tolerance."""
     return SLACK * tolerance + COAL_ACCURACY
+
+
+def meets(judgement: Assessment, tolerance: float) -> bool:
+    """Whether a posture meets the goals with everything held, as a method with a tolerance [m, rad] is judged."""
+    enough = assessed_tolerance(tolerance)
+    return judgement.holds(enough) and judgement.met(enough)
 
 
 def concluded(
@@ -74,15 +80,16 @@ def concluded(
         began: `time.perf_counter` at the beginning of the call.
     """
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
-    status = _status(judgement, ending, counted(tolerance), bool(control.reason))
+    enough = assessed_tolerance(tolerance)
+    status = _status(judgement, ending, enough, bool(control.reason))
     if ending.contradictions is None:
         why = "" if status == "solved" else explanation(problem)
     else:
-        holds = judgement.holds(counted(tolerance))
+        holds = judgement.holds(enough)
         status, why = proven(status, ending.contradictions, holds), in_words(ending.contradictions)
-    if why and ending.caveat and not judgement.holds(counted(tolerance)):
+    if why and ending.caveat and not judgement.holds(enough):
         why += f"; {ending.caveat}"
-    said = why or control.message(judgement) or _message(problem, status, judgement, ending, counted(tolerance))
+    said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
     return Solution(
         q=ending.q,
         status=status,

@@ -53,7 +53,7 @@ class Contradiction(NamedTuple):
     least: float = 0.0
 
 
-class _Told(NamedTuple):
+class _FixedGroup(NamedTuple):
     """The placement of a rigid group, and the term that fixes it."""
 
     placement: pin.SE3
@@ -84,18 +84,18 @@ class _Finder:
         self.found: list[Contradiction] = []
         state = workspace.state.update(problem.start)
         model = problem.scene.model
-        stuck = np.zeros(model.nv, dtype=bool)
-        self._stuck: list[tuple[Bound, Mask]] = []  # each bound, and the degrees of freedom (nv,) that it keeps
+        frozen = np.zeros(model.nv, dtype=bool)
+        self._frozen: list[tuple[Bound, Mask]] = []  # each bound, and the degrees of freedom (nv,) that it keeps
         for bound in problem.bounds:
             low, high = bound.bounds(state, None)
-            self._stuck.append((bound, (low == 0.0) & (high == 0.0)))
-            stuck |= self._stuck[-1][1]
+            self._frozen.append((bound, (low == 0.0) & (high == 0.0)))
+            frozen |= self._frozen[-1][1]
         self._group = list(range(model.njoints))
-        for joint in range(1, model.njoints) if stuck.any() else ():
-            if stuck[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]].all():
+        for joint in range(1, model.njoints) if frozen.any() else ():
+            if frozen[model.idx_vs[joint] : model.idx_vs[joint] + model.nvs[joint]].all():
                 self._group[joint] = self._group[model.parents[joint]]
         self._start = state.data
-        self._told: dict[int, _Told] = {0: _Told(pin.SE3.Identity(), "the world")}
+        self._fixed: dict[int, _FixedGroup] = {0: _FixedGroup(pin.SE3.Identity(), "the world")}
 
     def holds(self) -> None:
         """Collect the placements of groups that holds fix; different ones contradict each other."""
@@ -106,15 +106,15 @@ class _Finder:
             group, local = self._frame(term.frame)
             here = self._at(group, local)
             if here is not None:
-                self._compare("infeasible", name, here, term.kept_at, term.orientation, self._told[group].by)
+                self._compare("infeasible", name, here, term.kept_at, term.orientation, self._fixed[group].by)
             elif term.orientation:
-                self._told[group] = _Told(term.kept_at * local.inverse(), name)
+                self._fixed[group] = _FixedGroup(term.kept_at * local.inverse(), name)
 
     def pairs(self) -> None:
         """Find pieces that cannot move and are nearer than their clearance."""
         table, geometry = self._workspace.table, self._workspace.geometry
         group = np.array([self._group[joint] for joint in table.joint.tolist()], dtype=np.intp)
-        told = np.isin(group, list(self._told))
+        told = np.isin(group, list(self._fixed))
         pairs = table.pairs
         fixed = np.flatnonzero((told[pairs].all(axis=1)) | (group[pairs[:, 0]] == group[pairs[:, 1]]))
         if not len(fixed):
@@ -135,7 +135,7 @@ class _Finder:
 
     def ranges(self) -> None:
         """Find ranges of motion and reach cones that are violated wherever the joints turn that can."""
-        if not any(mask.any() for _, mask in self._stuck):
+        if not any(mask.any() for _, mask in self._frozen):
             return
         least, most = self._reachable()
         for number, term in enumerate(self._problem.constraints):
@@ -160,7 +160,7 @@ class _Finder:
         least, most = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         least[limits.idx_q], most[limits.idx_q] = limits.lower, limits.upper
         for joint in list(self._problem.scene.model.joints)[1:]:
-            if joint.nq == 1 and any(mask[joint.idx_v] for _, mask in self._stuck):
+            if joint.nq == 1 and any(mask[joint.idx_v] for _, mask in self._frozen):
                 least[joint.idx_q] = most[joint.idx_q] = start[joint.idx_q]
         return least, most
 
@@ -177,7 +177,7 @@ class _Finder:
     def _violated(self, name: str, largest: float, dofs: list[int]) -> None:
         """Report a range whose largest value is negative, with the bounds that keep some of its degrees of freedom."""
         if largest < -CLEAR:
-            keepers = " and ".join(repr(bound) for bound, mask in self._stuck if mask[dofs].any())
+            keepers = " and ".join(repr(bound) for bound, mask in self._frozen if mask[dofs].any())
             if keepers:
                 text = f"{name} is violated by {np.degrees(-largest):.3g} degrees where {keepers} keeps the joints"
                 self.found.append(Contradiction("infeasible", text))
@@ -194,14 +194,14 @@ class _Finder:
             if isinstance(goal, Frame):
                 target = placement(goal.target)
                 if here is not None:
-                    self._compare("unreachable", name, here, target, True, self._told[group].by)
+                    self._compare("unreachable", name, here, target, True, self._fixed[group].by)
                 else:
-                    self._told[group] = _Told(target * local.inverse(), name)
+                    self._fixed[group] = _FixedGroup(target * local.inverse(), name)
             elif isinstance(goal, Point):
                 place, wanted = local.act(np.asarray(goal.offset, dtype=float)), np.asarray(goal.target, dtype=float)
                 if here is not None:
-                    away = float(np.linalg.norm(self._told[group].placement.act(place) - wanted))
-                    self._report("unreachable", name, away, 0.0, self._told[group].by)
+                    away = float(np.linalg.norm(self._fixed[group].placement.act(place) - wanted))
+                    self._report("unreachable", name, away, 0.0, self._fixed[group].by)
                 for other, its_place, its_wanted, its_name in points:
                     if other == group:
                         apart = np.linalg.norm(wanted - its_wanted) - np.linalg.norm(place - its_place)
@@ -247,7 +247,7 @@ class _Finder:
     def _centers(self, group: NDArray[np.intp]) -> Array:
         """Origins (n, 3) of the pieces; those of fixed groups at their fixed placements."""
         center: Array = self._workspace.near(self._problem.start, 0.0).placements[:, 3].copy()
-        for told, (at, _) in self._told.items():
+        for told, (at, _) in self._fixed.items():
             moved = at * self._start.oMi[told].inverse()
             members = group == told
             center[members] = center[members] @ moved.rotation.T + moved.translation
@@ -265,7 +265,7 @@ class _Finder:
 
     def _at(self, group: int, local: pin.SE3) -> pin.SE3 | None:
         """Placement in the world of a local placement of a group, if the group is fixed."""
-        return self._told[group].placement * local if group in self._told else None
+        return self._fixed[group].placement * local if group in self._fixed else None
 
     def _piece(self, index: int, joint: int) -> pin.SE3:
         """Placement of a piece: in the world if its group is fixed, otherwise in its group."""
@@ -285,7 +285,7 @@ class _Finder:
 
     def _overlap(self, a: int, b: int, distance: float, asked: float) -> str:
         owners, joint = self._workspace.owners, self._workspace.table.joint.tolist()
-        said = [f"{owners[k]} (kept by {self._told[group].by})" if (group := self._group[joint[k]]) in self._told
+        said = [f"{owners[k]} (kept by {self._fixed[group].by})" if (group := self._group[joint[k]]) in self._fixed
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
         return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are asked" if asked else "")

@@ -23,7 +23,8 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.state import State, Wrench
+from wholebody.assessment import goal_errors
+from wholebody.figures.state import State
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
@@ -92,10 +93,10 @@ class DampedLeastSquares(SolvesAnew):
         began = time.perf_counter()
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             descent = _Descent(problem, self, workspace.state, control)
-            rested = descent.run()
+            converged = descent.run()
         ending = Ending(
             descent.best,
-            rested,
+            converged,
             descent.steps,
             tuple(descent.trace),
             f"in {descent.steps} steps",
@@ -126,7 +127,8 @@ class _Descent:
         for _ in range(method.iterations + 1):
             self._state.update(q)
             held, wanted = self._held(), self._wanted()
-            violation, error = float(np.abs(held).max(initial=0.0)), self._largest_error()
+            distance, angle, _ = goal_errors(problem, self._state)
+            violation, error = float(np.abs(held).max(initial=0.0)), max(distance, angle)
             self.trace.append(TraceEntry(error, violation, 0.0, step))
             self._control.tell(self.trace[-1])
             if (max(violation, enough), error) < best:
@@ -153,15 +155,6 @@ class _Descent:
         """Errors of all goals, multiplied by the roots of their weights."""
         goals = self._problem.goals
         return _joined([-(goal.weight**0.5) * np.atleast_1d(goal.error(self._state)) for goal in goals])
-
-    def _largest_error(self) -> float:
-        """The largest norm of a goal's error, metres or radians, as in the assessment."""
-        lengths = [0.0]
-        for goal in self._problem.goals:
-            error = np.atleast_1d(goal.error(self._state))
-            angular = np.broadcast_to(goal.angular, error.shape)
-            lengths += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
-        return max(lengths)
 
     def _step(self, held: Array, wanted: Array) -> Array:
         """Displacement (nv,), within the limits."""
@@ -218,10 +211,7 @@ def _damped(jacobian: Array, error: Array, damping: float) -> Array:
 
 def _jacobian(terms: Sequence[Goal | Constraint], state: State) -> Array:
     """Rows (m, nv) of all terms."""
-    rows = []
-    for term in terms:
-        part = term.jacobian(state)
-        rows.append(state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part))
+    rows = [state.dense_jacobian(term.jacobian(state)) for term in terms]
     return np.concatenate(rows) if rows else np.zeros((0, state.model.nv))
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.assessment import goal_errors, largest_violation
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
@@ -22,13 +23,13 @@ from wholebody.workspace import Workspace
 
 SHARE = 0.5  # of the tolerance, to which goals and constraints are met: the assessment rounds differently
 REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
-COMFORT = 1e-2  # weight of the measures at the beginning, against goals of weight 1
+MEASURES = 1e-2  # weight of the measures at the beginning, against goals of weight 1
 LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
 REGULAR = 1e-3  # share of the measures' weight: weight of the motion itself
 DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one, against goals of weight 1
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
-FIRM = 1e-4  # m, rad: what must hold and is missed by less than this is no reason to prefer an earlier posture
+NEGLIGIBLE = 1e-4  # m, rad: what must hold and is missed by less than this is no reason to prefer an earlier posture
 
 
 class Stopwatch(threading.local):
@@ -105,7 +106,7 @@ class Iteration:
     Attributes:
         q: (nq,) the present posture.
         steps: how many were made.
-        rested: whether it converged: nothing moves any more.
+        converged: whether nothing moves any more.
         failure: the tool's message if it found no step.
         trace: one entry a posture.
     """
@@ -118,7 +119,7 @@ class Iteration:
         self._proximity, self._state = workspace.proximity, workspace.state
         self.q: Array = problem.scene.figure.clamp(problem.start)
         self.trace: list[TraceEntry] = []
-        self.steps, self.rested, self.failure = 0, False, ""
+        self.steps, self.converged, self.failure = 0, False, ""
         self._damping, self._last = 0.0, np.zeros(problem.scene.model.nv)
         self._best, self._best_rank = self.q, (np.inf, np.inf)
 
@@ -145,7 +146,7 @@ class Iteration:
             ):
                 return
             if self.steps and not early and length <= REST * settings.tolerance:
-                self.rested = True
+                self.converged = True
                 return
             if self.steps == settings.iterations or self._control.over:
                 return
@@ -161,7 +162,7 @@ class Iteration:
     def _move(self) -> Array:
         """The tool's displacement (nv,), cut to the longest step; its direction sets the damping of the next one."""
         settings = self._settings
-        weight = max(COMFORT * settings.decay**self.steps, LEAST * settings.tolerance)
+        weight = max(MEASURES * settings.decay**self.steps, LEAST * settings.tolerance)
         self.steps += 1
         move = self._stepper.step(self.q, weight, max(REGULAR * weight, self._damping))
         if not np.isfinite(move).all():
@@ -181,19 +182,12 @@ class Iteration:
     def _rank(self, error: float, violation: float) -> None:
         """Keep the present posture if it is the best so far: least broken, then nearest; of equal ones the last."""
         broken = max(violation, self._clearance_violation(self.q))
-        rank = (max(broken, self._settings.tolerance, FIRM), error)
+        rank = (max(broken, self._settings.tolerance, NEGLIGIBLE), error)
         if rank <= self._best_rank:
             self._best, self._best_rank = self.q, rank
 
     def _look(self) -> tuple[float, float]:
         """The largest error of a goal and of a constraint, metres or radians."""
         state = self._state.update(self.q)
-        errors, violations = [0.0], [0.0]
-        for goal in self._problem.goals:
-            error = np.atleast_1d(goal.error(state))
-            angular = np.broadcast_to(goal.angular, error.shape)
-            errors += [float(np.linalg.norm(error[angular])), float(np.linalg.norm(error[~angular]))]
-        for term in self._problem.constraints:
-            value = np.atleast_1d(term.value(state))
-            violations.append(float(np.maximum(term.lower - value, value - term.upper).max(initial=0.0)))
-        return max(errors), max(violations)
+        distance, angle, _ = goal_errors(self._problem, state)
+        return max(distance, angle), largest_violation(self._problem, state)

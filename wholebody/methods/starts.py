@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.human_fingers import finger_angles
+from wholebody.figures.human.fingers import finger_angles
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.grasp import Grasp
@@ -21,7 +21,7 @@ ROOT_SPREAD = 0.2  # m and rad, for joints without limits, but those that turn a
 TURN = 2.0 * np.pi  # rad: range of those
 
 
-def bent(problem: Problem, state: State, start: Array) -> Array | None:
+def off_limits(problem: Problem, state: State, start: Array) -> Array | None:
     """The start, shape (nq,), with every joint at a limit moved off it; None if no joint is at a limit.
 
     Args:

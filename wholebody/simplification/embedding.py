@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Mask
 from wholebody.figures.self_pairs import random_postures
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
 
 SAMPLES = 3  # postures at which a resolved term is compared with that of the whole figure
@@ -57,7 +57,7 @@ class Embedding:
     def rows(self, term: Goal | Constraint, state: State) -> Array:
         """The columns (m, small nv) of a term's Jacobian at the small figure's posture."""
         whole = self.whole(state)
-        return np.asarray(_dense(term.jacobian(whole), whole)[:, self.idx_v])
+        return np.asarray(whole.dense_jacobian(term.jacobian(whole))[:, self.idx_v])
 
 
 class EmbeddedGoal(Goal):
@@ -205,9 +205,9 @@ def _values(term: Term, state: State, start: Array) -> list[Array]:
     postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
     ask: list[Callable[[], object]] = []
     if isinstance(term, Goal):
-        ask = [lambda: term.error(state), lambda: _dense(term.jacobian(state), state), lambda: term.angular]
+        ask = [lambda: term.error(state), lambda: state.dense_jacobian(term.jacobian(state)), lambda: term.angular]
     elif isinstance(term, Constraint):
-        ask = [lambda: np.atleast_1d(term.value(state)), lambda: _dense(term.jacobian(state), state)]
+        ask = [lambda: np.atleast_1d(term.value(state)), lambda: state.dense_jacobian(term.jacobian(state))]
         ask += [lambda: _wide(term.lower, term, state), lambda: _wide(term.upper, term, state)]
     elif isinstance(term, Measure):
         ask = [lambda: term.gradient(state), lambda: term.curvature(state)]
@@ -228,10 +228,6 @@ def _moving_rows(values: list[Array]) -> tuple[list[Array], int]:
 
 def _wide(bound: Array, term: Constraint, state: State) -> Array:
     return np.broadcast_to(bound, np.shape(np.atleast_1d(term.value(state))))
-
-
-def _dense(part: Wrench | Array, state: State) -> Array:
-    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
 
 
 def _places(spans: list[tuple[int, int]]) -> NDArray[np.intp]:

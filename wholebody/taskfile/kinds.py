@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from wholebody.checks import FAR, color, shown, slipped
+from wholebody.checks import FAR, color, shown, unit_hint
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.matter.joints import BallJoint, Hinge
@@ -70,7 +70,7 @@ class Number(Kind):
 
     def _slip(self, value: float) -> str:
         if self.unit == "m":
-            return slipped(value, self.low, self.high) or "; change it"
+            return unit_hint(value, self.low, self.high) or "; change it"
         for factor, unit in _SLIPS.get(self.unit, ()):
             if abs(value) < FAR and self.low <= value * factor <= self.high:
                 return f"; if it is in {unit}, write {value * factor:.6g}"

@@ -58,6 +58,10 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
         top["clearance"] = problem.clearance
     if problem.touching:
         top["touching"] = [list(pair) for pair in problem.touching]
+    if not problem.range_of_motion:
+        top["range_of_motion"] = False
+    if problem.balance is not None:
+        top["balance"] = problem.balance
     parts = [_lines(top), _table("[figure]", _figure(scene.figure, target)), _table("[start]", _start(problem))]
     for thing in scene.objects.values():
         parts.append(_table("[[object]]" if thing.segment is None else "[[attach]]", _thing(thing, target, beside)))

@@ -97,13 +97,7 @@ class Axis(Goal):
         direction, distance = self._way(frame)
         if distance < TOUCHING:
             return np.zeros(2)
-        across = self.basis @ (direction @ frame.rotation)
-        x, y, along = across.tolist()
-        sine = hypot(x, y)
-        angle = atan2(sine, along)
-        if sine < NO_ANGLE:
-            return np.array((angle, 0.0))
-        return np.array((x, y)) * (angle / sine)
+        return equidistant_error(*(self.basis @ (direction @ frame.rotation)).tolist())
 
     def jacobian(self, state: State) -> Wrench:
         """Two rows: moments, and also forces if the direction depends on the frame's position."""
@@ -112,14 +106,7 @@ class Axis(Goal):
         if distance < TOUCHING:
             return Wrench(np.zeros((2, 6)), self.place.joint)
         axes = self.basis @ frame.rotation.T
-        x, y, along = (axes @ direction).tolist()
-        sine = hypot(x, y)
-        gain = self._gain(sine, along)
-        ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
-        fall = along - gain
-        # theta' = c s' - s c' and (x/s)' is the part of x' across x, over s.
-        change = np.array(((gain + fall * ux * ux, fall * ux * uy, -x), (fall * ux * uy, gain + fall * uy * uy, -y)))
-        on_direction = change @ axes
+        on_direction = equidistant_jacobian(*(axes @ direction).tolist()) @ axes
         rows = np.zeros((2, 6))
         rows[:, 3:] = on_direction @ pin.skew(direction)
         if self.toward is not None:
@@ -137,12 +124,29 @@ class Axis(Goal):
         distance = float(np.sqrt(way @ way))
         return way / max(distance, TOUCHING), distance
 
-    @staticmethod
-    def _gain(sine: float, along: float) -> float:
-        """Derivative across the error: the angle over its sine."""
-        if sine < NO_ANGLE:
-            return 1.0 if along > 0.0 else STEEPEST
-        return min(atan2(sine, along) / sine, STEEPEST)
+
+def equidistant_error(x: float, y: float, along: float) -> Array:
+    """(2,) angle between a unit direction and the axis, resolved along t1 and t2 [rad].
+
+    The arguments are the components of the direction along t1, t2 and the axis.
+    """
+    sine = hypot(x, y)
+    angle = atan2(sine, along)
+    return np.array((angle, 0.0)) if sine < NO_ANGLE else np.array((x, y)) * (angle / sine)
+
+
+def equidistant_jacobian(x: float, y: float, along: float) -> Array:
+    """(2, 3) derivative of `equidistant_error` by the three components, for changes that keep the length 1.
+
+    theta' = c s' - s c', and (x / s)' is the part of x' across x, over s. Across the error the derivative is the angle
+    over its sine, at most `STEEPEST`.
+    """
+    sine = hypot(x, y)
+    at_an_end = 1.0 if along > 0.0 else STEEPEST
+    gain = at_an_end if sine < NO_ANGLE else min(atan2(sine, along) / sine, STEEPEST)
+    ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
+    fall = along - gain
+    return np.array(((gain + fall * ux * ux, fall * ux * uy, -x), (fall * ux * uy, gain + fall * uy * uy, -y)))
 
 
 def across(axis: Array) -> Array:

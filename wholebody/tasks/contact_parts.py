@@ -7,7 +7,6 @@ constraint: the list of a problem in which it stands decides whether it is met i
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from math import atan2, hypot
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -15,7 +14,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State
-from wholebody.tasks.axis import NO_ANGLE, STEEPEST
+from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, nearest
@@ -99,18 +98,10 @@ class Facing(NamedTuple):
         axes = self.basis @ state.frame(self.place.frame).rotation.T
         if self.either and axes[2] @ direction < 0.0:
             direction = -direction
-        x, y, along = (axes @ direction).tolist()
-        sine = hypot(x, y)
-        angle = atan2(sine, along)
-        small = sine < NO_ANGLE
-        value = np.array((angle, 0.0)) if small else np.array((x, y)) * (angle / sine)
-        gain = min(angle / sine, STEEPEST) if not small else (1.0 if along > 0.0 else STEEPEST)
-        ux, uy = (1.0, 0.0) if small else (x / sine, y / sine)
-        fall = along - gain
-        change = np.array(((gain + fall * ux * ux, fall * ux * uy, -x), (fall * ux * uy, gain + fall * uy * uy, -y)))
+        components = (axes @ direction).tolist()
         wrench = np.zeros((2, 6))
-        wrench[:, 3:] = (change @ axes) @ pin.skew(direction)
-        return value, _between(state, wrench, self.place.joint, self.face.joint)
+        wrench[:, 3:] = (equidistant_jacobian(*components) @ axes) @ pin.skew(direction)
+        return equidistant_error(*components), _between(state, wrench, self.place.joint, self.face.joint)
 
 
 class Level(NamedTuple):

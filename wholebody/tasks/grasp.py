@@ -18,7 +18,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs, through
-from wholebody.tasks.surfaces import Face, Surface, carried_by, face, joined, outermost, surface
+from wholebody.tasks.surfaces import Face, Surface, carried_by, face, joined, outermost, segments_beyond, surface
 from wholebody.tasks.touch import check_apart, named
 
 KINDS = ("palm", "power", "pinch", "fingertips")
@@ -112,7 +112,7 @@ class Grasp(ContactTerm):
             parts = self._fingertips(scene, thing, where)
         else:
             parts = self._pinch(scene, thing, where)
-        return filled(self, parts=tuple(parts), touches=owner_pairs(_fingers(scene, place.joint), thing.owners))
+        return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
     def _palm(
         self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
@@ -263,11 +263,3 @@ def _heading(scene: Surroundings, state: State) -> Array:
         return np.eye(3)
     c, s = ahead[0] / length, ahead[1] / length
     return np.array(((c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
-
-
-def _fingers(scene: Surroundings, joint: int) -> list[str]:
-    """Segments on a hand's joint and beyond it."""
-    segments = set(scene.figure.segments)
-    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
-    beyond = [owner for owner, piece in owners if joint in scene.model.supports[piece.parentJoint]]
-    return [owner for owner in dict.fromkeys(beyond) if owner in segments]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.checks import array, number, numbers, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
@@ -76,7 +76,7 @@ def find_base(scene: Surroundings, name: str | None, moved: str, where: str) -> 
     return base
 
 
-def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
+def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Indices:
     """Tangent indices (k,) of joints and groups.
 
     Raises:
@@ -91,10 +91,10 @@ def find_dofs(scene: Surroundings, names: Sequence[str], where: str) -> Any:
         raise InputError(f"{where}: {error}") from None
 
 
-def angular_dofs(model: Any) -> Any:
+def angular_dofs(model: Any) -> Mask:
     """(nv,) whether each degree of freedom is in radians, which holds for rotations."""
     state = State(model)
-    return state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5
+    return np.asarray(state.folded(np.abs(state.jacobian[3:])).max(axis=0) > 0.5)
 
 
 def point(value: object, where: str) -> Array:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from math import hypot
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs
 from wholebody.tasks.sit import UP
-from wholebody.tasks.support import STANDING_HEIGHT, low_points
-from wholebody.tasks.surfaces import face, surface
+from wholebody.tasks.support import STANDING_HEIGHT, hull_corners, low_points
+from wholebody.tasks.surfaces import face, segments_beyond, surface
 from wholebody.tasks.touch import named
 
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
@@ -88,7 +87,7 @@ class Stand(Constraint):
                 Facing(place, across(up), ground, UP),
                 Over(place, ground, -ground.half, ground.half),
             ]
-            toes = [owner for owner in _beyond(scene, place.joint) if owner != foot]
+            toes = [owner for owner in segments_beyond(scene, place.joint) if owner != foot]
             touches += owner_pairs([*sole.owners, *toes], thing.owners)
             lows = np.vstack([low_points(shape, sole.placed(k, rest)) for k, shape in enumerate(sole.shapes)])
             lows = lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT]
@@ -161,7 +160,7 @@ class SolePolygon(NamedTuple):
         points = np.array([place.act(point) for place, point in zip(placed, self.points, strict=True)])
         center, moves = state.center_of_mass(), state.center_of_mass_jacobian()
         values, rows = np.full(len(points), FAR_INSIDE), np.zeros((len(points), state.model.nv))
-        begin = np.array(_hull(points[:, :2]), dtype=np.intp)
+        begin = np.array(hull_corners(points[:, :2]), dtype=np.intp)
         if not len(begin):
             return values, rows
         end = np.roll(begin, -1)
@@ -175,32 +174,3 @@ class SolePolygon(NamedTuple):
             wrench = np.hstack([normals, np.cross(points[corner], normals)])
             rows[begin] -= part[:, None] * state.rows(wrench, self.joints[corner], np.zeros_like(corner))
         return values, rows
-
-
-def _hull(points: Array) -> list[int]:
-    """Indices of the corners of the convex hull of points (n, 2), anticlockwise, by Andrew's monotone chain."""
-    order = sorted(range(len(points)), key=lambda k: (round(float(points[k, 0]), 6), round(float(points[k, 1]), 6)))
-
-    def half(indices: list[int]) -> list[int]:
-        chain: list[int] = []
-        for k in indices:
-            while len(chain) > 1:
-                (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
-                    break
-                chain.pop()
-            if not chain or hypot(*(points[k] - points[chain[-1]])) > 1e-5:
-                chain.append(k)
-        return chain
-
-    lower, upper = half(order), half(order[::-1])
-    corners = list(dict.fromkeys(lower[:-1] + upper[:-1]))
-    return corners if len(corners) > 2 else []
-
-
-def _beyond(scene: Surroundings, joint: int) -> list[str]:
-    """Segments on a joint and beyond it, such as the toes of a foot."""
-    segments = set(scene.figure.segments)
-    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
-    beyond = [owner for owner, piece in owners if joint in scene.model.supports[piece.parentJoint]]
-    return [owner for owner in dict.fromkeys(beyond) if owner in segments]

@@ -12,9 +12,9 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings
+from wholebody.tasks.surfaces import outermost
 
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
@@ -22,8 +22,13 @@ STANDING_HEIGHT = 0.01
 FLATTEST = 1e-6
 """Height [m] of a corner over the line through its neighbours below which it is no corner."""
 
+NEAREST = 1e-5
+"""Distance [m] below which two points count as one corner."""
+
 THINNEST = 1e-4
 """Width [m] below which a polygon counts as a line."""
+
+DOWN = np.array((0.0, 0.0, -1.0))
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
@@ -56,34 +61,47 @@ def low_points(geometry: Any, placement: pin.SE3) -> Array:
         geometry: a coal shape.
         placement: of its origin in the world.
     """
-    swept = swept_points(geometry)
-    if len(swept.points) == 0:
-        # An ellipsoid's lowest point: the image of the ball's point whose normal is mapped to -z.
-        pull = np.asarray(geometry.radii) * placement.rotation[2]
-        lowest = placement.rotation @ (np.asarray(geometry.radii) * pull) / np.linalg.norm(pull)
-        return np.array([placement.translation - lowest])
-    corners = swept.points @ placement.rotation.T + placement.translation
-    corners[:, 2] -= swept.radius
-    return np.asarray(corners)
+    return outermost(geometry, placement, DOWN)
 
 
 def convex_polygon(points: Array) -> Array:
     """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise.
 
-    Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
-    edge between two points that differ by rounding alone would have no direction.
-
     Raises:
         InputError: the points lie on a line.
     """
-    ordered = sorted({(round(float(x), 6), round(float(y), 6)) for x, y in points})
-    hull = _half_hull(ordered)[:-1] + _half_hull(ordered[::-1])[:-1]
-    corners = np.array(hull).reshape(-1, 2)
+    flat = np.round(points[:, :2], 6)
+    corners = flat[hull_corners(flat)].reshape(-1, 2)
     if len(corners) < 3 or least_width(corners) < THINNEST:
         raise InputError(
             "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
         )
     return corners
+
+
+def hull_corners(points: Array) -> list[int]:
+    """Indices of the corners of the convex hull of points (n, 2), anticlockwise; none where they lie on a line.
+
+    Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
+    edge between two points that differ by rounding alone would have no direction.
+    """
+    order = sorted(range(len(points)), key=lambda k: (round(float(points[k, 0]), 6), round(float(points[k, 1]), 6)))
+
+    def half(indices: list[int]) -> list[int]:
+        chain: list[int] = []
+        for k in indices:
+            while len(chain) > 1:
+                (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > FLATTEST * hypot(x - ax, y - ay):
+                    break
+                chain.pop()
+            if not chain or hypot(*(points[k] - points[chain[-1]])) > NEAREST:
+                chain.append(k)
+        return chain
+
+    lower, upper = half(order), half(order[::-1])
+    corners = list(dict.fromkeys(lower[:-1] + upper[:-1]))
+    return corners if len(corners) > 2 else []
 
 
 def edges(corners: Array) -> tuple[Array, Array]:
@@ -110,18 +128,6 @@ def shrunk(corners: Array, margin: float) -> Array:
                 kept.append(rest[i])
         rest = np.array(kept).reshape(-1, 2)
     return rest
-
-
-def _half_hull(ordered: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    hull: list[tuple[float, float]] = []
-    for x, y in ordered:
-        while len(hull) > 1:
-            (ax, ay), (bx, by) = hull[-2:]
-            if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > FLATTEST * hypot(x - ax, y - ay):
-                break
-            hull.pop()
-        hull.append((x, y))
-    return hull
 
 
 def least_width(corners: Array) -> float:

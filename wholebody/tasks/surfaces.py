@@ -18,6 +18,7 @@ from wholebody.checks import shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
+from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
@@ -212,7 +213,7 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
     place = found.placed(0, state)
     if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Halfspace):
         normal = np.array(found.shapes[0].n)
-        return Face(found, normal * float(found.shapes[0].d), _axes(normal), np.full(2, np.inf))
+        return Face(found, normal * float(found.shapes[0].d), across(normal), np.full(2, np.inf))
     if len(found.shapes) == 1 and isinstance(found.shapes[0], coal.Box):
         half = np.array(found.shapes[0].halfSide)
         along = place.rotation.T @ direction
@@ -226,7 +227,7 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
     everything = np.vstack(points)
     height = everything @ direction
     top = everything[height >= height.max() - TOP]
-    axes = _axes(direction)
+    axes = across(direction)
     flat = top @ axes[:2].T
     low, high = flat.min(axis=0), flat.max(axis=0)
     center = axes[:2].T @ (0.5 * (low + high)) + direction * height.max()
@@ -243,8 +244,9 @@ def outermost(shape: Any, placement: pin.SE3, direction: Array) -> Array:
     return np.asarray(swept.points @ placement.rotation.T + placement.translation + swept.radius * direction)
 
 
-def _axes(normal: Array) -> Array:
-    """Rows: two directions across a unit vector, and it."""
-    first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    first /= np.linalg.norm(first)
-    return np.array((first, np.cross(normal, first), normal))
+def segments_beyond(scene: Surroundings, joint: int) -> list[str]:
+    """Segments on a joint and beyond it, such as a foot with its toes, or a hand with its fingers."""
+    segments = set(scene.figure.segments)
+    owners = zip(scene.piece_owner, scene.geometry.geometryObjects, strict=True)
+    beyond = [owner for owner, piece in owners if joint in scene.model.supports[piece.parentJoint]]
+    return [owner for owner in dict.fromkeys(beyond) if owner in segments]

@@ -71,7 +71,7 @@ class AssemblyDrag:
         try:
             for move in GOAL_MOVES:
                 if move < error:
-                    made.aim_between(goal, move / error, target)
+                    made.interpolate_goal(goal, move / error, target)
                 elif np.isfinite(move):
                     continue  # the goal is nearer than that, and was tried already
                 step = made.step()

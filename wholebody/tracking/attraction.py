@@ -37,7 +37,7 @@ class Attraction(DistanceMeasure):
         np.multiply(2.0, self.distance.weights, out=self.distance.curvature)
 
 
-class Pace(Bound):
+class FrameMotionLimit(Bound):
     """Bounds the motion of a whole frame, whatever the number of its steps."""
 
     def __init__(self, model: pin.Model, limit: Array) -> None:

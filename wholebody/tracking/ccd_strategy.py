@@ -35,17 +35,17 @@ class CCDStrategy:
             seed: of the order of the chains.
         """
         self.scene = scene
-        self._pace = np.full(scene.model.nv, SPEED * dt)
+        self._largest_motion = np.full(scene.model.nv, SPEED * dt)
         if scene.figure.root == "free":
-            self._pace[:3] = ROOT_SPEED * dt
+            self._largest_motion[:3] = ROOT_SPEED * dt
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
 
     def resolve(self, shown: Array, tracked: Array) -> Resolution:
         """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
-        pace = self._pace + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
+        largest_motion = self._largest_motion + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
         self._tracked = tracked
-        result = resolve_overlap(self.scene, shown, tracked, self._rng, pace)
+        result = resolve_overlap(self.scene, shown, tracked, self._rng, largest_motion)
         note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
         return Resolution(
             candidates=(result.q,),

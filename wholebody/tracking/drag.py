@@ -26,11 +26,11 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point, StepLimit
 from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
-from wholebody.workspace import OfOneRun, Workspace
+from wholebody.workspace import NotCopyable, Workspace
 
-FRAME = 1.0 / 60.0  # s: frame time of a screen
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
@@ -166,7 +166,7 @@ def _depth(workspace: Workspace, q: Array) -> float:
     return float(-workspace.near(q, 0.0).distance.min(initial=0.0))
 
 
-class Drag(OfOneRun, Generic[Answer]):
+class Drag(NotCopyable, Generic[Answer]):
     """Follows a goal that is moved from frame to frame, of a problem by any method or of an assembly.
 
     "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods

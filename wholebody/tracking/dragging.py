@@ -25,8 +25,8 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, moving_goal, retarget
-from wholebody.tracking.scripts import FRAME
 
 Counts = NDArray[np.intp]
 
@@ -85,19 +85,19 @@ class DragJudgement:
     jerk: Array
 
 
-def present_place(problem: Problem, goal: int = 0) -> Array:
+def present_position(problem: Problem, goal: int = 0) -> Array:
     """Position of a goal's frame (or of its point) at the problem's start, (3,) metres.
 
     Raises:
         InputError: the goal is not a `Point` or a `Frame`.
     """
     term = moving_goal(problem, goal)
-    here: Array = goal_place(problem, goal) + term.error(problem.scene.state(problem.start))[:3]
+    here: Array = target_position(problem, goal) + term.error(problem.scene.state(problem.start))[:3]
     return here
 
 
-def goal_place(problem: Problem, goal: int = 0) -> Array:
-    """Position of a goal's target, (3,) metres; raises like `present_place`."""
+def target_position(problem: Problem, goal: int = 0) -> Array:
+    """Position of a goal's target, (3,) metres; raises like `present_position`."""
     term = moving_goal(problem, goal)
     return np.array(term.resolved_target if isinstance(term, Point) else term.resolved_target.translation, dtype=float)
 

@@ -36,15 +36,15 @@ PATIENCE = 10
 class Entanglement:
     """Looks whether two limbs hold each other, and which of them gives way."""
 
-    def __init__(self, scene: Scene, workspace: Workspace, pace: Array) -> None:
+    def __init__(self, scene: Scene, workspace: Workspace, largest_motion: Array) -> None:
         """Prepare.
 
         Args:
             scene: the figure among things.
             workspace: of the run.
-            pace: (nv,) largest motion of each degree of freedom in a frame, radians and metres.
+            largest_motion: (nv,) largest motion of each degree of freedom in a frame, radians and metres.
         """
-        self._model, self._workspace, self._pace = scene.model, workspace, pace
+        self._model, self._workspace, self._largest_motion = scene.model, workspace, largest_motion
         limb_of = np.full(scene.model.njoints, -1)
         self._dofs: list[Array] = []
         for number, (joints, _) in enumerate(chains_of(scene.figure).values()):
@@ -70,7 +70,7 @@ class Entanglement:
             self._frames = 0
         return factors
 
-    def look(self, before: Array, shown: Array, tracked: Array, contacts: Contacts) -> None:
+    def update(self, before: Array, shown: Array, tracked: Array, contacts: Contacts) -> None:
         """Look at a frame that led from `before` to `shown`.
 
         Args:
@@ -90,7 +90,7 @@ class Entanglement:
         self._frames = 0
         dofs = np.concatenate([self._dofs[limb] for limb in pair])
         was, now = (np.abs(pin.difference(self._model, q, tracked))[dofs] for q in (before, shown))
-        possible = np.minimum(was, self._pace[dofs]).max()
+        possible = np.minimum(was, self._largest_motion[dofs]).max()
         held = now.max() > FAR and was.max() - now.max() < GAIN * possible
         self._holding = pair if held else None
 

@@ -7,6 +7,8 @@ from typing import NamedTuple, Protocol
 from wholebody.arrays import Array
 from wholebody.moving_things import Collision
 
+FRAME = 1.0 / 60.0  # s: of a display, from frame to frame
+
 
 class Resolution(NamedTuple):
     """Result of the overlap removal of one frame; the other attributes are those of `Frame`.

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.checks import instance
-from wholebody.motion_assessment import OVERLAPS, assess_motion, cone_violation, passed, root_mean_square
+from wholebody.motion_assessment import OVERLAPS, assess_motion, cone_violation, frames_passed_through, root_mean_square
 from wholebody.scene import Scene
 from wholebody.tracking.recording import Recording
 
@@ -71,7 +71,7 @@ def judge(scene: Scene, recording: Recording) -> Judgement:
         tracked_pairs=tracked.overlapping,
         limit_violation=shown.limit_violation,
         cone_violation=cone_violation(scene, recording.q),
-        passed=passed(scene, recording.q, PASSING[recording.overlap], recording.moves),
+        passed=frames_passed_through(scene, recording.q, PASSING[recording.overlap], recording.moves),
         distance=root_mean_square(apart[:, 6 if free else 0 :]),
         root_distance=places if free else np.zeros(len(recording)),
         jerk=shown.jerk,

@@ -20,7 +20,8 @@ from wholebody.methods.base import Method
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
 from wholebody.tasks import Hold, Point
-from wholebody.tracking.drag import FRAME, Drag
+from wholebody.tracking.drag import Drag
+from wholebody.tracking.frame import FRAME
 
 HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
 """Frames of people with handles: hands, feet, pelvis, head."""
@@ -201,6 +202,8 @@ class LiveDrag:
             measures=measures,
             clearance=self.problem.clearance,
             touching=self.problem.touching,
+            range_of_motion=self.problem.range_of_motion,
+            balance=self.problem.balance,
         )
 
     def _restart(self) -> None:

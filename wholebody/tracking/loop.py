@@ -29,12 +29,11 @@ from wholebody.records import with_values
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction
-from wholebody.tracking.frame import Frame, OverlapStrategy, Resolution
+from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
 from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
 from wholebody.tracking.recording import Recording
-from wholebody.tracking.scripts import FRAME
 from wholebody.tracking.tracks import UNIT_TOLERANCE, Track
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 OVERLAPS = ("qp", "ccd")
 
@@ -51,7 +50,7 @@ def check_scene(scene: object, what: str) -> None:
     instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
 
 
-class FrameLoop(OfOneRun):
+class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with
@@ -101,7 +100,7 @@ class FrameLoop(OfOneRun):
         self.scene, self.overlap, self.count, self._touching = scene, overlap, 0, tuple(touching)
         self._inside = False  # whether the posture that is shown overlaps something
         q = array(start, "start", f"a posture of {scene.figure.name}").copy()
-        reason = unreadable(scene, q)
+        reason = invalid_reason(scene, q)
         if reason:
             raise InputError(f"frame 0: {reason}; begin with a posture of {scene.figure.name}")
         self.shown, self._note = free_start(scene, q, rigid)
@@ -120,13 +119,13 @@ class FrameLoop(OfOneRun):
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
-        reason = unreadable(self.scene, goal)
+        reason = invalid_reason(self.scene, goal)
         self._workspace.refresh()
         motion = self._workspace.next_frame()
         if reason:
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
-            resolution = self._strategy.resolve(self.shown, self._readable(goal))
+            resolution = self._strategy.resolve(self.shown, self._within_limits(goal))
         if motion is not None:
             resolution, collisions = self._kept_from_moving(resolution, motion)
             return self._shown(resolution, collisions, resolution.path, began=began)
@@ -155,7 +154,7 @@ class FrameLoop(OfOneRun):
             collisions, path,
         )  # fmt: skip
 
-    def _readable(self, goal: Array) -> Array:
+    def _within_limits(self, goal: Array) -> Array:
         """The tracked posture within limits and with a quaternion of unit length."""
         return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
 
@@ -222,7 +221,7 @@ class FrameLoop(OfOneRun):
         return CCDStrategy(self.scene, self.shown, dt, seed)
 
 
-def unreadable(scene: Scene, q: Array) -> str:
+def invalid_reason(scene: Scene, q: Array) -> str:
     """Why a tracked posture is invalid, or ""."""
     if q.shape != (scene.model.nq,) or not np.isfinite(q).all():
         return f"the tracked posture is not {scene.model.nq} finite numbers"

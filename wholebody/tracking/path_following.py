@@ -24,13 +24,13 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point
 from wholebody.tasks.inputs import FARTHEST, point
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
 CLOSEST = 1e-6  # m: least spacing
 MOST_GOALS = 10_000
-FRAME = 1.0 / 60.0  # s: time step of the tracker, which makes only whole solves here
 
 
 @overload

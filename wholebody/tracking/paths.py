@@ -15,6 +15,7 @@ from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.files import read_text
 from wholebody.tasks.inputs import direction, point
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.tracks import MOST_FRAMES
 
 SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
@@ -74,7 +75,7 @@ def read_path(path: str | os.PathLike[str]) -> Array:
     return np.array(places)
 
 
-def spread(corners: ArrayLike, frames: int | None = None, dt: float = 1.0 / 60.0) -> Array:
+def spread(corners: ArrayLike, frames: int | None = None, dt: float = FRAME) -> Array:
     """Evenly spaced points (n, 3) of a path, with its end and without its beginning.
 
     Args:

@@ -13,7 +13,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import ReachCones
-from wholebody.tracking.attraction import Attraction, Pace
+from wholebody.tracking.attraction import Attraction, FrameMotionLimit
 from wholebody.tracking.entanglement import Entanglement
 from wholebody.tracking.frame import Resolution
 
@@ -55,13 +55,13 @@ class QPStrategy:
             touching: things that the figure may touch; from all others it keeps `CLEARANCE`.
         """
         self.scene, self.dt = scene, dt
-        most = pace(scene, dt)
-        self._pace = Pace(scene.model, most)
+        most = largest_motions(scene, dt)
+        self._motion_limit = FrameMotionLimit(scene.model, most)
         self._attraction = Attraction(scene.model, start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
         mine = [*scene.figure.segments, *(name for name, thing in scene.objects.items() if thing.segment is not None)]
         self.problem = Problem(
-            scene, start, constraints=[self._pace, *cones], measures=[self._attraction], clearance=CLEARANCE,
+            scene, start, constraints=[self._motion_limit, *cones], measures=[self._attraction], clearance=CLEARANCE,
             touching=[(part, name) for name in touching for part in mine],
         )  # fmt: skip
         self._tracker = QP().tracker(self.problem, dt)
@@ -82,7 +82,7 @@ class QPStrategy:
         self._attraction.toward(tracked)
         if self._entanglement is not None:
             self._attraction.weigh(self._entanglement.weights(shown, tracked))
-        self._pace.begin(shown)
+        self._motion_limit.begin(shown)
         q = shown
         candidates: list[Array] = []
         path: list[tuple[float, Array]] = []
@@ -95,7 +95,7 @@ class QPStrategy:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
         if self._entanglement is not None:
-            self._entanglement.look(shown, q, tracked, contacts)
+            self._entanglement.update(shown, q, tracked, contacts)
         pairs = int((contacts.distance < self.problem.clearances[contacts.number] + 0.01 * CLEARANCE).sum())
         queried = proximity.seconds - queried
         whole = time.perf_counter() - began
@@ -114,7 +114,7 @@ def weights(scene: Scene, rigid: bool) -> Array:
     return result
 
 
-def pace(scene: Scene, dt: float) -> Array:
+def largest_motions(scene: Scene, dt: float) -> Array:
     """Largest motion of every degree of freedom in a frame, (nv,)."""
     result = np.full(scene.model.nv, SPEED * dt)
     if scene.figure.root == "free":

@@ -59,25 +59,23 @@ class RigidTranslation:
         began, queried = time.perf_counter(), self._workspace.proximity.seconds
         self._displacements, self._pairs = 0, 0
         self._out: list[Array] = []
-        note, q = "", self._with_glove(shown, tracked)
+        note, q = "", self._with_fingers(shown, tracked)
         if q is None:
             q, note = shown, "the fingers would be inside each other or have no room; they stay"
         for _ in range(STEPS):
-            following = self._freed(q, self._drawn(q, tracked))
-            if self._left(following, tracked) > self._left(q, tracked) - GAIN:
+            following = self._freed(q, self._toward(q, tracked))
+            if self._root_distance(following, tracked) > self._root_distance(q, tracked) - GAIN:
                 break
             q = following
         queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
         return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
 
-    def _with_glove(self, shown: Array, tracked: Array) -> Array | None:
+    def _with_fingers(self, shown: Array, tracked: Array) -> Array | None:
         """The shown hand with the tracked fingers, displaced out of overlap; None if that fails."""
-        q = np.concatenate([shown[:7], tracked[7:]])
-        freed = self._displaced(q)
-        return freed
+        return self._displaced(np.concatenate([shown[:7], tracked[7:]]))
 
-    def _drawn(self, q: Array, tracked: Array) -> Array:
+    def _toward(self, q: Array, tracked: Array) -> Array:
         """A step of the root towards the tracked one, tangential to the obstacles of this frame, so that it slides."""
         way = np.asarray(pin.difference(self.model, q, tracked))
         turn = pin.Quaternion(q[3:7]).toRotationMatrix()
@@ -126,7 +124,7 @@ class RigidTranslation:
         obstacle = np.where(self._mine[first] & self._mine[second], -1, obstacle)
         return -contacts.distance, normals, obstacle
 
-    def _left(self, q: Array, tracked: Array) -> float:
+    def _root_distance(self, q: Array, tracked: Array) -> float:
         """Remaining distance of the root, metres, with radians converted by a hand's length of 0.2 m."""
         way = np.asarray(pin.difference(self.model, q, tracked))
         return float(np.linalg.norm(way[:3]) + 0.2 * np.linalg.norm(way[3:6]))

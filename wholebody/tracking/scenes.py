@@ -17,7 +17,8 @@ from wholebody.checks import known
 from wholebody.figures.figure import Figure
 from wholebody.scene import Scene
 from wholebody.tracking import rooms
-from wholebody.tracking.scripts import FRAME, Keys, Place, ScenePlan, standing_at
+from wholebody.tracking.frame import FRAME
+from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
 from wholebody.tracking.tracks import Track
 
 

@@ -15,12 +15,12 @@ from wholebody.checks import number, whole
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.methods.inputs import SEED
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 Place = tuple[float, float, float]
 Keys = list[tuple[float, Array]]
 
-FRAME = 1.0 / 60.0  # s: of a display
 TIME_STEPS = (1e-3, 1.0)  # s: least and greatest from frame to frame
 TREMOR = 2e-3  # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
 STILL = ("hip", "knee", "ankle", "toe")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from wholebody.arrays import Array
 from wholebody.assessment import assess
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.base import Tracker
 from wholebody.problem import Problem
@@ -43,5 +43,5 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:
     """Whether the motion between two postures (nq,) passes through something."""
     with problem.borrow() as workspace:
-        first, last = (Placed(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
+        first, last = (QueryResult(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
         return passes_through(workspace, first, last, before, after)

@@ -14,7 +14,7 @@ import pinocchio as pin
 
 from wholebody.errors import MissingPackageError, WholebodyError
 from wholebody.methods import METHODS
-from wholebody.tracking.drag import FRAME
+from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.gltf import drawn_triangles
 

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import doubtful_pairs, first_passed, last_free, passes_through
 
 WITHIN = 0.05
@@ -15,7 +15,7 @@ WITHIN = 0.05
 
 def placed(scene, q):
     with scene.borrow() as workspace:
-        return Placed(workspace.near(q, WITHIN), WITHIN)
+        return QueryResult(workspace.near(q, WITHIN), WITHIN)
 
 
 def doubted(scene, q0, q1):

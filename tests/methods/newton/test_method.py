@@ -14,7 +14,7 @@ import pytest
 import wholebody as wb
 from tests.answers import honest
 from wholebody.methods.newton.equations import unit_lengths
-from wholebody.methods.newton.feasibility import reach
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import SquaredSlacks
@@ -162,7 +162,7 @@ def test_nothing_is_jumped_over(human: wb.Figure, least_distance: Callable[..., 
         return changed
 
     active_system.arrive = watched  # type: ignore[method-assign]
-    reach(active_system, active_system.variables(problem.start), tolerance=1e-5, iterations=60)
+    satisfy(active_system, active_system.variables(problem.start), tolerance=1e-5, iterations=60)
     assert len(visited) > 10
     for before, after in itertools.pairwise(visited):
         way = [least_distance(scene, pin.interpolate(human.model, before, after, t)) for t in np.linspace(0, 1, 9)]

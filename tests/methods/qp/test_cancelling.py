@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.stability.posed import cancelling
-from wholebody.methods.qp.cancelling import parted
+from wholebody.methods.qp.cancelling import posture_apart
 
 JOINT = (
     '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/><axis xyz="0 0 1"/>'
@@ -22,7 +22,7 @@ def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
     """Its prongs reach 12 cm over the plate, and overlap it by 1.5 cm each from both sides."""
     problem = cancelling().problem
     with problem.borrow() as workspace:
-        q = parted(problem, workspace, problem.start)
+        q = posture_apart(problem, workspace, problem.start)
     assert q is not None
     assert q == pytest.approx([-0.12, 0.0, 0.5], abs=2e-3)
 
@@ -43,7 +43,7 @@ def test_no_place_of_the_fork_is_nearer_to_its_goal() -> None:
 def test_one_prong_alone_does_not_cancel() -> None:
     problem = cancelling().problem
     with problem.borrow() as workspace:
-        assert parted(problem, workspace, problem.start + [0.0, 0.0, 0.06]) is None
+        assert posture_apart(problem, workspace, problem.start + [0.0, 0.0, 0.06]) is None
 
 
 def test_the_last_link_of_an_arm_is_pulled_off(tmp_path: Path) -> None:
@@ -59,7 +59,7 @@ def test_the_last_link_of_an_arm_is_pulled_off(tmp_path: Path) -> None:
     problem = wb.Problem(scene, start, goals=[wb.Point("d", (wrist, 0.0, 0.0))])
     assert wb.assess(problem, start).penetration == pytest.approx(0.015, abs=1e-5)
     with problem.borrow() as workspace:
-        q = parted(problem, workspace, start)
+        q = posture_apart(problem, workspace, start)
         assert q is not None
         place = workspace.state.update(q).frame(scene.figure.frame_id("d"))
         assert place.translation == pytest.approx([wrist - 0.1, 0.0, 0.0], abs=1e-3)

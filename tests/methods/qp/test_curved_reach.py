@@ -8,8 +8,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.control import Control
-from wholebody.methods.qp.bending_kernel import add_bending
 from wholebody.methods.qp.curved_reach import CurvedReach
+from wholebody.methods.qp.kinematic_hessian_kernel import add_kinematic_hessian
 from wholebody.methods.qp.solvers.registry import make_solver
 
 FEET = (wb.Hold("left_foot"), wb.Hold("right_foot"))
@@ -37,7 +37,7 @@ def test_how_a_pull_bends_is_the_second_derivative_of_the_place():
         ]
         pin.computeJointJacobians(model, data, q)
         total, place = np.zeros((model.nv, model.nv)), data.oMi[joint].act(point)
-        add_bending(total, data.J.T, np.ones(model.nv), place, force, np.zeros(3))
+        add_kinematic_hessian(total, data.J.T, np.ones(model.nv), place, force, np.zeros(3))
         assert total == pytest.approx(np.array(second), abs=1e-6)
 
 

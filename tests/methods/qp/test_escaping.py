@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.methods.qp.escaping import GAP, Barriers, free_end
+from wholebody.methods.qp.escaping import GAP, ProjectionRows, free_end
 
 RADIUS = 0.1
 
@@ -22,10 +22,10 @@ def point() -> pin.Model:
 def around(begun: np.ndarray, most: np.ndarray, wall: float = np.inf):
     """What a point sees around it: the disc, a wall at some x, and what is left of the way that it may go."""
 
-    def look(q: np.ndarray) -> Barriers:
+    def look(q: np.ndarray) -> ProjectionRows:
         far = float(np.linalg.norm(q))
         rows, room = np.array([q / far, [-1.0, 0.0]]), np.array([far - RADIUS - GAP, min(wall, 9.0) - q[0]])
-        return Barriers(max(RADIUS - far, 0.0), rows, room, np.array([begun - most, begun + most]) - q)
+        return ProjectionRows(max(RADIUS - far, 0.0), rows, room, np.array([begun - most, begun + most]) - q)
 
     return look
 

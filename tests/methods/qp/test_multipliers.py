@@ -9,7 +9,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.reaches import reach
+from wholebody.bench.stability.posed import collinear_start
 from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
+from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.subproblem import Rows
 from wholebody.methods.qp.tangential import parts_of
@@ -55,6 +57,28 @@ def test_along_the_rows_the_lagrangian_falls_by_half_of_the_curvature(random_pro
         measure = float(program.linear @ t + 0.5 * (program.diagonal * t) @ t)
         after = multipliers.lagrangian(measure, rows._replace(soft_error=program.rows @ t - program.target))
         assert before - after == pytest.approx(0.5 * (program.diagonal * t) @ t, rel=1e-4, abs=1e-5)
+
+
+def test_what_a_step_to_a_bound_is_to_bring_counts_the_way_there():
+    """Measures (x - 1)^2 / 2 + (y - 1)^2 / 2 with y = 0 asked, and x at most 0.2: L falls by 0.18 along x."""
+    program = QuadraticProgram(
+        np.ones(2), -np.ones(2), np.array([[0.0, 1.0]]), np.zeros(1), np.array([1e6]), np.zeros((0, 2)), np.zeros(0),
+        np.zeros(0), -np.ones(2), np.array([0.2, 1.0]),
+    )  # fmt: skip
+    solver = make_solver("active_set")
+    answer = solver.solve_cold(program)
+    t = parts_of(program, answer, np.zeros(0), WorkingSet(solver)).tangential
+    assert t == pytest.approx([0.2, 0.0], abs=1e-5)
+    multipliers = multipliers_of(program, answer, rows_of(program, np.random.default_rng(0)), 1.0)
+    model = float(-program.linear @ t - 0.5 * t @ t)
+    assert model - multipliers.change(program, t) == pytest.approx(0.2 - 0.5 * 0.2**2, abs=1e-5)
+
+
+def test_a_descent_does_not_stop_at_the_first_limit():
+    """From a straight arm the last joint comes to its limit. Its way there counts, so no step there is rejected."""
+    solution = wb.QP().solve(collinear_start().problem)
+    assert solution.solved
+    assert not any("rejected" in entry.note for entry in solution.trace)
 
 
 def test_elastic_rows_count_by_their_names():

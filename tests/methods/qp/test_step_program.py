@@ -14,7 +14,7 @@ import wholebody as wb
 from wholebody.bench.adapters.registry import make_tool
 from wholebody.bench.track import judge, track
 from wholebody.figures.state import State
-from wholebody.linearisation import Linearisation, Passing
+from wholebody.linearisation import Linearisation, PackedLinearisation
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import (
     AGAIN,
@@ -42,7 +42,7 @@ def scene() -> wb.Scene:
     return scene.add(wb.Sphere(0.1), name="ball", at=(0.3, 0.3, 1.2))
 
 
-def whole(at: Passing) -> Linearisation:
+def whole(at: PackedLinearisation) -> Linearisation:
     """The same as what `Lineariser.at` returns."""
     terms, goals = len(at.value), at.goals
     return Linearisation(
@@ -139,7 +139,7 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
     for number in range(60):
         if number % 20 == 19:
             q = problem.scene.figure.clamp(pin.integrate(workspace.model, q, 0.02 * rng.normal(size=len(q) - 1)))
-        at = lineariser.passing(q, 0.06)
+        at = lineariser.packed(q, 0.06)
         answer = compiled.solve(at, measures=True)
         found, found_rows = compiled.program(), compiled.rows(at)
         rows, program, wanted = plain.solve(whole(at), partial(compiled.motion, at))

@@ -10,7 +10,7 @@ import pytest
 from tests.reference import active_set as reference
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.tangential import ALONG, Extrapolation, Parts, parts_of
+from wholebody.methods.qp.tangential import ALONG, ROOM, Extrapolation, Parts, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 
 NO_SHIFT = np.zeros(0)
@@ -30,13 +30,22 @@ def parts(program: QuadraticProgram, shift: np.ndarray = NO_SHIFT) -> tuple[Part
 
 
 def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_program):
-    rng = np.random.default_rng(0)
+    """Without the bounds that have room, unless the answer without them comes to one of them."""
+    rng, ways = np.random.default_rng(0), set()
     for _ in range(60):
         program = random_program(rng, int(rng.integers(4, 40)), int(rng.integers(1, 9)), int(rng.integers(0, 20)))
         split, answer = parts(program)
-        expected = reference.minimise_on_face(replace(program, linear=np.zeros(program.size)), answer.active).x
-        assert split.normal == pytest.approx(np.clip(expected, program.lower, program.upper), abs=1e-9)
+        plain, held = replace(program, linear=np.zeros(program.size)), answer.active
+        near = held._replace(lower=held.lower & (program.lower >= -ROOM), upper=held.upper & (program.upper <= ROOM))
+        left = (held.lower | held.upper) & ~(near.lower | near.upper)
+        expected = np.clip(reference.minimise_on_face(plain, near).x, program.lower, program.upper)
+        free = ((program.lower < expected) & (expected < program.upper))[left].all()
+        ways.add((bool(left.any()), bool(free)))
+        if not free:
+            expected = np.clip(reference.minimise_on_face(plain, held).x, program.lower, program.upper)
+        assert split.normal == pytest.approx(expected, abs=1e-9)
         assert split.normal + split.tangential == pytest.approx(answer.x, abs=1e-12)
+    assert {(True, True), (True, False)} <= ways
 
 
 def test_the_tangential_part_saves_half_of_its_curvature(random_program):
@@ -65,11 +74,13 @@ def test_the_shift_of_the_multipliers_makes_up_for_a_gradient_that_the_normal_pa
     assert split.normal == pytest.approx([0.05, 0.05], abs=1e-6)
 
 
-def test_held_bounds_stay_held():
-    program = replace(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=np.full(3, -2.0), upper=np.full(3, 2.0))
+@pytest.mark.parametrize(("off", "along"), [(5e-4, 0.0), (2.0, -2.0)])
+def test_a_near_bound_stays_held_and_the_way_to_a_far_one_is_tangential(off, along):
+    lower = np.array([-off, -2.0, -2.0])
+    program = replace(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=lower, upper=np.full(3, 2.0))
     split, answer = parts(program)
     assert answer.active.same(ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
-    assert split.tangential == pytest.approx([0.0, 1.0, -0.5])
+    assert split.tangential == pytest.approx([along, 1.0, -0.5])
 
 
 def gone(ahead: Extrapolation, sizes: list[float]) -> None:
@@ -77,7 +88,7 @@ def gone(ahead: Extrapolation, sizes: list[float]) -> None:
     for size in sizes:
         split = Parts(np.array([0.0, size**2]), np.array([size, 0.0]))
         ahead.propose(split, free_program(2))
-        ahead.went(split, split.normal + split.tangential, False)
+        ahead.record(split, split.normal + split.tangential, False)
 
 
 def test_steps_that_shrink_by_a_factor_are_taken_to_their_limit():
@@ -103,7 +114,7 @@ def test_a_refused_proposal_shortens_the_next_ones():
         gone(ahead, [0.1, 0.13])
         split = Parts(np.zeros(2), np.array([0.169, 0.0]))
         factors.append(float(ahead.propose(split, free_program(2))[0] / 0.169))
-        ahead.refused()
+        ahead.rejected()
     assert factors == pytest.approx([3.0, 2.0])
 
 
@@ -120,9 +131,9 @@ def test_a_proposal_that_would_be_the_own_step_is_not_made():
     for _ in range(2):
         gone(ahead, [0.1, 0.13])
         ahead.propose(Parts(np.zeros(2), np.array([0.169, 0.0])), free_program(2))
-        ahead.refused()
+        ahead.rejected()
     gone(ahead, [0.1, 0.13])
     split = Parts(np.zeros(2), np.array([0.169, 0.0]))
     assert ahead.propose(split, free_program(2)) is None
-    ahead.went(split, split.normal + split.tangential, False)
+    ahead.record(split, split.normal + split.tangential, False)
     assert ahead.propose(Parts(np.zeros(2), np.array([0.2, 0.0])), free_program(2))[0] / 0.2 == pytest.approx(2.0)

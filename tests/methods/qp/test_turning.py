@@ -117,11 +117,11 @@ def test_the_bound_holds_for_random_displacements(planar_arm, least_distance):
         q = problem.start + 0.1 * rng.normal(size=3)
         if least_distance(scene, q) < 0.0:
             continue
-        at = lineariser.passing(q, 0.5)
+        at = lineariser.packed(q, 0.5)
         program.solve(at, True)
         rows, x = program.rows(at), 0.05 * rng.normal(size=3)
         foreseen = float((rows.elastic @ x - rows.elastic_violation).min())
-        if turning.bent(at, rows, x) == 0.0:
+        if turning.linearisation_error(at, rows, x) == 0.0:
             trusted += 1
             assert least_distance(scene, q + x) > min(foreseen, 0.0)
     assert trusted > 20

@@ -209,3 +209,19 @@ def test_progress_that_ends_is_not_called_again(arm):
     solution = wb.solve(problem, wb.QP(measures=False), progress=lambda entry: told.append(entry) or True)
     assert len(told) == 1
     assert solution.solved
+
+
+@pytest.mark.parametrize("measures", [False, True])
+def test_an_end_that_the_assessment_refuses_is_searched_again(arm, monkeypatch, measures):
+    """As if a distance had been missed: the descent answers with a posture that is inside of a ball."""
+    goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
+    met = found(wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", goal)]))
+    middle = np.array(State(arm.model).update(met.q).data.oMi[4].translation)
+    scene = wb.Scene(arm).add(wb.Sphere(0.03), name="ball", at=middle)
+    problem = wb.Problem(scene, START, goals=[wb.Point("tip", goal)])
+    assert wb.assess(problem, met.q).penetration > 0.01
+    monkeypatch.setattr("wholebody.methods.qp.method.unobstructed", lambda *_: met)
+    solution = wb.QP(measures=measures).solve(problem)
+    assert solution.solved, solution.message
+    assert wb.assess(problem, solution.q).penetration < 1e-5
+    assert solution.iterations > len(met.trace)

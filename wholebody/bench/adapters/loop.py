@@ -104,7 +104,7 @@ class Loop(Outside[Stepper], ABC):
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"{self.name} gave up at step {run.steps} ({run.failure})" if run.failure else ""
-        ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
+        ending = Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} steps", "steps", failure)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def _room(self, problem: Problem) -> float:

@@ -22,7 +22,7 @@ from wholebody.arrays import Array
 from wholebody.bench.adapters.base import Adapter
 from wholebody.methods.base import Tracker
 from wholebody.methods.control import Progress
-from wholebody.methods.differential import FIRM
+from wholebody.methods.differential import NEGLIGIBLE
 from wholebody.methods.starts import SPREADS, restarts
 from wholebody.problem import Problem
 from wholebody.runner import processor_time
@@ -162,6 +162,6 @@ def _depth(workspace: Workspace, q: Array) -> float:
 def _rank(solution: Solution) -> tuple[bool, float, float]:
     judged = solution.assessment
     broken = max(
-        judged.penetration, judged.clearance_violation, judged.constraint_violation, judged.limit_violation, FIRM
+        judged.penetration, judged.clearance_violation, judged.constraint_violation, judged.limit_violation, NEGLIGIBLE
     )
     return not solution.solved, broken, max(judged.goal_error, judged.goal_angle)

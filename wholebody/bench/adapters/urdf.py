@@ -15,7 +15,7 @@ from wholebody.arrays import Array
 from wholebody.bench.adapters.loop import size
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf_writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
+from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
 from wholebody.scene import Scene
 from wholebody.tasks.inputs import Place
 

@@ -20,7 +20,7 @@ from wholebody.bench.published.reading import VERSION
 from wholebody.bench.published.shapes import Meshes, described, pose_of
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.urdf_writing import urdf_axis
+from wholebody.figures.urdf.writing import urdf_axis
 
 ROOT = ("root x", "root y", "root z", "root qx", "root qy", "root qz", "root qw")
 NO_LIMIT = 1e6  # rad, m: beyond which a limit is none

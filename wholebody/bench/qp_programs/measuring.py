@@ -144,7 +144,7 @@ def _row(one: Recorded, name: str, solver: QPSolver) -> QPRow:
     answer = solver.solve(program, None)
     wall, cpu = time.perf_counter_ns() - clock, time.thread_time_ns() - worked
     gc.enable()
-    own = solver.own()
+    own = solver.uncorrected()
     found = residuals(program, answer)
     return QPRow(
         one.set, one.name, name, program.size, len(program.target), len(program.least), wall / 1e3, cpu / 1e3,

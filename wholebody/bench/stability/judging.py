@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.assessment import Assessment, assess
 from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Posed, Stream
-from wholebody.motion_assessment import dip, velocities
+from wholebody.motion_assessment import depth_between, velocities
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -82,7 +82,7 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
         for name, place in frame.moved.items():
             scene.move(name, at=place)
-        depth, owners = dip(scene, before, q, DIP)
+        depth, owners = depth_between(scene, before, q, DIP)
         if depth > deepest_way:
             passed, deepest_way, through = f"{owners}, frame {number}", depth, number
         problem.retarget([Point(first.frame, frame.target)])

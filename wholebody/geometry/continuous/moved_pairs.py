@@ -14,7 +14,7 @@ from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
 
 
-class Placed(NamedTuple):
+class QueryResult(NamedTuple):
     """The near pairs at a posture and the query distance, for tests of motions."""
 
     contacts: Contacts
@@ -26,7 +26,7 @@ class Placed(NamedTuple):
         return self.contacts.placements
 
 
-def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
+def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
     """Pairs that moved against each other by more than their distance.
 
     Raises:
@@ -45,22 +45,22 @@ def far_moved(table: PairTable, before: Placed, after: Placed) -> Indices:
     return found
 
 
-def parted(table: PairTable, before: Placed, after: Placed, pairs: Indices, dip: float) -> Mask:
+def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: Indices, overlap: float) -> Mask:
     """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it.
 
-    The heights of the arcs that points describe are allowed for; a pair that was not near before is not parted.
+    The heights of the arcs that points describe are allowed for; a pair that was not near before is not separated.
 
     Args:
         table: the pieces and pairs.
         before: near pairs before the motion.
         after: near pairs after it.
         pairs: (k,) places among the collision pairs.
-        dip: metres by which a piece may be beyond the plane.
+        overlap: metres by which a piece may be beyond the plane.
     """
     known = before.contacts
-    found: Mask = compiled_kernel().parted(
+    found: Mask = compiled_kernel().separated(
         pairs, before.placements, after.placements, known.number, known.pair, known.normal, known.point_a,
-        known.point_b, table.points, table.first_point, table.radius, table.reach, dip,
+        known.point_b, table.points, table.first_point, table.radius, table.reach, overlap,
     )  # fmt: skip
     return found
 
@@ -76,14 +76,14 @@ def compiled_kernel() -> Any:
         placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
     )
     lines = np.zeros((0, 3))
-    moved_pairs_kernel.parted(
+    moved_pairs_kernel.separated(
         places, placements, placements, places, pairs, lines, lines, lines, lines, np.zeros(1, dtype=np.intp), none,
         none, 0.0,
     )  # fmt: skip
     return moved_pairs_kernel
 
 
-def distances(placed: Placed, count: int) -> Array:
+def distances(placed: QueryResult, count: int) -> Array:
     """Signed distance (pairs,) of every pair; the query distance for pairs that are not near."""
     distance = np.full(count, placed.within)
     distance[placed.contacts.number] = placed.contacts.distance

@@ -80,7 +80,7 @@ def far_moved(
 
 
 @compiled()
-def parted(
+def separated(
     doubtful: Indices,
     before: Array,
     after: Array,
@@ -93,12 +93,12 @@ def parted(
     first_point: Indices,
     radius: Array,
     reach: Array,
-    dip: float,
+    overlap: float,
 ) -> Mask:
     """Return whether the plane between the pieces of a pair before a motion, fixed to either, parts them after it (k,).
 
     Args:
-        doubtful: (k,) pairs; those that were not near before are not parted.
+        doubtful: (k,) pairs; those that were not near before are not separated.
         before: (n, 4, 3) placements of the pieces before the motion.
         after: the same after the motion.
         number: (c,) pairs that were near before.
@@ -110,7 +110,7 @@ def parted(
         first_point: (n + 1,) where those of each piece begin.
         radius: (n,) around the points.
         reach: (n,) of the pieces from their origins.
-        dip: metres by which a piece may be beyond the plane.
+        overlap: metres by which a piece may be beyond the plane.
     """
     found = np.zeros(len(doubtful), dtype=np.bool_)
     for k in range(len(doubtful)):
@@ -119,10 +119,10 @@ def parted(
                 a, b = pair[c, 0], pair[c, 1]
                 found[k] = _beyond(
                     before, after, a, b, normal[c], 1.0, point_a[c], points[first_point[b] : first_point[b + 1]],
-                    radius[b], reach[b], dip,
+                    radius[b], reach[b], overlap,
                 ) or _beyond(
                     before, after, b, a, normal[c], -1.0, point_b[c], points[first_point[a] : first_point[a + 1]],
-                    radius[a], reach[a], dip,
+                    radius[a], reach[a], overlap,
                 )  # fmt: skip
                 break
     return found
@@ -140,7 +140,7 @@ def _beyond(
     points: Array,
     radius: float,
     reach: float,
-    dip: float,
+    overlap: float,
 ) -> bool:
     """Whether a piece stays beyond a plane that is fixed to another one, also on the arcs between both placements."""
     if len(points) == 0:
@@ -175,7 +175,7 @@ def _beyond(
                 turned += (after[piece, j, i] - before[piece, j, i]) ** 2
         angle += np.sqrt(0.5 * turned)
     arc = 0.125 * angle * angle * (reach + np.sqrt(apart))
-    return bool(least - arc > -dip)
+    return bool(least - arc > -overlap)
 
 
 @compiled(inner=True)

@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import Placed, distances, far_moved, parted
+from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved, separated
 from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from wholebody.geometry.continuous.swept_depth import Depths, SweptDepth
 
 
-DIP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
+ALLOWED_OVERLAP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
 OVERLAP = 2e-4  # m: overlap during a motion that is ignored; smaller than the width of any piece
 INSIDE = 1e-4  # m: overlap at the end of a motion that is ignored
 GRAZE = 5e-4  # m: a motion that gets deeper than this is blocked; held soles overlap a little between two postures
@@ -141,7 +141,7 @@ def last_free(model: pin.Model, free: Array, q: Array, overlaps: Callable[[Array
     return np.asarray(pin.interpolate(model, free, q, inside))
 
 
-def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array) -> bool:
+def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array) -> bool:
     """Whether some pair has changed sides during a motion.
 
     A pair that touches during the motion and at its end is a collision, which its distance shows; a pair that touches
@@ -160,19 +160,19 @@ def passes_through(queries: Queries, before: Placed, after: Placed, q0: Array, q
     if not len(moved):
         return False
     moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
-    doubtful = _not_parted(table, before, after, moved)
+    doubtful = _not_separated(table, before, after, moved)
     return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, HALVINGS)
 
 
 def _halved(
-    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, doubtful: Indices, halvings: int
+    queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, doubtful: Indices, halvings: int
 ) -> bool:
     table = queries.table
     end = distances(after, len(table.pairs))
     if not halvings:
         return _swept_through(queries, q0, q1, doubtful, end)
     q = pin.interpolate(queries.model, q0, q1, 0.5)
-    middle = Placed(queries.near(q, before.within), before.within)
+    middle = QueryResult(queries.near(q, before.within), before.within)
     inside = distances(middle, len(table.pairs))[doubtful] < -OVERLAP
     if (inside & (end[doubtful] > -OVERLAP)).any():
         return True
@@ -196,7 +196,7 @@ def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, en
 
 
 def first_passed(
-    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, overlap: float
+    queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, overlap: float
 ) -> FirstContact | None:
     """First contact of a pair that may have changed sides, and is separate after the motion; None if there is none.
 
@@ -214,13 +214,13 @@ def first_passed(
     return queries.sweep.first_contact(q0, q1, table.pairs[doubtful], overlap) if len(doubtful) else None
 
 
-def doubtful_pairs(table: PairTable, before: Placed, after: Placed) -> Indices:
+def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
     """Pairs (indices into the collision pairs) that may have changed sides between two postures."""
-    return _not_parted(table, before, after, far_moved(table, before, after))
+    return _not_separated(table, before, after, far_moved(table, before, after))
 
 
 def _passing_by(
-    queries: Queries, before: Placed, after: Placed, q0: Array, q1: Array, pairs: Indices
+    queries: Queries, before: QueryResult, after: QueryResult, q0: Array, q1: Array, pairs: Indices
 ) -> NDArray[np.bool_]:
     """The pairs whose bounding spheres stay separate during the motion, estimated from its middle.
 
@@ -248,9 +248,9 @@ def _nearest(start: Array, end: Array) -> Array:
     return nearest
 
 
-def _not_parted(table: PairTable, before: Placed, after: Placed, doubtful: Indices) -> Indices:
+def _not_separated(table: PairTable, before: QueryResult, after: QueryResult, doubtful: Indices) -> Indices:
     """The pairs that no plane separates before and after."""
     if not len(doubtful):
         return doubtful
-    left: Indices = doubtful[~parted(table, before, after, doubtful, DIP)]
+    left: Indices = doubtful[~separated(table, before, after, doubtful, ALLOWED_OVERLAP)]
     return left

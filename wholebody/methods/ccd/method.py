@@ -40,7 +40,7 @@ class _Trial:
     q: Array
     overlap: float
     error: float
-    rested: bool
+    converged: bool
 
     def better(self, other: _Trial, tolerance: float) -> bool:
         """Less overlap first, then the smaller error."""
@@ -124,7 +124,7 @@ class CCD:
         turns = len(search.trace)
         ending = Ending(
             best.q,
-            best.rested,
+            best.converged,
             search.sweeps,
             tuple(search.trace),
             "from the start" if turns == 1 else f"at turn {turns}",
@@ -203,9 +203,9 @@ class _Search:
             trial = self._attempt(q, free, "" if attempt == 0 else "restart")
             if best is None or trial.better(best, self._tolerance):
                 best = trial
-            if self._serves(best):
+            if self._solves(best):
                 self.contradictions = ()
-            if self._serves(best) or self._control.over:
+            if self._solves(best) or self._control.over:
                 break
             if attempt == 0:
                 self.contradictions = contradictions(self._problem, self._workspace)
@@ -213,7 +213,7 @@ class _Search:
             if least is None or (least and best.error <= NEAREST * least):
                 break
         assert best is not None
-        return best if not self._control.over else replace(best, rested=False)
+        return best if not self._control.over else replace(best, converged=False)
 
     def pushed_out(self, q: Array) -> Array:
         """The result of overlap resolution at a posture q (nq,), or at one beside it, if that is better."""
@@ -227,7 +227,7 @@ class _Search:
                 break
         return out
 
-    def _serves(self, trial: _Trial) -> bool:
+    def _solves(self, trial: _Trial) -> bool:
         return trial.error <= SHARE * self._method.tolerance and trial.overlap <= self._tolerance
 
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
@@ -238,10 +238,10 @@ class _Search:
             q, reached = self._reach.run(q, SHARE * self._method.tolerance, self._method.iterations)
             self.sweeps += reached.sweeps
             left = self._resolver.query(q)
-            trial = _Trial(q, self._resolver.deepest, reached.error, reached.rested)
+            trial = _Trial(q, self._resolver.deepest, reached.error, reached.converged)
             if left:
                 q, left = self._resolver.resolve(q, self._rng)
-                trial = _Trial(q, self._resolver.deepest, self._error(q), reached.rested)
+                trial = _Trial(q, self._resolver.deepest, self._error(q), reached.converged)
             if left and free is not None:
                 back = last_free(self._problem.scene.model, free, q, self._resolver.query, HALVINGS)
                 self._resolver.query(back)
@@ -252,7 +252,7 @@ class _Search:
             gained = best is None or trial.better(best, self._tolerance)
             if gained:
                 best = trial
-            if self._serves(trial) or not gained or self._control.over:
+            if self._solves(trial) or not gained or self._control.over:
                 break
         assert best is not None
         return best

@@ -30,7 +30,7 @@ class Reached(NamedTuple):
 
     error: float
     sweeps: int
-    rested: bool
+    converged: bool
 
 
 class _Goals:
@@ -103,12 +103,12 @@ class Reach:
         aims = goals.aims
         steps = aims.plan(limbs)
         error, last = goals.error, inf
-        sweeps, rested = 0, not len(steps.nodes)
-        while error > tolerance and sweeps < most and not rested and not self._control.over:
+        sweeps, converged = 0, not len(steps.nodes)
+        while error > tolerance and sweeps < most and not converged and not self._control.over:
             if sweeps % WINDOW == 0:
-                rested = error > PROGRESS * last
+                converged = error > PROGRESS * last
                 last = error
-                if rested:
+                if converged:
                     break
             change = sweep(limbs, aims, steps)
             self._keep_ranges()
@@ -118,9 +118,9 @@ class Reach:
             goals.carry()
             error = goals.error
             sweeps += 1
-            rested = change < 1e-9
+            converged = change < 1e-9
         limbs.write(q)
-        return q, Reached(error, sweeps, rested)
+        return q, Reached(error, sweeps, converged)
 
     def _keep_ranges(self) -> None:
         moved = [guard.keep() for guard in self._ranges]

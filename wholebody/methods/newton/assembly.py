@@ -23,7 +23,7 @@ from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.contacts import LEAVE
 from wholebody.methods.newton.equations import EquationSet, unit_lengths
-from wholebody.methods.newton.feasibility import reach
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES
@@ -182,7 +182,7 @@ class Assembly(AssemblyJoints):
         error = one.error(self._placed(one.index))
         return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
-    def aim_between(self, goal: int, share: float, target: Any) -> Self:
+    def interpolate_goal(self, goal: int, share: float, target: Any) -> Self:
         """Move a goal to a share of the way from where its body is now to a target."""
         one = self._goals[self.goal_index(goal)].moved(target)
         self._goals[goal] = one.between(self._placed(one.index), number(share, "share", 0.0, 1.0))
@@ -283,7 +283,7 @@ class Assembly(AssemblyJoints):
         """A few Newton steps from the variables `start` (7 n,) of a system that begun there."""
         before = active.system.residual(start)
         wrong = np.where(active.system.inequality, np.minimum(before, 0.0), before)[~active.system.goal]
-        found = reach(
+        found = satisfy(
             active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
             early_exit=True,
         )  # fmt: skip

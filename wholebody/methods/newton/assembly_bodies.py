@@ -62,7 +62,7 @@ class AssemblyBodies:
         self._parts: list[str] = []  # names of bodies and figures, in the order of their bodies
         self._apart: set[frozenset[str]] = set()
         self._joined: set[frozenset[int]] = set()
-        self._stuck: list[tuple[int, int]] = []
+        self._fixed_pairs: list[tuple[int, int]] = []
         self._scene: Scene | None = None
         self.revision = 0
 
@@ -344,7 +344,7 @@ class AssemblyBodies:
     def _groups(self) -> list[int]:
         """For each body, and last for the world, a number that is the same for bodies that fixed joints connect."""
         group = list(range(len(self._places) + 1))
-        for first, second in self._stuck:
+        for first, second in self._fixed_pairs:
             old, new = group[second], group[first]
             group = [new if entry == old else entry for entry in group]
         return group

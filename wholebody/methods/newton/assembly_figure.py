@@ -90,9 +90,9 @@ class AssemblyFigure:
         self._q = self.posture(x)
         x[7 * self.first : 7 * self.last] = self.variables(self._q)
 
-    def aim(self) -> None:
+    def choose_limits(self) -> None:
         """Set the rows of the limits to the nearer limits at the last posture of `retract`."""
-        self.bodies.aim(self._limits, self._q)
+        self.bodies.choose_limits(self._limits, self._q)
 
     def frames(self) -> list[tuple[str, int, Any]]:
         """Name, index of the body, and placement in it (pin.SE3) of the figure's bodies and frames."""

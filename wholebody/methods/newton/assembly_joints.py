@@ -141,7 +141,7 @@ class AssemblyJoints(AssemblyBodies):
         self._joints.add("fixed joint", first, second)
         self._holding.coincide(a, b, what, np.array(wanted.translation), np.zeros(3))
         self._holding.turn(a, b, what, pin.Quaternion(wanted.rotation), pin.Quaternion.Identity(), 3)
-        self._stuck.append((a, b))
+        self._fixed_pairs.append((a, b))
         return self._connected(a, b)
 
     def on_plane(

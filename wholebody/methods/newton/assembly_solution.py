@@ -12,7 +12,7 @@ import pinocchio as pin
 from wholebody.all_pairs import all_pairs
 from wholebody.arrays import Array
 from wholebody.methods.newton.assembly_system import AssemblySystem
-from wholebody.methods.newton.feasibility import reach
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.kkt import project
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
@@ -87,7 +87,7 @@ def solved(
 
     With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
     """
-    found = reach(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind, settle=True)
+    found = satisfy(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind, improve_goals=True)
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest is not None and found.met:

@@ -116,7 +116,7 @@ class AssemblySystem(ActiveSystem):
             return False  # nothing depends on the state
         self._fresh = False
         for figure in self._figures:
-            figure.aim()
+            figure.choose_limits()
         batches = [*self._held, *self._goals]
         laid: Hashable = self._goals_laid
         if self.contacts is not None:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
@@ -45,12 +45,12 @@ class ContactSet:
         self._joint = table.joint[table.pairs].reshape(-1, 2)
         thin = np.array([swept.width for swept in table.swept])[table.pairs].reshape(-1, 2).min(axis=1)
         self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
-        self._here: Placed | None = None
-        self._there: Placed | None = None
+        self._here: QueryResult | None = None
+        self._there: QueryResult | None = None
 
     def measure(self, data: Any) -> None:
         """Measure at the joints' places in `data` (Pinocchio's), where a step leads."""
-        self._there = Placed(self.workspace.proximity.query(Joints(data), self._within), self._within)
+        self._there = QueryResult(self.workspace.proximity.query(Joints(data), self._within), self._within)
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps at the end of the step; such pairs become inequalities."""

@@ -40,7 +40,7 @@ class FeasibilityResult(NamedTuple):
         return len(self.residuals) - 1
 
 
-def reach(
+def satisfy(
     active_system: ActiveSystem,
     x: Array,
     *,
@@ -49,7 +49,7 @@ def reach(
     kind: Kind = "slack",
     goal_tolerance: float | None = None,
     early_exit: bool = False,
-    settle: bool = False,
+    improve_goals: bool = False,
 ) -> FeasibilityResult:
     """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
 
@@ -60,8 +60,8 @@ def reach(
         iterations: most iterations.
         kind: treatment of inequalities.
         goal_tolerance: of the goals, if it differs.
-        settle: go on from where goals out of reach pulled the constraints open and these were restored, with goals that
-            give way; the end is nearer to the goals then.
+        improve_goals: go on from where goals out of reach pulled the constraints open and these were restored, with
+            goals that give way; the end is nearer to the goals then.
         early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
@@ -72,12 +72,12 @@ def reach(
         stationary = run.stationary
         run.iterate(RESTORATIONS, goals=False, measures="ignore")
         run.stationary = stationary if run.hard <= tolerance else run.stationary
-        if settle and run.hard <= tolerance and not run.met:
-            _settle(run, iterations, tolerance)
+        if improve_goals and run.hard <= tolerance and not run.met:
+            _improve_goals(run, iterations, tolerance)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
 
 
-def _settle(run: Iteration, iterations: int, tolerance: float) -> None:
+def _improve_goals(run: Iteration, iterations: int, tolerance: float) -> None:
     """Lower the error of goals out of reach, from a state that meets the constraints; it stays if that fails."""
     best, goal, stationary = run.x, run.goal, run.stationary
     run.least_damping = GOAL_DAMPING

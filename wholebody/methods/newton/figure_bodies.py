@@ -127,7 +127,7 @@ class FigureBodies:
         self._step = None
 
     def limits(self) -> Angle:
-        """One row for each limited joint, for the nearer of its two limits; `aim` chooses it."""
+        """One row for each limited joint, for the nearer of its two limits; `choose_limits` chooses it."""
         limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
         part = self.angles
         labels = [part.labels[k] for k in limited]
@@ -145,7 +145,7 @@ class FigureBodies:
         """(k,) angles of the revolute joints at the posture q (nq,)."""
         return q[self._places]
 
-    def aim(self, limits: Angle, q: Array) -> None:
+    def choose_limits(self, limits: Angle, q: Array) -> None:
         """Set the rows of `limits` to the limits that are nearer at q (nq,)."""
         value = q[self._places[self._limited]]
         low, high = self.low[self._limited], self.high[self._limited]
@@ -195,7 +195,7 @@ class FigureBodies:
         result: Array = self.figure.clamp(q)
         return result
 
-    def ask(self, equations: EquationSet, label: str, q: Array, dofs: set[int], weight: float) -> None:
+    def add_posture_goals(self, equations: EquationSet, label: str, q: Array, dofs: set[int], weight: float) -> None:
         """Add goals that move the joints of some degrees of freedom to their values in the posture q (nq,)."""
         model = self.model
         turning = {row[0]: k for k, row in enumerate(self._turning)}

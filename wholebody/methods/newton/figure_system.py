@@ -102,7 +102,7 @@ class FigureSystem(ActiveSystem):
         if x is not self._ordered:
             x = self.retract(x)
         self._left = self.q
-        self.bodies.aim(self._limits, self.q)
+        self.bodies.choose_limits(self._limits, self.q)
         self.objective.renew(self.q)
         batches = [*self._fixed, *self._goals]
         pairs: bytes = b""

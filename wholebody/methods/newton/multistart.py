@@ -12,13 +12,13 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.assessment import Assessment, assess
-from wholebody.methods.conclusion import Ending, concluded, counted
+from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
-from wholebody.methods.newton.feasibility import FeasibilityResult, reach
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.refinement import refine
-from wholebody.methods.starts import Minima, bent, restarts
+from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.records import with_values
 from wholebody.solution import Solution, TraceEntry
 
@@ -38,9 +38,9 @@ class Settings(NamedTuple):
     inequalities: Kind
 
     @property
-    def counted(self) -> float:
+    def assessed_tolerance(self) -> float:
         """Error below which an assessment counts as good."""
-        return counted(self.tolerance)
+        return assessed_tolerance(self.tolerance)
 
 
 class Found(NamedTuple):
@@ -78,30 +78,32 @@ class Search:
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
         best = self._go(q, "", TRIAL) if hopeless else self.from_here(q)
-        if not self._serves(best) and not hopeless:
+        if not self._solves(best) and not hopeless:
             minima = Minima()
             for start, how in self._starts(q):
                 if minima.complete:
                     break
                 found = self._go(start, how, min(TRIAL, self.settings.iterations))
-                if self._better(found, best) and not found.reached.stationary and not self._serves(found):
+                if self._better(found, best) and not found.reached.stationary and not self._solves(found):
                     found = self._go(found.q, how, self.settings.iterations)
-                minima.add(max(_broken(found), self.settings.counted) + _missed(found), found.reached.stationary)
+                minima.add(
+                    max(_broken(found), self.settings.assessed_tolerance) + _missed(found), found.reached.stationary
+                )
                 if self._better(found, best):
                     best = found
-                if self._serves(best):
+                if self._solves(best):
                     self.contradictions = ()
                 if (
-                    self._serves(best)
+                    self._solves(best)
                     or self.active_system.control.over
                     or self.active_system.control.spent > FOR_STARTS
                 ):
                     break
         if self.active_system.control.over:
             return best
-        if not best.judgement.holds(self.settings.counted) and not hopeless:
+        if not best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
             best = self._least_violation(best, q)
-        if self._serves(best) and self.active_system.objective.minimised:
+        if self._solves(best) and self.active_system.objective.minimised:
             best = self._refined(best)
         return best
 
@@ -129,16 +131,17 @@ class Search:
 
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
         problem = self.active_system.problem
-        start = bent(problem, self.active_system.workspace.state, q)
+        start = off_limits(problem, self.active_system.workspace.state, q)
         if start is not None:
             yield start, " from a start with bent joints"
         rng = np.random.default_rng(self.settings.seed)
         for start in restarts(problem, self.active_system.workspace.state, q, rng, self.settings.restarts):
             yield start, " from another start"
 
-    def _go(self, q: Array, how: str, iterations: int) -> Found:
-        active_system, settings = self.active_system, self.settings
-        reached = reach(
+    def _go(self, q: Array, how: str, iterations: int, system: FigureSystem | None = None) -> Found:
+        """The result from a posture (nq,), by the search's own equations or by others of the same problem."""
+        active_system, settings = self.active_system if system is None else system, self.settings
+        reached = satisfy(
             active_system,
             active_system.variables(q),
             tolerance=SHARPER * settings.tolerance,
@@ -147,37 +150,36 @@ class Search:
         )
         self.iterations += reached.iterations
         self.residuals += reached.residuals
-        return self._judged(reached, how)
+        return self._judged(reached, how, active_system)
 
     def _refined(self, found: Found) -> Found:
         """The same with lower measures, if possible."""
         active_system, tolerance = self.active_system, self.settings.tolerance
         x, spent = refine(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
         self.iterations += spent
-        lower = self._judged(with_values(found.reached, x=x), found.how)
-        return lower if self._serves(lower) and self._better(lower, found) else found
+        lower = self._judged(with_values(found.reached, x=x), found.how, active_system)
+        return lower if self._solves(lower) and self._better(lower, found) else found
 
     def _least_violation(self, best: Found, q: Array) -> Found:
         """The posture with the least violation of the constraints, if it violates them less than the best so far."""
         whole = self.active_system
-        self.active_system = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
-        self.active_system.control = whole.control
-        found = self._go(q, best.how, self.settings.iterations)
-        self.active_system = whole
+        elastic = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
+        elastic.control = whole.control
+        found = self._go(q, best.how, self.settings.iterations, elastic)
         stationary = best.reached.stationary or found.reached.stationary
         found = with_values(found, reached=with_values(found.reached, stationary=stationary))
         return found if self._better(found, best) else best
 
-    def _judged(self, reached: FeasibilityResult, how: str) -> Found:
-        q = self.active_system.posture(reached.x)
-        return Found(q, assess(self.active_system.problem, q), reached, how)
+    def _judged(self, reached: FeasibilityResult, how: str, system: FigureSystem) -> Found:
+        q = system.posture(reached.x)
+        return Found(q, assess(system.problem, q), reached, how)
 
-    def _serves(self, found: Found) -> bool:
-        return found.judgement.holds(self.settings.counted) and found.judgement.met(self.settings.counted)
+    def _solves(self, found: Found) -> bool:
+        return meets(found.judgement, self.settings.tolerance)
 
     def _better(self, one: Found, other: Found) -> bool:
         """Whether one result is better: in the violation, then in the goal errors, then in the measures."""
-        enough = self.settings.counted
+        enough = self.settings.assessed_tolerance
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
             left, right = max(left, enough), max(right, enough)
             if abs(left - right) > max(enough, ALIKE * min(left, right)):

@@ -23,13 +23,8 @@ from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
 
-CAN = (
-    Effort,
-    RotationEffort,
-    Displacement,
-    Discomfort,
-    Rhythm,
-)  # minimised over the revolute joints, and a root that they count
+MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
+"""Measures that are minimised over the revolute joints, and over a root that they count."""
 SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
 STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
 LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint
@@ -63,7 +58,7 @@ class Objective:
         self.squares: list[TangentRows] = []
         self._curved: list[Measure] = []  # those without squares
         for term in problem.measures:
-            if isinstance(term, CAN) or _depends_on(term, self._tangent, problem.start, state):
+            if isinstance(term, MINIMISED) or _depends_on(term, self._tangent, problem.start, state):
                 self.minimised.append(term)
                 rows = None if bodies.uncharted else square_rows(bodies, term, type(term).__name__)
                 self._curved += [term] if rows is None else []
@@ -127,7 +122,9 @@ class Objective:
 def _counts_root(problem: Problem, state: State) -> bool:
     """Whether the measures that are always minimised count the motion of a free root."""
     curved = [
-        term.weight * term.curvature(state.update(problem.start)) for term in problem.measures if type(term) in CAN
+        term.weight * term.curvature(state.update(problem.start))
+        for term in problem.measures
+        if type(term) in MINIMISED
     ]
     return bool(curved) and float(np.min(np.sum(curved, axis=0)[:6])) > 0.0
 

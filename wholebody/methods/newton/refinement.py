@@ -71,7 +71,7 @@ def refine(
         value = measure(run.x)
         change = least - value
         if free and run.met and change > ROUNDING * abs(least):
-            memory.went(run.x - best)
+            memory.record(run.x - best)
             moved = float(np.abs(run.x - best).max())
             best, least, step = run.x, value, None
             if run.system is not system:  # other contacts: what was remembered is of other equations

@@ -16,7 +16,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.self_pairs import random_postures
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.tasks.base import Constraint, Goal, Measure
@@ -77,7 +77,7 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
     """Rows of a goal: its error."""
     error = np.atleast_1d(goal.error(bodies.start_state))
     return TangentRows(
-        bodies, label, goal.error, lambda state: _dense(goal.jacobian(state), state),
+        bodies, label, goal.error, lambda state: state.dense_jacobian(goal.jacobian(state)),
         np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
     )  # fmt: skip
 
@@ -115,7 +115,7 @@ def constraint_rows(
     def rows(chosen: Indices, sign: Array, bound: Array) -> TangentRows | None:
         if not len(chosen):
             return None
-        slope = lambda state: _dense(term.jacobian(state), state)  # noqa: E731
+        slope = lambda state: state.dense_jacobian(term.jacobian(state))  # noqa: E731
         return TangentRows(bodies, label, term.value, slope, chosen, sign, bound)
 
     sides = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
@@ -123,10 +123,6 @@ def constraint_rows(
         rows(equal, np.ones(len(equal)), lower[equal]),
         rows(np.concatenate([above, below]), sides, np.concatenate([lower[above], upper[below]])),
     )
-
-
-def _dense(part: Wrench | Array, state: State) -> Array:
-    return state.wrench_jacobian(part) if isinstance(part, Wrench) else np.atleast_2d(part)
 
 
 def _reads(bodies: FigureBodies) -> Mask:

@@ -76,7 +76,7 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
             make = partial(_mass_center, bodies, label, directions, goal.resolved_target)
             result.add(make, "mass center", goal=True, weight=goal.weight)
         elif isinstance(goal, Posture):
-            bodies.ask(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
+            bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
         else:
             _check_own(bodies, label)
             result.add(_as_made(goal_rows(bodies, goal, label)), "own", goal=True, weight=goal.weight)

@@ -13,7 +13,7 @@ from wholebody.checks import number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.feasibility import reach
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.multistart import SHARPER, Search, Settings
@@ -23,7 +23,7 @@ from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
@@ -47,7 +47,7 @@ class NewtonStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class NewtonTracker(OfOneRun):
+class NewtonTracker(NotCopyable):
     """Follows the goals of one problem, frame by frame.
 
     Goals, other terms and clearances of the problem may be replaced between calls, and things may be moved. A tracker
@@ -116,7 +116,7 @@ class NewtonTracker(OfOneRun):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
                 active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
-            found = reach(
+            found = satisfy(
                 active_system,
                 active_system.variables(q),
                 tolerance=SHARPER * self._settings.tolerance,
@@ -153,16 +153,16 @@ class NewtonTracker(OfOneRun):
     @property
     def pattern(self) -> Pattern:
         """Structural non-zeros of the Jacobian."""
-        return self._course.system.pattern
+        return self._active_system.system.pattern
 
     @property
     def laid_out(self) -> tuple[int, float]:
         """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._course.patterns.structures, self._course.patterns.laying
+        return self._active_system.patterns.structures, self._active_system.patterns.laying
 
     def _lay_out(self) -> None:
         problem = self.problem
-        self._course = FigureSystem(problem, self.workspace, self._algebra)
+        self._active_system = FigureSystem(problem, self.workspace, self._algebra)
         self._terms = (problem.constraints, problem.bounds, problem.measures)
 
     def _renewed(self) -> FigureSystem:
@@ -173,7 +173,7 @@ class NewtonTracker(OfOneRun):
         now = (problem.constraints, problem.bounds, problem.measures)
         if any(new is not old for new, old in zip(now, self._terms, strict=True)):
             self._lay_out()
-        self._course.retarget()
-        self._course.objective.follow()
-        self._course.bodies.free_step()
-        return self._course
+        self._active_system.retarget()
+        self._active_system.objective.follow()
+        self._active_system.bodies.free_step()
+        return self._active_system

@@ -13,7 +13,7 @@ from wholebody.checks import choice
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
-from wholebody.methods.differential import COMFORT, REGULAR, TOOL, Iteration, Settings, StepError
+from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
@@ -83,8 +83,8 @@ class Placo(SolvesAnew):
             MissingPackageError: placo is not installed.
         """
         check_problem(problem, "Placo.prepare: problem")
-        with problem.borrow() as workspace, problem.scene.built.pool(_Room, _Room).borrow() as room:
-            room.robot(problem, workspace, self.pairs(problem))
+        with problem.borrow() as workspace, problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
+            cache.robot(problem, workspace, self.pairs(problem))
 
     def pairs(self, problem: Problem) -> Indices:
         """Numbers (pairs,) of the scene's pairs that placo is given: all of them."""
@@ -106,20 +106,20 @@ class Placo(SolvesAnew):
         began = time.perf_counter()
         with (
             problem.borrow() as workspace,
-            problem.scene.built.pool(_Room, _Room).borrow() as room,
+            problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache,
             Control(self.time_limit, progress) as control,
         ):
-            robot = room.robot(problem, workspace, self.pairs(problem))
+            robot = cache.robot(problem, workspace, self.pairs(problem))
             stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])
             settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
-        ending = Ending(run.q, run.rested, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
+        ending = Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
 
-class _Room:
+class _RobotCache:
     """Keeps the robot of one solve for the next solve on the same scene, which may have a similar problem."""
 
     def __init__(self) -> None:
@@ -148,7 +148,7 @@ class _Programs:
         self._solver: Any = placo.KinematicsSolver(robot.wrapper)
         robot.couple(self._solver)
         self._tasks = add_terms(self._solver, robot, problem, holding)
-        self._regular = self._solver.add_regularization_task(REGULAR * COMFORT)
+        self._regular = self._solver.add_regularization_task(REGULAR * MEASURES)
         self._solver.dt = 1.0
         robot.wrapper.set_velocity_limits(STEP)
         self._solver.enable_joint_limits(True)

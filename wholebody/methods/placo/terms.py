@@ -47,14 +47,14 @@ class Tasks:
     """The tasks whose weight changes while the solver runs.
 
     Attributes:
-        comfort: the tasks of the measures, with the share of the weight of each.
+        measures: the tasks of the measures, with the share of the weight of each.
     """
 
-    comfort: list[tuple[Any, float]] = field(default_factory=list)
+    measures: list[tuple[Any, float]] = field(default_factory=list)
 
     def weigh(self, weight: float) -> None:
         """Set the weight of the measures against the goals."""
-        for number, (task, share) in enumerate(self.comfort):
+        for number, (task, share) in enumerate(self.measures):
             task.configure(f"measure {number}", "soft", weight * share)
 
 
@@ -203,7 +203,7 @@ def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Disp
         if values:
             task = solver.add_joints_task()
             task.set_joints(values)
-            tasks.comfort.append((task, measure.weight * value / float(weights.max())))
+            tasks.measures.append((task, measure.weight * value / float(weights.max())))
 
 
 def _joint_values(robot: Robot, problem: Problem, q: Array, dofs: Iterable[int]) -> dict[str, float]:

@@ -36,7 +36,7 @@ class _Group(NamedTuple):
     rows: list[int]
 
 
-def parted(problem: Problem, workspace: Workspace, q: Array) -> Array | None:
+def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | None:
     """A posture (nq,) in which two objects are apart whose normals cancel at the posture q (nq,).
 
     None where no normals cancel, or no translation separates the two. Other pairs may overlap there.

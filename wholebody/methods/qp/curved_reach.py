@@ -21,7 +21,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
@@ -134,7 +134,7 @@ class CurvedReach:
     def _iterate_at(self, lineariser: Lineariser, q: Array, within: float) -> Iterate:
         at = lineariser.at(q, within)
         rows = self._subproblem.rows(at)
-        return Iterate(at, rows, self._subproblem.violation(rows), Placed(at.contacts, within))
+        return Iterate(at, rows, self._subproblem.violation(rows), QueryResult(at.contacts, within))
 
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self._lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
@@ -154,7 +154,7 @@ class CurvedReach:
             part = term.jacobian(state)
             size = len(part.rows) if isinstance(part, Wrench) else len(part)
             if isinstance(part, Wrench) and part.against == 0:
-                _add_bending(total, state, part, force[row : row + size])
+                _add_kinematic_hessian(total, state, part, force[row : row + size])
             row += size
         for held, equal in zip(self._problem.constraints, self._subproblem.equalities, strict=True):
             pulls = force[row : row + equal]
@@ -162,7 +162,7 @@ class CurvedReach:
             if pulls.any():
                 part = held.jacobian(state)
                 if isinstance(part, Wrench) and part.against == 0 and equal == len(part.rows):
-                    _add_bending(total, state, part, pulls)
+                    _add_kinematic_hessian(total, state, part, pulls)
         bending = state.folded(state.folded(total).T)
         bent = np.flatnonzero(bending.any(axis=0))
         value, vector = np.linalg.eigh(bending[np.ix_(bent, bent)])
@@ -172,7 +172,7 @@ class CurvedReach:
         return ways, value[kept]
 
 
-def _add_bending(total: Array, state: State, part: Wrench, force: Array) -> None:
+def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Array) -> None:
     """Add the second derivative of force times place, for the rows of one term on one joint, to a total.
 
     The rows are forces along the world's axes through a point, or moments, or both in this order; others have none.
@@ -193,14 +193,14 @@ def _add_bending(total: Array, state: State, part: Wrench, force: Array) -> None
         pull, moment = np.zeros(3), force[:3]
     else:
         return
-    compiled_kernel().add_bending(total, state.columns, state.support[part.joint], point, pull, moment)
+    compiled_kernel().add_kinematic_hessian(total, state.columns, state.support[part.joint], point, pull, moment)
 
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import bending_kernel
+    from wholebody.methods.qp import kinematic_hessian_kernel
 
     three = np.zeros(3)
-    bending_kernel.add_bending(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros(1), three, three, three)
-    return bending_kernel
+    kinematic_hessian_kernel.add_kinematic_hessian(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros(1), three, three, three)
+    return kinematic_hessian_kernel

@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.linearisation import Passing
+from wholebody.linearisation import PackedLinearisation
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (
@@ -40,8 +40,8 @@ WORTH = 0.95  # share of the depth that a round must leave at most, or else it i
 WEAK = 3  # rounds from one start that may be weak; larger is slower and finds more
 
 
-class Barriers(NamedTuple):
-    """What stands around a posture.
+class ProjectionRows(NamedTuple):
+    """What a posture is projected out of: rows of near contacts and of constraints.
 
     Attributes:
         depth: greatest of any pair, metres.
@@ -56,30 +56,30 @@ class Barriers(NamedTuple):
     box: Array
 
 
-def barriers(at: Passing, rows: Array, room: Array) -> Barriers:
-    """What stands around a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
+def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:
+    """Rows of a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
     gaps = at.gap - np.minimum(at.clearance, GAP)
-    return Barriers(
+    return ProjectionRows(
         -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
         np.concatenate([gaps, room]), at.box,
     )  # fmt: skip
 
 
-def free_end(model: pin.Model, q: Array, out: float, look: Callable[[Array], Barriers]) -> Array | None:
+def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], ProjectionRows]) -> Array | None:
     """A posture (nq,) that is free, whatever passes on the way to it; None if none was found.
 
     Args:
         model: of the figure.
         q: (nq,) the posture at the start of the frame.
         out: depth up to which a posture is free, metres.
-        look: what stands around a posture (nq,).
+        rows_at: of a posture (nq,).
     """
-    project, box = compiled_kernel().project, look(q).box.copy()
+    project, box = compiled_kernel().project, rows_at(q).box.copy()
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0
         for _ in range(ROUNDS):
             here = np.asarray(pin.integrate(model, q, gone))
-            at = look(here)
+            at = rows_at(here)
             if at.depth <= out:
                 return here
             weak += at.depth > WORTH * least

@@ -20,7 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
@@ -164,7 +164,7 @@ class Feasibility:
     def _iterate_at(self, q: Array) -> Iterate:
         at = self.lineariser.at(q, WITHIN)
         rows = self.subproblem.rows(at)
-        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, WITHIN))
+        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, WITHIN))
 
     def _record(self, here: Iterate, step: float, what: str) -> None:
         violation = here.violation

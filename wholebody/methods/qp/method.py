@@ -5,8 +5,9 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass, replace
 
+from wholebody.assessment import assess
 from wholebody.checks import flag
-from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
 from wholebody.methods.qp.multistart import Search, Settings
@@ -102,11 +103,13 @@ class QP:
         settings = Settings(self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures)
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             met = unobstructed(problem, workspace, self.tolerance, self.iterations, control)
-            if met is not None and not self.measures:
-                ending = Ending(met.q, True, len(met.trace), met.trace, "directly")
+            judgement = None if met is None or self.measures else assess(problem, met.q)
+            if met is not None and judgement is not None and meets(judgement, self.tolerance):
+                ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
             else:
                 search = Search(problem, workspace, self._qp_solver(), settings, control)
-                best, before = (search.run(), ()) if met is None else (search.run(met.q), met.trace)
+                begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
+                best = search.run(begin)
                 ending = Ending(
                     best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
                     contradictions=search.contradictions, programs=search.solver.counted(),

@@ -7,7 +7,9 @@ near the goals two postures compare by the Lagrangian, with the multipliers y, z
 
 where m are the measures, c the errors of the soft rows and v the violations of the elastic ones (less than zero where
 they hold with room to spare). For a step x = n + t in its normal and tangential parts the program's own model has L
-fall by t' H t / 2 along the constraints (Nocedal and Wright 2006, chapters 12 and 18). Measures alone would let steps
+fall along the constraints by -g' t - t' H t / 2 - y' A t + z' C t, with the soft rows A and the elastic rows C (Nocedal
+and Wright 2006, chapters 12 and 18). That is t' H t / 2 where no bound holds the step, and more where one does.
+Measures alone would let steps
 that are too long for curved constraints swing to and fro, each by more than the last.
 """
 
@@ -42,6 +44,11 @@ class Multipliers(NamedTuple):
             self.soft, self.elastic, self.key, rows.soft_error, rows.key, rows.elastic_violation
         )
         return measure + work
+
+    def change(self, program: QuadraticProgram, x: Array) -> float:
+        """What errors and violations add to L, to first order, with the displacement x (n,): y' A x - z' C x."""
+        soft = program.rows[: len(self.soft)] @ x
+        return float(self.soft @ soft - self.elastic @ (program.elastic @ x))
 
 
 def multipliers_of(program: QuadraticProgram, answer: QPSolution, rows: Rows, scale: float) -> Multipliers:

@@ -12,7 +12,7 @@ from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.cancelling import parted
+from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -94,7 +94,7 @@ class Search:
     def run(self, begin: Array | None = None) -> LocalSolution:
         """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found."""
         self._try_ways(begin)
-        self._settle()
+        self._come_nearest()
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than what is asked
         if self._out_of_reach:  # which is known, although a nearer posture may be near
@@ -144,7 +144,7 @@ class Search:
         """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
         if _held(self.best, self.settings.tolerance):
             return
-        if (q := parted(self.problem, self.lineariser.workspace, self.best.q)) is not None:
+        if (q := posture_apart(self.problem, self.lineariser.workspace, self.best.q)) is not None:
             self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
@@ -172,7 +172,7 @@ class Search:
             yield self._try(probe.q, "restart") if reached else probe, "from another start"
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
-        """Look whether the goals can be met from a start, in haste and without regard to the measures.
+        """Look whether the goals can be met from a start, by few programs and without regard to the measures.
 
         Args:
             start: (nq,).
@@ -191,7 +191,7 @@ class Search:
             self.control,
         )  # fmt: skip
 
-    def _settle(self) -> None:
+    def _come_nearest(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         tolerance = self.settings.tolerance
         if self.control.over:

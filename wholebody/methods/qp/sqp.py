@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.methods.control import Control
@@ -72,7 +72,7 @@ class Iterate(NamedTuple):
     at: Linearisation
     rows: Rows
     violation: Violation
-    placed: Placed
+    placed: QueryResult
     longest: float = np.inf
 
 
@@ -225,10 +225,13 @@ class SQP:
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
-            saved = self.subproblem.bending(program, here.rows, parts.tangential)
+            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
+            saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
+            if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
+                saved = self.subproblem.saving(program, here.rows, parts.tangential)
+                saved -= multipliers.change(program, parts.tangential)
             flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
-            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
         return Step(x, parts, flat, answer.x, predicted, multipliers)
@@ -259,7 +262,7 @@ class SQP:
             if acceptance.accepted and not self._jumps(here, leap):
                 self._record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
-            self._ahead.refused()
+            self._ahead.rejected()
         dq = step.dq
         there = self._moved(here, dq)
         acceptance = self._judge(here, there, step)
@@ -308,7 +311,7 @@ class SQP:
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
         if step.parts is not None and not step.flat:
-            self._ahead.went(step.parts, way, way is not step.dq)
+            self._ahead.record(step.parts, way, way is not step.dq)
         self._anchor = None
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
@@ -336,7 +339,7 @@ class SQP:
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
-        return Iterate(at, rows, self.subproblem.violation(rows), Placed(at.contacts, within), longest)
+        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 from wholebody.figures.state import State
-from wholebody.linearisation import ConstraintValues, Passing
+from wholebody.linearisation import ConstraintValues, PackedLinearisation
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import (
@@ -127,7 +127,7 @@ class StepProgram:
         gain = min(1.0, seconds / SETTLING) if self.goals else 1.0
         self._numbers = numbers_of(self._subproblem.scale, gain)
 
-    def solve(self, at: Passing, measures: bool) -> Answer:
+    def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
 
         Args:
@@ -163,7 +163,7 @@ class StepProgram:
         after[: len(q)] = q
         self._before, self._after = after, self._before
 
-    def rows(self, at: Passing) -> Rows:
+    def rows(self, at: PackedLinearisation) -> Rows:
         """The rows of the last program; overwritten by the next."""
         k, first = self._elastic, self._first_elastic
         after = first + k * self._variables
@@ -182,7 +182,7 @@ class StepProgram:
             elastic.reshape(k, n), least, weight, self._entries[2], self._entries[3],
         )  # fmt: skip
 
-    def bounded(self, at: Passing) -> tuple[Array, Array]:
+    def bounded(self, at: PackedLinearisation) -> tuple[Array, Array]:
         """Rows (k, nv) of the constraints, and how far (k,) they are from their bounds; less than zero beyond."""
         value, rows = at.value[at.goals :], at.jacobian[at.goals : len(at.value)]
         lower, upper = self._subproblem.bound
@@ -192,7 +192,7 @@ class StepProgram:
             np.concatenate([value[low] - lower[low], upper[high] - value[high]]),
         )
 
-    def motion(self, at: Passing, displacement: Array) -> tuple[float, float]:
+    def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
         """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,).
 
         The workspace's state is where the linearisation is.
@@ -204,7 +204,7 @@ class StepProgram:
         )  # fmt: skip
         return way, turn
 
-    def _once(self, at: Passing, measures: bool, least_damping: float) -> tuple[Answer, float, float]:
+    def _once(self, at: PackedLinearisation, measures: bool, least_damping: float) -> tuple[Answer, float, float]:
         """An answer, the damping of its program, and what it asks for.
 
         Raises:
@@ -237,7 +237,7 @@ class StepProgram:
         answered = (answer.exact, answer.iterations, answer.by)
         return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
-    def _foresee(self, at: Passing, displacement: Array) -> bool:
+    def _foresee(self, at: PackedLinearisation, displacement: Array) -> bool:
         """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.
 
         Returns:

@@ -183,9 +183,9 @@ class Subproblem:
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
         """By how much the measures of a program lessen, to second order, with the displacement x (nv,)."""
-        return -float(program.linear @ x) / self.scale - self.bending(program, rows, x)
+        return -float(program.linear @ x) / self.scale - self.quadratic_part(program, rows, x)
 
-    def bending(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
+    def quadratic_part(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
         """Half of x' H x with the measures' curvature H in a program: what a tangential part x (nv,) saves."""
         soft = len(rows.soft_error)
         bent = (program.diagonal * x) @ x

@@ -5,7 +5,8 @@ On the face of a program's active set its answer x is the sum of a *normal* part
 
     n = the program's answer with g = 0 on that face,    t = x - n,    n' H t = 0,
 
-where H = D + S' S is the measures' curvature. So t lessens the measures by t' H t / 2. Because H does not know how the
+where H = D + S' S is the measures' curvature. So t lessens the measures by t' H t / 2, and by more where a bound holds
+x. Because H does not know how the
 constraints are curved, the tangential parts of one step after the other form a linear sequence, or grow where the
 measures curve downwards along the constraints. The normal parts follow the square of the step and have no law of their
 own; they would spoil an extrapolation.
@@ -21,8 +22,10 @@ from wholebody.arrays import Array
 from wholebody.methods.acceleration import STRETCH, Anderson
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.records import with_values
 
 ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
+ROOM = 1e-3  # rad, m: a bound that is nearer holds the normal part too
 SHORTER, LONGER = 1.0 / 3.0, 2.0  # factors of the longest extrapolation after one was rejected, and taken
 
 
@@ -36,6 +39,9 @@ class Parts(NamedTuple):
 def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, working_set: WorkingSet) -> Parts | None:
     """The parts of the answer of a program; None where its face has no normal part.
 
+    Where the answer went to a bound that was some way off, it is the measures that pull there. The way to that bound
+    belongs to the tangential part, so the bound does not hold the normal one, unless that comes to the bound too.
+
     Args:
         program: of a step.
         answer: its answer.
@@ -44,7 +50,15 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, workin
     """
     target = program.target.copy()
     target[: len(shift)] += shift
-    normal = working_set.without_gradient(program, answer.active, target)
+    active, normal = answer.active, None
+    lower, upper = active.lower & (program.lower >= -ROOM), active.upper & (program.upper <= ROOM)
+    left = (active.lower & ~lower) | (active.upper & ~upper)
+    if left.any():
+        normal = working_set.without_gradient(program, with_values(active, lower=lower, upper=upper), target)
+        if normal is not None and not ((program.lower < normal) & (normal < program.upper))[left].all():
+            normal = None
+    if normal is None:
+        normal = working_set.without_gradient(program, active, target)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 
@@ -73,13 +87,13 @@ class Extrapolation:
             fast = min(ALONG, self._longest) * plain
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
-    def went(self, parts: Parts, way: Array, extrapolated: bool) -> None:
+    def record(self, parts: Parts, way: Array, extrapolated: bool) -> None:
         """Remember the way (n,) that was gone after the last proposal, and whether it was the proposed one."""
-        self._memory.went(way - parts.normal)
+        self._memory.record(way - parts.normal)
         if extrapolated or self._as_plain:
             self._longest = min(LONGER * self._longest, STRETCH)
 
-    def refused(self) -> None:
+    def rejected(self) -> None:
         """Go less far the next time, from what is learnt from now on."""
         self._memory.forget()
         self._longest = max(SHORTER * self._longest, 1.0)

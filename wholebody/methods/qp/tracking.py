@@ -12,10 +12,10 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.checks import flag, number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.linearisation import Passing
+from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.qp.escaping import WITHIN, Barriers, barriers, free_end
+from wholebody.methods.qp.escaping import WITHIN, ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
@@ -27,7 +27,7 @@ from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import StepLimit, allowed, at_speeds
-from wholebody.workspace import OfOneRun
+from wholebody.workspace import NotCopyable
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5
@@ -89,7 +89,7 @@ class FrameStep(NamedTuple):
     collisions: tuple[Collision, ...] = ()
 
 
-class QPTracker(OfOneRun):
+class QPTracker(NotCopyable):
     """Follows the goals of one problem, step by step.
 
     No step moves any piece farther than half the distance within which pairs were looked at, so nothing is jumped over,
@@ -227,7 +227,7 @@ class QPTracker(OfOneRun):
             path.append((following, steps[-1].q))
         self._left = None
         if depth > OUT:
-            free = free_end(model, q, OUT, self._barriers)
+            free = free_end(model, q, OUT, self._projection_rows)
             if free is not None:
                 path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
         self._program.take(self.dt)
@@ -239,18 +239,18 @@ class QPTracker(OfOneRun):
         """Greatest depth of any pair at a posture (nq,), metres."""
         return -float(self.workspace.near(q, 0.0).distance.min(initial=0.0))
 
-    def _barriers(self, q: Array) -> Barriers:
+    def _projection_rows(self, q: Array) -> ProjectionRows:
         """What stands around a posture (nq,), with all things where they are."""
-        at = self._unbraked(self._lineariser.passing(q, WITHIN))
-        return barriers(at, *self._program.bounded(at))
+        at = self._unbraked(self._lineariser.packed(q, WITHIN))
+        return projection_rows(at, *self._program.bounded(at))
 
-    def _unbraked(self, at: Passing) -> Passing:
+    def _unbraked(self, at: PackedLinearisation) -> PackedLinearisation:
         """The same, with joints that need not brake: to get out of the way they go up to their limits."""
         at.box[:] = allowed(self.problem.bounds, self.problem.scene.figure.limits, self.workspace.state, self.dt)
         return at
 
-    def _linearised(self, q: Array) -> Passing:
-        at = self._lineariser.passing(q, self._query_distance)
+    def _linearised(self, q: Array) -> PackedLinearisation:
+        at = self._lineariser.packed(q, self._query_distance)
         if self._left is not None:
             self._unbraked(at)
             np.clip(at.box, np.minimum(self._left[0], 0.0), np.maximum(self._left[1], 0.0), out=at.box)
@@ -273,11 +273,11 @@ class QPTracker(OfOneRun):
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
         following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
-            bent = (
-                self._turning.bent(at, program.rows(at), displacement) if curved > least_unseen(answer.asked) else 0.0
-            )
+            bent = 0.0
+            if curved > least_unseen(answer.asked):
+                bent = self._turning.linearisation_error(at, program.rows(at), displacement)
             if bent > 0.0:
-                displacement, share, following = self._looked_after(at, displacement, share, bent > MIDWAY)
+                displacement, share, following = self._corrected(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
@@ -289,7 +289,9 @@ class QPTracker(OfOneRun):
             answer.iterations, answer.by, self._working_set.solver.counted(), share,
         )  # fmt: skip
 
-    def _looked_after(self, at: Passing, displacement: Array, share: float, midway: bool) -> tuple[Array, float, Array]:
+    def _corrected(
+        self, at: PackedLinearisation, displacement: Array, share: float, midway: bool
+    ) -> tuple[Array, float, Array]:
         """A step that turns far is looked at where it ends: what turning brought nearer is asked for, or the step cut.
 
         Args:
@@ -326,7 +328,7 @@ class QPTracker(OfOneRun):
         return 0.0 * displacement, 0.0, at.q.copy()
 
     def _shortfall(
-        self, at: Passing, displacement: Array, kept: Array, began: Array, midway: bool
+        self, at: PackedLinearisation, displacement: Array, kept: Array, began: Array, midway: bool
     ) -> tuple[Array, Array]:
         """By how much each contact (k,) is nearer after a displacement (nv,) than the distances (k,) it should keep.
 
@@ -340,7 +342,7 @@ class QPTracker(OfOneRun):
         q = pin.integrate(model, at.q, displacement)
         return np.maximum(short, self._nearer(at, q, kept)), q
 
-    def _nearer(self, at: Passing, q: Array, kept: Array) -> Array:
+    def _nearer(self, at: PackedLinearisation, q: Array, kept: Array) -> Array:
         """By how much each contact (k,) is nearer at a posture (nq,) than the distances (k,) it should keep."""
         near = self.workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
         after = self._distance

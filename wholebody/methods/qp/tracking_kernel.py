@@ -49,7 +49,7 @@ def solve(
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
-        value: (g + c,) errors of goals and values of constraints; see `linearisation.Passing`, like the next seven.
+        value: (g + c,) errors of goals and values of constraints; see `PackedLinearisation`, like the next seven.
         jacobian: (g + c + r, n).
         gap: (r,).
         gap_contact: (r,).
@@ -74,7 +74,7 @@ def solve(
         floats: room, which `parts` lays out.
         integers: room for 5 k: labels and keys of the elastic rows, the keys of those that push, places.
         masks: room for 2 n + 2 k.
-        numbers: see `step_program.NUMBERS`.
+        numbers: see `step_program.numbers_of`.
         measures: whether measures count.
         hot: whether to solve it, not only to build it.
         least_damping: of goals, where the last step does not ask for more.

@@ -13,7 +13,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.linearisation import Passing
+from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.qp.subproblem import Rows
 from wholebody.workspace import Workspace
 
@@ -40,7 +40,7 @@ class Turning:
         self._twists = np.empty((3, workspace.model.njoints, 6))
         self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
 
-    def bent(self, at: Passing, rows: Rows, displacement: Array) -> float:
+    def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
 
         Args:
@@ -53,7 +53,7 @@ class Turning:
         """
         state, contacts = self._workspace.state, at.contacts
         count = len(contacts.distance)
-        share: float = self._kernel.bent(
+        share: float = self._kernel.linearisation_error(
             state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
             self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
             at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
@@ -68,7 +68,7 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import turning_kernel
 
     none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
-    turning_kernel.bent(
+    turning_kernel.linearisation_error(
         np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
         np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
         np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),

@@ -10,7 +10,7 @@ from wholebody.methods.qp.dense_kernel import dot
 
 
 @compiled()
-def bent(
+def linearisation_error(
     displacement: Array,
     columns: Array,
     column_joint: Indices,

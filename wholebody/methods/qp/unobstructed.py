@@ -4,7 +4,7 @@ Of a robot of plain joints on a fixed base most goals are met by a few steps of 
 end nothing is hit. The whole descent is one compiled loop, without programs, contacts or judgements on the way. The
 steps are those of `DampedLeastSquares`: Sugihara's damping, and joints that stop at their limits. Where the end is
 inside of something, nearer to it than the clearance, or not at the goals, all begins from the start as if this had not
-been tried.
+been tried; so it does where that end would be the answer and the assessment refuses it.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.anthropometry import Body
+from wholebody.figures.anthropometry import Person
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, hand_figure_of
@@ -45,7 +45,7 @@ class HandShape(NamedTuple):
     rest: dict[str, Array]
 
 
-def hand_shape(person: Body, side: str) -> HandShape:
+def hand_shape(person: Person, side: str) -> HandShape:
     """Return the hand of a person."""
     size, figure = Dimensions(person), hand_figure_of(person, side)
     bind, rest = _placements(figure, side, _spread(side)), _placements(figure, side, _resting(side))

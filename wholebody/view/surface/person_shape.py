@@ -8,11 +8,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.figures.anthropometry import Body
+from wholebody.figures.anthropometry import Person
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.dimensions import Dimensions
-from wholebody.figures.human import human_spec
-from wholebody.figures.human_figure import figure_of
+from wholebody.figures.human.figure import figure_of
+from wholebody.figures.human.spec import human_spec
 from wholebody.view.surface.fields import (
     Field,
     ball,
@@ -52,7 +52,7 @@ class PersonShape:
         bind: placement (4, 4) of every segment in the world in the binding posture.
     """
 
-    def __init__(self, person: Body) -> None:
+    def __init__(self, person: Person) -> None:
         """Read the person's pieces and joints."""
         spec = human_spec(person)
         figure = figure_of(spec, "capsules")

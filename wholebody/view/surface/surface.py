@@ -13,10 +13,10 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
-from wholebody.figures.anthropometry import Body
+from wholebody.figures.anthropometry import Person
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS
-from wholebody.figures.human import human_spec
+from wholebody.figures.human.spec import human_spec
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.view.surface.borders import Bound, divided
 from wholebody.view.surface.garments import Garment, Part, bounds, made
@@ -140,16 +140,16 @@ def surface_of(figure: Any) -> Surface | None:
 
 
 @lru_cache(maxsize=8)
-def _person_surface(person: Body) -> Surface:
+def _person_surface(person: Person) -> Surface:
     return _kept("person", person, lambda: _make_person(person))
 
 
 @lru_cache(maxsize=8)
-def _hand_surface(person: Body, side: str) -> Surface:
+def _hand_surface(person: Person, side: str) -> Surface:
     return _kept(f"{side} hand", person, lambda: _make_hand(person, side))
 
 
-def _make_person(person: Body) -> Surface:
+def _make_person(person: Person) -> Surface:
     shape = PersonShape(person)
     bones = {name: Bone(name, None, None, placement, np.eye(4)) for name, placement in shape.bind.items()}
     for side in ("left", "right"):
@@ -164,7 +164,7 @@ def _make_person(person: Body) -> Surface:
     return Surface(tuple(bones.values()), tuple(made(garment, order) for garment in shape.garments()))
 
 
-def _make_hand(person: Body, side: str) -> Surface:
+def _make_hand(person: Person, side: str) -> Surface:
     shape = hand_shape(person, side)
     bones = {name: Bone(name, None, None, placement, np.eye(4)) for name, placement in shape.bind.items()}
     bones[f"{side}_forearm"] = Bone(f"{side}_forearm", None, f"{side}_hand", np.eye(4), np.eye(4))
@@ -189,7 +189,7 @@ def halfway(first: Array, second: Array) -> Array:
 # ---- kept on disk
 
 
-def _kept(kind: str, person: Body, make: Any) -> Surface:
+def _kept(kind: str, person: Person, make: Any) -> Surface:
     spec = human_spec(person)
     digest = hashlib.sha256(f"{FORMAT} {kind} {person!r}".encode())
     for solid in spec.solids:

@@ -16,7 +16,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
 from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
@@ -31,8 +31,8 @@ SMALL_STEP_BUDGET = 15  # queries and goals for small steps, if larger ones foun
 OVERRUN = 16  # further queries and goals after which no chain is processed any more
 HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
 PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
-DIP = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
-PASSED = 2e-3  # m: allowed overlap of the motion of a single step; `DIP` is that between shown postures
+ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
+PASSED = 2e-3  # m: allowed overlap of the motion of a single step; `ALLOWED_DEPTH` is that between shown postures
 WIDE = 5e-3  # m: margin of limbs that return to a free posture, so that they have room to turn
 TINY = 1e-12  # rad, m
 
@@ -63,7 +63,7 @@ class OverlapResult:
 
 
 def resolve_overlap(
-    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
+    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
 ) -> OverlapResult:
     """The posture nearest to the wanted one that this frame can reach without overlap.
 
@@ -72,8 +72,8 @@ def resolve_overlap(
         q_free: (nq,) the last posture without overlap: the one shown before.
         q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
         rng: of the order of the chains; the same seed gives the same answer.
-        pace: (nv,) largest motion of each degree of freedom, radians and metres; None for no limit. The remainder
-            is left to the next frame. If things were moved into `q_free`, leaving them comes first.
+        largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
+            to the next frame. If things were moved into `q_free`, leaving them comes first.
 
     Returns:
         The posture, within limits and reach cones and never NaN. If things were moved into `q_free`, that overlap is
@@ -84,7 +84,7 @@ def resolve_overlap(
     """
     checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
     with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:
-        return frames.remove(checked[0], checked[1], rng, pace)
+        return frames.remove(checked[0], checked[1], rng, largest_motion)
 
 
 class FrameResolver:
@@ -98,11 +98,11 @@ class FrameResolver:
         self._parts = self._attraction.parts
 
     def remove(
-        self, q_free: Array, q_wanted: Array, rng: np.random.Generator, pace: Array | None = None
+        self, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
     ) -> OverlapResult:
         """See `resolve_overlap`."""
         self._workspace.begin()
-        self._pace = np.full(self._model.nv, np.inf) if pace is None else pace
+        self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
         resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
@@ -134,7 +134,7 @@ class FrameResolver:
         self._swept = shown is not None and not pushed
         return self._result(q if shown is None else shown)
 
-    def _approach(self, q: Array, wanted: Array, before: Placed, rng: np.random.Generator) -> list[Array]:
+    def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
         """Steps from a free posture towards the wanted one; returns the postures."""
         resolver = self._resolver
         settled = [False] * len(self._parts)
@@ -168,7 +168,7 @@ class FrameResolver:
         share.
         """
         way = np.asarray(pin.difference(self._model, q0, q1))
-        shares = np.minimum(1.0, self._pace / np.maximum(np.abs(way), TINY))
+        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), TINY))
         for dofs, _ in self._parts:
             shares[dofs] = shares[dofs].min(initial=1.0)
         least = float(shares.min())
@@ -181,7 +181,7 @@ class FrameResolver:
 
     def _clear(self, q0: Array, q1: Array) -> bool:
         """Whether the direct motion between two shown postures is free."""
-        return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * DIP) is None
+        return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * ALLOWED_DEPTH) is None
 
     def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
         """Copy of a posture q (nq,) with random changes of its joints, so that a straight arm can bend."""
@@ -195,7 +195,7 @@ class FrameResolver:
         self._resolver.query(result)
         return result
 
-    def _passes_through(self, before: Placed, q0: Array, q1: Array) -> bool:
+    def _passes_through(self, before: QueryResult, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then the first contact."""
         hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, PASSED)
         if hit is not None:

@@ -12,7 +12,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.geometry.continuous.moved_pairs import Placed
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
@@ -114,7 +114,7 @@ class OverlapResolver:
         self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
         near = self.workspace.proximity.query(Joints(self._data), self._query_distance)
-        self.placed = Placed(near, self._query_distance)
+        self.placed = QueryResult(near, self._query_distance)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
         found: list[Overlap] = []

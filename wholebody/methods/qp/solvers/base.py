@@ -78,7 +78,7 @@ class QPSolver(ABC):
         programs, self._programs = self._programs, {}
         return programs
 
-    def own(self) -> Array | None:
+    def uncorrected(self) -> Array | None:
         """(n,) the solver's own answer to the last program that it was given, before the active set was corrected."""
         return None
 

@@ -7,7 +7,7 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
-from wholebody.methods.qp.solvers.native_solver import Native, SplitFormSolver
+from wholebody.methods.qp.solvers.native_solver import NativeAnswer, SplitFormSolver
 from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e30  # DAQP's infinity
@@ -21,7 +21,7 @@ class DAQPSolver(SplitFormSolver):
 
     name = "daqp"
 
-    def answer(self, form: SplitForm, n: int, m: int) -> Native | None:
+    def answer(self, form: SplitForm, n: int, m: int) -> NativeAnswer | None:
         """See `SplitFormSolver.answer`."""
         hessian = np.diag(form.diagonal)
         upper = np.concatenate([form.box_upper[:n], np.minimum(form.upper, FAR)])
@@ -40,4 +40,4 @@ class DAQPSolver(SplitFormSolver):
             self._workspace.settings = {"primal_tol": TOLERANCE, "iter_limit": LIMIT}
         z, _, _, info = self._workspace.solve()
         multiplier = np.asarray(info["lam"])
-        return Native(np.asarray(z), multiplier[:n], -multiplier[n + m :], int(info["iterations"]))
+        return NativeAnswer(np.asarray(z), multiplier[:n], -multiplier[n + m :], int(info["iterations"]))

@@ -24,7 +24,7 @@ from wholebody.methods.qp.solvers.split_form import (
 from wholebody.records import with_values
 
 
-class Native(NamedTuple):
+class NativeAnswer(NamedTuple):
     """What a solver answers to a program.
 
     Attributes:
@@ -48,11 +48,11 @@ class NativeSolver(QPSolver):
         super().__init__(hot_start)
         self._shape = (0, 0, 0)
         self._workspace: Any = None
-        self._own: Array | None = None
+        self._uncorrected: Array | None = None
 
-    def own(self) -> Array | None:
-        """See `QPSolver.own`."""
-        return self._own
+    def uncorrected(self) -> Array | None:
+        """See `QPSolver.uncorrected`."""
+        return self._uncorrected
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise, from the last answer where the workspace is of the program's size, and once more without it."""
@@ -66,7 +66,7 @@ class NativeSolver(QPSolver):
             if found is None:
                 break
             iterations += found.iterations
-            x = self._own = np.where(np.isfinite(found.x), found.x, 0.0)
+            x = self._uncorrected = np.where(np.isfinite(found.x), found.x, 0.0)
             solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
@@ -74,7 +74,7 @@ class NativeSolver(QPSolver):
         return last_resort(program, x, iterations)
 
     @abstractmethod
-    def minimise(self, program: QuadraticProgram, slots: int) -> Native | None:
+    def minimise(self, program: QuadraticProgram, slots: int) -> NativeAnswer | None:
         """Ask the solver.
 
         Args:
@@ -98,7 +98,7 @@ class SplitFormSolver(NativeSolver):
         """Make the loop that fills the form ready."""
         compiled_kernel()
 
-    def minimise(self, program: QuadraticProgram, slots: int) -> Native | None:
+    def minimise(self, program: QuadraticProgram, slots: int) -> NativeAnswer | None:
         """See `NativeSolver.minimise`."""
         n, m = program.size, len(program.target)
         if self._workspace is None:
@@ -107,7 +107,7 @@ class SplitFormSolver(NativeSolver):
         return None if found is None else with_values(found, x=found.x[:n] / SCALE)
 
     @abstractmethod
-    def answer(self, form: SplitForm, n: int, m: int) -> Native | None:
+    def answer(self, form: SplitForm, n: int, m: int) -> NativeAnswer | None:
         """Ask the solver.
 
         Args:

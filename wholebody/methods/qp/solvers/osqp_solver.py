@@ -49,8 +49,8 @@ class OSQPSolver(QPSolver):
         extension()
         compiled_kernel()
 
-    def own(self) -> Array | None:
-        """See `QPSolver.own`."""
+    def uncorrected(self) -> Array | None:
+        """See `QPSolver.uncorrected`."""
         return None if self._workspace is None else self._workspace.x()
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:

@@ -13,7 +13,7 @@ import piqp
 
 from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE
 
 TOLERANCE = 1e-5  # of the optimality conditions; the active set is then corrected
@@ -25,7 +25,7 @@ class PIQPSolver(NativeSolver):
 
     name = "piqp"
 
-    def minimise(self, program: QuadraticProgram, slots: int) -> Native:
+    def minimise(self, program: QuadraticProgram, slots: int) -> NativeAnswer:
         """See `NativeSolver.minimise`."""
         n, k = program.size, len(program.least)
         data = _condensed(program, slots)
@@ -43,7 +43,7 @@ class PIQPSolver(NativeSolver):
         z, push = np.asarray(found.x), np.asarray(found.z_l)[:k]
         x = z[:n]
         box_lower, box_upper = np.asarray(found.z_bl)[:n], np.asarray(found.z_bu)[:n]
-        return Native(
+        return NativeAnswer(
             x / SCALE,
             _active(box_upper, data["x_u"][:n] - x) - _active(box_lower, x - data["x_l"][:n]),
             _active(push, data["G"][:k] @ z - data["h_l"][:k]),

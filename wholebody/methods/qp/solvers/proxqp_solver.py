@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from proxsuite import proxqp
 
-from wholebody.methods.qp.solvers.native_solver import Native, SplitFormSolver
+from wholebody.methods.qp.solvers.native_solver import NativeAnswer, SplitFormSolver
 from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e20  # ProxQP's infinity
@@ -18,7 +18,7 @@ class ProxQPSolver(SplitFormSolver):
 
     name = "proxqp"
 
-    def answer(self, form: SplitForm, n: int, m: int) -> Native:
+    def answer(self, form: SplitForm, n: int, m: int) -> NativeAnswer:
         """See `SplitFormSolver.answer`."""
         size, slots = len(form.linear), len(form.lower) - m
         data = (
@@ -38,4 +38,4 @@ class ProxQPSolver(SplitFormSolver):
         solver.solve()
         self._workspace, found = solver, solver.results
         z = np.asarray(found.z)
-        return Native(np.array(found.x), z[slots : slots + n].copy(), -z[:slots], max(int(found.info.iter), 1))
+        return NativeAnswer(np.array(found.x), z[slots : slots + n].copy(), -z[:slots], max(int(found.info.iter), 1))

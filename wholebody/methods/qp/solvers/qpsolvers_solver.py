@@ -23,11 +23,11 @@ class QpsolversSolver(QPSolver):
 
         self.name = name
         self._sparse = name in sparse_solvers
-        self._own: Array | None = None
+        self._uncorrected: Array | None = None
 
-    def own(self) -> Array | None:
-        """See `QPSolver.own`."""
-        return self._own
+    def uncorrected(self) -> Array | None:
+        """See `QPSolver.uncorrected`."""
+        return self._uncorrected
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise; see `QPSolver.solve_cold`."""
@@ -49,5 +49,5 @@ class QpsolversSolver(QPSolver):
                 solver=self.name,
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
-        self._own = x
+        self._uncorrected = x
         return finish(program, x, 1, self.name) or last_resort(program, x, 1)

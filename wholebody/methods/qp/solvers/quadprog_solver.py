@@ -17,7 +17,7 @@ from scipy.linalg.lapack import dgeqrf, dtrtri
 
 from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.solvers.native_solver import Native, NativeSolver
+from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, SCALE
 
 
@@ -26,11 +26,11 @@ class QuadprogSolver(NativeSolver):
 
     name = "quadprog"
 
-    def minimise(self, program: QuadraticProgram, slots: int) -> Native:
+    def minimise(self, program: QuadraticProgram, slots: int) -> NativeAnswer:
         """See `NativeSolver.minimise`."""
         n, k = program.size, len(program.least)
         if self._workspace is None:
-            self._workspace = _room(n, slots)
+            self._workspace = _buffers(n, slots)
         factor, rows = (part[: n + k] for part in self._workspace)
         factor[:n, :n] = SCALE * inverse_factor(program)
         root, residuals = np.sqrt(np.minimum(program.elastic_weight, HEAVIEST)), np.arange(k)
@@ -44,9 +44,9 @@ class QuadprogSolver(NativeSolver):
                 factor[:, : n + k], linear, rows[:, : 2 * n + k], least, 0, True
             )
         except ValueError:  # it takes rounding for a contradiction; programs have none
-            return Native(np.zeros(n), np.zeros(n), np.zeros(k), 1)
+            return NativeAnswer(np.zeros(n), np.zeros(n), np.zeros(k), 1)
         box = multiplier[n : 2 * n] - multiplier[:n]
-        return Native(z[:n] / SCALE, box, multiplier[2 * n :], max(int(iterations[0]), 1))
+        return NativeAnswer(z[:n] / SCALE, box, multiplier[2 * n :], max(int(iterations[0]), 1))
 
 
 def inverse_factor(program: QuadraticProgram) -> Array:
@@ -65,7 +65,7 @@ def inverse_factor(program: QuadraticProgram) -> Array:
     return result
 
 
-def _room(n: int, slots: int) -> tuple[Array, Array]:
+def _buffers(n: int, slots: int) -> tuple[Array, Array]:
     """The factor's inverse and the columns of the inequalities for x and so many residuals, but for what changes."""
     variables, columns = np.arange(n), np.zeros((n + slots, 2 * n + slots))
     columns[variables, variables], columns[variables, n + variables] = 1.0, -1.0

@@ -56,7 +56,7 @@ from wholebody.figures.motion_ranges import (
 )
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
-from wholebody.figures.xml_reading import numbers
+from wholebody.figures.urdf.xml_reading import numbers
 
 _RANGES = ("coupled_range", "elliptic_range", "twist_range")
 

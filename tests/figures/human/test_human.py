@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures import load, urdf_path
-from wholebody.figures.anthropometry import body, design_cases, table
+from wholebody.figures.anthropometry import design_cases, make_person, table
 from wholebody.figures.packaged_urdf import packaged_files
 
 CASES = tuple(design_cases())
@@ -427,4 +427,4 @@ def test_mass_left_out_is_what_people_of_that_stature_weigh():
     for case in design_cases().values():
         row = next(row for row in table("design_cases") if float(row["stature_m"]) == case.stature)
         expected = float(row["mass_kg_regressed_on_stature"])
-        assert body(case.sex, case.stature).mass == pytest.approx(expected, rel=2e-3)
+        assert make_person(case.sex, case.stature).mass == pytest.approx(expected, rel=2e-3)

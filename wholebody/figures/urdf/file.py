@@ -11,13 +11,13 @@ from xml.etree.ElementTree import Element
 from wholebody.checks import color, shown
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.link_pieces import LinkShape
-from wholebody.figures.urdf_joints import UrdfJoint, read_joints
-from wholebody.figures.xml_reading import bounded, numbers, placement, read_xml, unique_names
+from wholebody.figures.urdf.joints import UrdfJoint, read_joints
+from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names
 from wholebody.geometry.pieces import LARGEST
 from wholebody.records import with_values
 
 EXTENSION = "wholebody"
-"""Name of the element of our extension; see `wholebody.figures.urdf_extension`."""
+"""Name of the element of our extension; see `wholebody.figures.urdf.extension`."""
 
 
 class LinkVisual(NamedTuple):

@@ -7,9 +7,10 @@ from typing import Any
 
 import pinocchio as pin
 
-from wholebody.figures import hulls, human_capsules
+from wholebody.figures import hulls
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import capsules
 from wholebody.records import with_values
 
 _TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
@@ -17,12 +18,12 @@ _TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "n
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
-    rest = [solid for solid in human_capsules.solids(size) if solid.name not in _TRUNK]
+    rest = [solid for solid in capsules.solids(size) if solid.name not in _TRUNK]
     return (*_trunk(size), *(hull_of(solid) for solid in rest))
 
 
 def _trunk(size: Dimensions) -> Iterator[Solid]:
-    for part in human_capsules.trunk_parts(size):
+    for part in capsules.trunk_parts(size):
         radii = (part.half_depth, part.half_breadth, part.half_height)
         yield _solid(part.segment, hulls.ellipsoid(radii, part.segment), part.x, part.z)
     neck, length = size.body.radius("neck"), size.body.length("neck")

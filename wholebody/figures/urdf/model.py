@@ -16,9 +16,9 @@ import pinocchio as pin
 
 from wholebody.checks import shown
 from wholebody.errors import FileFormatError
-from wholebody.figures.urdf_file import UrdfFile
-from wholebody.figures.urdf_joints import Mimic, UrdfJoint
-from wholebody.figures.urdf_writing import ANY_LIMIT, add_joint
+from wholebody.figures.urdf.file import UrdfFile
+from wholebody.figures.urdf.joints import Mimic, UrdfJoint
+from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
 from wholebody.records import with_values
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")

@@ -17,7 +17,7 @@ import wholebody as wb
 from wholebody.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.figures import load
 
-ARM = Path(__file__).resolve().parents[1] / "data" / "arm" / "arm.urdf"
+ARM = Path(__file__).resolve().parents[2] / "data" / "arm" / "arm.urdf"
 TEXT = ARM.read_text(encoding="utf-8")
 
 

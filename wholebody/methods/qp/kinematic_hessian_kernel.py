@@ -1,4 +1,4 @@
-"""How the pull on a point bends with the posture, as a compiled loop: see `curved_reach`."""
+"""The kinematic Hessian of a force on a point, as a compiled loop: see `curved_reach`."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from wholebody.compiled import compiled
 
 
 @compiled()
-def add_bending(total: Array, columns: Array, support: Array, point: Array, force: Array, moment: Array) -> None:
+def add_kinematic_hessian(
+    total: Array, columns: Array, support: Array, point: Array, force: Array, moment: Array
+) -> None:
     """Add the second derivative of force times place and moment times angle to a total.
 
     Args:

@@ -9,7 +9,7 @@ import pytest
 
 from wholebody.errors import InputError
 from wholebody.figures import load
-from wholebody.figures.anthropometry import body, design_cases, table
+from wholebody.figures.anthropometry import design_cases, make_person, table
 from wholebody.figures.measuring import ansur, measure
 
 CASES = tuple(design_cases())
@@ -64,7 +64,7 @@ def test_people_in_between_lie_between(sex):
 
 def test_inertia_of_the_female_thigh_belongs_to_its_sources_segment():
     # de Leva 1996: length 0.2124 of the stature, centre of mass 36.12 % from the hip, gyration 36.9 %.
-    who = body("female", 1.626, 66.8)
+    who = make_person("female", 1.626, 66.8)
     assert who.center_of_mass("left_thigh")[2] == pytest.approx(-0.361 * 0.2124 * 1.626, rel=1e-9)
     moment = who.segment_mass("left_thigh") * (0.369 * 0.2124 * 1.626) ** 2
     assert who.inertia("left_thigh")[0] == pytest.approx(moment, rel=1e-9)
@@ -108,15 +108,15 @@ def test_calf_and_thigh_give_way_by_what_flesh_does():
 @pytest.mark.parametrize("case", CASES)
 def test_a_percentile_is_a_design_case(case):
     who = design_cases()[case]
-    made = body(who.sex, percentile=int(case[1:]))
+    made = make_person(who.sex, percentile=int(case[1:]))
     assert (made.stature, made.mass) == pytest.approx((who.stature, who.mass), rel=1e-3)
-    assert body(who.sex, stature=1.7, percentile=50).stature == 1.7
+    assert make_person(who.sex, stature=1.7, percentile=50).stature == 1.7
 
 
 def test_percentiles_in_between_follow_the_normal_deviate():
     # Statures are nearly normal: mean 175.62 cm, standard deviation 6.86 cm (4082 men of ANSUR II).
     for percentile, deviate in ((10, -1.2816), (40, -0.2533), (90, 1.2816)):
-        assert body(percentile=percentile).stature == pytest.approx(1.7562 + 0.0686 * deviate, abs=0.006)
+        assert make_person(percentile=percentile).stature == pytest.approx(1.7562 + 0.0686 * deviate, abs=0.006)
 
 
 @pytest.mark.parametrize(

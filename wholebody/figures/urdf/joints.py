@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.checks import shown
 from wholebody.errors import FileFormatError
-from wholebody.figures.xml_reading import bounded, numbers, placement, unique_names
+from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
 from wholebody.records import with_values
 

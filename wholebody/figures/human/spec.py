@@ -10,19 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-import numpy as np
-
 from wholebody.checks import known
 from wholebody.errors import InputError, UnknownNameError
-from wholebody.figures import human_capsules, human_fingers, human_hulls, human_spheres
-from wholebody.figures.anthropometry import Body, body, describe, table
+from wholebody.figures.anthropometry import Person, describe, make_person, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
+from wholebody.figures.hand import palm_axes
+from wholebody.figures.human import capsules, fingers, hulls, spheres
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
-    "spheres": human_spheres.solids,
-    "capsules": human_capsules.solids,
-    "hulls": human_hulls.solids,
+    "spheres": spheres.solids,
+    "capsules": capsules.solids,
+    "hulls": hulls.solids,
 }
 
 
@@ -30,11 +29,11 @@ OLDER = 45.0
 """Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011)."""
 
 
-def human_spec(person: Body | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
+def human_spec(person: Person | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person.
 
     Args:
-        person: from `wholebody.figures.anthropometry.body`; the median man if left out.
+        person: from `wholebody.figures.anthropometry.make_person`; the median man if left out.
         detail: "spheres", "capsules" or "hulls": the collision pieces.
         hands: "rigid": each is one segment; "fingers": each has twenty joints.
 
@@ -42,15 +41,15 @@ def human_spec(person: Body | None = None, detail: str = "capsules", hands: str 
         UnknownNameError: another detail or other hands.
         InputError: fingers in spheres.
     """
-    person = person or body()
-    known(hands, human_fingers.HANDS, "kind of hands", "human")
+    person = person or make_person()
+    known(hands, fingers.HANDS, "kind of hands", "human")
     if hands == "fingers" and detail == "spheres":
         raise InputError("hands='fingers': the 39 spheres have none for fingers; give detail 'capsules' or 'hulls'")
     spec = _spec(person, detail)
-    return human_fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
+    return fingers.with_fingers(spec, Dimensions(person), detail) if hands == "fingers" else spec
 
 
-def _spec(person: Body, detail: str) -> BodySpec:
+def _spec(person: Person, detail: str) -> BodySpec:
     return BodySpec(
         name="human",
         title=describe(person),
@@ -62,7 +61,7 @@ def _spec(person: Body, detail: str) -> BodySpec:
     )
 
 
-def human_solids(person: Body, detail: str) -> tuple[Solid, ...]:
+def human_solids(person: Person, detail: str) -> tuple[Solid, ...]:
     """Return the collision pieces of a person in one detail.
 
     Raises:
@@ -73,19 +72,19 @@ def human_solids(person: Body, detail: str) -> tuple[Solid, ...]:
     return DETAILS[detail](Dimensions(person))
 
 
-def _links(person: Body) -> tuple[Link, ...]:
+def _links(person: Person) -> tuple[Link, ...]:
     massive = {row["name"] for row in table("segments")}
     names = ["pelvis", *(row["child_segment"] for row in table("joints"))]
     return tuple(_link(person, name) if name in massive else Link(name) for name in names)
 
 
-def _link(person: Body, segment: str) -> Link:
+def _link(person: Person, segment: str) -> Link:
     x, y, z = (float(value) for value in person.center_of_mass(segment))
     ix, iy, iz = (float(value) for value in person.inertia(segment))
     return Link(segment, person.segment_mass(segment), (x, y, z), (ix, iy, iz))
 
 
-def _joints(person: Body) -> tuple[Joint, ...]:
+def _joints(person: Person) -> tuple[Joint, ...]:
     rows = table("joints")
     child = {row["name"]: row["child_segment"] for row in rows} | {"root": "pelvis"}
     joints = []
@@ -99,7 +98,7 @@ def _joints(person: Body) -> tuple[Joint, ...]:
     return tuple(joints)
 
 
-def joint_limits(person: Body, row: Mapping[str, str]) -> tuple[float, float]:
+def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
     """Return the least and greatest angle of a joint, degrees.
 
     From 45 years on they are scaled by the means of people of 45 to 69 over those of 20 to 44 (Soucie et al. 2011),
@@ -141,8 +140,7 @@ def landmarks(size: Dimensions) -> tuple[Landmark, ...]:
         Landmark("gaze", "head", place(size.eye_x, 0.0, size.eye_z)),
     ]
     for side, sign in (("left", 1.0), ("right", -1.0)):
-        # Hanging hand: fingers -z, palm towards the thigh, which is -y on the left.
-        palm = np.column_stack([[0.0, 0.0, -1.0], [sign, 0.0, 0.0], [0.0, -sign, 0.0]])
+        palm = palm_axes(side)
         length, thick, index, thumb = size.palm_length, size.palm_half_thickness, size.index, size.thumb
         marks += [
             Landmark(f"{side}_palm", f"{side}_hand", place(0.0, -sign * thick, -0.6 * length, palm)),

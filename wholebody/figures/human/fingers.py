@@ -27,7 +27,7 @@ from wholebody.figures.hand import (
     part_radii,
     thumb_metacarpal,
 )
-from wholebody.figures.human_hulls import hull_of
+from wholebody.figures.human.hulls import hull_of
 
 HANDS = ("rigid", "fingers")
 """What a person's hands can be: one segment each, or palms with fingers."""
@@ -176,37 +176,3 @@ def _solids(size: Dimensions, side: str, parts: list[_Part]) -> Iterator[Solid]:
 
 def _radius(size: Dimensions, key: str) -> float:
     return 0.5 * (keyed_hand(key, "width") + keyed_hand(key, "depth")) * size.hand_breadth
-
-
-def is_finger(segment: str) -> bool:
-    """Whether a segment without its side, such as "index_middle", is of a finger."""
-    return segment.partition("_")[0] in FINGERS
-
-
-def finger_pair(a: str, b: str) -> str | None:
-    """Why two segments of one hand are not tested against each other; None if they are.
-
-    Args:
-        a: segment without its side, such as "hand" or "index_middle".
-        b: the other one.
-    """
-    first, second = sorted((a, b), key=_order)
-    finger, _, part = second.partition("_")
-    if finger not in FINGERS:
-        return None
-    if first in ("hand", "forearm"):
-        near = part == "metacarpal" or (part == "proximal" and first == "hand")
-        return "neighbours that overlap at their joint" if near else None
-    other, _, _ = first.partition("_")
-    if other not in FINGERS:
-        return None
-    if other == finger:
-        return "neighbours that overlap at their joint"
-    order = list(FINGERS)
-    beside = abs(order.index(other) - order.index(finger)) == 1 and "thumb" not in (other, finger)
-    return "fingers rest side by side" if beside else None
-
-
-def _order(segment: str) -> int:
-    finger = segment.partition("_")[0]
-    return list(FINGERS).index(finger) if finger in FINGERS else -1

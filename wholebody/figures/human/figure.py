@@ -8,14 +8,15 @@ from functools import partial
 
 import numpy as np
 
-from wholebody.figures import human_fingers, postures
-from wholebody.figures.anthropometry import Body, body, table
+from wholebody.figures import postures
+from wholebody.figures.anthropometry import Person, make_person, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees
-from wholebody.figures.human import human_spec
-from wholebody.figures.human_pairs import body_pairs, collision_group, sphere_pairs
+from wholebody.figures.human.fingers import EFFORT, finger_angles
+from wholebody.figures.human.pairs import body_pairs, collision_group, sphere_pairs
+from wholebody.figures.human.spec import human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
@@ -53,7 +54,7 @@ def human_figure(
         InputError: an impossible body, or fingers in spheres.
         UnknownNameError: an unknown detail or dimension, or other hands.
     """
-    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
     return figure_of(human_spec(person, detail, hands), detail, person.sex)
 
 
@@ -71,7 +72,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
     rigid = drop_rigid_pairs(geometry)
     joints = {joint.name for joint in spec.joints if joint.axis is not None}
     segments = tuple(link.name for link in spec.links if link.mass)
-    fingers = [name for name in human_fingers.finger_angles("relaxed") if name in joints]
+    fingers = [name for name in finger_angles("relaxed") if name in joints]
     held = finger_degrees({}) if fingers else {}
     attitudes = {
         name: postures.Attitude({**held, **attitude.degrees}, attitude.pitch)
@@ -87,7 +88,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         collision_groups={segment: collision_group(segment) for segment in segments},
         effort={
             **{row["name"]: float(row["effort_weight"]) for row in table("joints")},
-            **dict.fromkeys(fingers, human_fingers.EFFORT),
+            **dict.fromkeys(fingers, EFFORT),
         },
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
         person=spec.person,
@@ -107,7 +108,7 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
         for finger in FINGERS:
-            shaped = human_fingers.finger_angles("relaxed", side)
+            shaped = finger_angles("relaxed", side)
             groups[f"{side}_{finger}"] = tuple(
                 name for name in shaped if name.startswith(f"{side}_{finger}_") and name in joints
             )
@@ -155,9 +156,9 @@ RIGID = ("spine", "neck2", "left_clavicle", "right_clavicle")
 """Beginnings of the names of the joints that the avatar does not have."""
 
 
-def avatar_spec(person: Body | None = None, detail: str = "capsules") -> BodySpec:
+def avatar_spec(person: Person | None = None, detail: str = "capsules") -> BodySpec:
     """Return the specification of an avatar; arguments as for the person."""
-    person = person or body()
+    person = person or make_person()
     whole = human_spec(person, detail)
     joints = tuple(with_values(joint, axis=None) if joint.name.startswith(RIGID) else joint for joint in whole.joints)
     return replace(whole, name="avatar", joints=joints)
@@ -177,5 +178,5 @@ def avatar_figure(
     Two arms and two legs of seven joints and a neck of three, on a rigid torso (Schmidl & Lin): the person with spine,
     shoulder girdle and upper neck fixed.
     """
-    person = proportioned(body(sex, stature, mass, percentile, age), proportions)
+    person = proportioned(make_person(sex, stature, mass, percentile, age), proportions)
     return figure_of(avatar_spec(person, detail), detail)

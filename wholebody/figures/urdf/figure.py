@@ -10,9 +10,9 @@ from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure, visual_of_links
-from wholebody.figures.urdf_extension import extended_figure
-from wholebody.figures.urdf_file import read_urdf
-from wholebody.figures.urdf_model import urdf_model
+from wholebody.figures.urdf.extension import extended_figure
+from wholebody.figures.urdf.file import read_urdf
+from wholebody.figures.urdf.model import urdf_model
 
 SAMPLES = 400
 """Number of random postures for finding pairs that always overlap."""
@@ -30,7 +30,7 @@ def urdf_figure(
 
     Args:
         path: the file.
-        root: "fixed" to the world, or "free"; if left out, as in the file (see `urdf_extension`), or "fixed".
+        root: "fixed" to the world, or "free"; if left out, as in the file (see `urdf.extension`), or "fixed".
         package_dirs: folders in which ``package://`` names are looked up, before the file's own parents and those of
             ROS_PACKAGE_PATH and AMENT_PREFIX_PATH.
         concavity: None for one convex hull for each mesh; or the concavity of the pieces of meshes, 0.01 (close) to 1,
