@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import faulthandler
 import gc
+import multiprocessing
 import os
 import signal
+import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
@@ -17,9 +21,9 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
-from wholebody import batches
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
+from wholebody.runner import Child, serve
 from wholebody.scene import Scene
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -185,13 +189,35 @@ def least_distance() -> Callable[..., float]:
     return _least_distance
 
 
-@pytest.fixture(scope="module")
-def one_process() -> Iterator[None]:
-    """Let batches of one job at a time use one child process throughout a module: each would start its own otherwise.
+@pytest.fixture(autouse=True, scope="module")
+def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fork the processes of jobs from that of the tests, which has imported everything: each saves a second.
 
-    A process that ends over a job is replaced as always. Changes of the environment reach it only until it begins.
+    A module that is about processes sets ``FROM_SCRATCH = True``: there they are new interpreters, as for users.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batches, "close_own_child", lambda: None)
+        if not getattr(request.module, "FROM_SCRATCH", False):
+            patch.setattr(Child, "_start", _start_warm)
         yield
-    batches.close_own_child()
+
+
+def _start_warm(child: Child) -> None:
+    """Start the process of a `Child` as `Child._start` does, as a fork of this one."""
+    ours, theirs = socket.socketpair()
+    context = multiprocessing.get_context("fork")
+    child._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+    arguments = (theirs, child._words.fileno(), child._environment, os.getpid())
+    child._process = context.Process(target=_serve_warm, args=arguments, daemon=True)
+    child._process.start()
+    theirs.close()
+    child._ear = Connection(ours.detach())
+
+
+def _serve_warm(connection: socket.socket, words: int, environment: dict[str, str], parent: int) -> None:
+    faulthandler.disable()  # jobs that crash on purpose would write of it into the output of the tests
+    os.environ.update(environment)
+    os.dup2(words, 1)
+    os.dup2(words, 2)
+    sys.stdout, sys.stderr = os.fdopen(1, "w", 1), os.fdopen(2, "w", 1)
+    serve(connection.detach(), parent)
+    os._exit(0)  # the process must not close resources of the parent

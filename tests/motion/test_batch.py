@@ -18,8 +18,6 @@ import wholebody as wb
 from wholebody.cli import main
 from wholebody.motion.batch_table import SHEET, TABLE
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 
 @pytest.fixture(scope="module")
 def human() -> wb.Figure:

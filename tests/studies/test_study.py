@@ -14,8 +14,6 @@ from tests.task_text import box, figure, hold, point
 from wholebody.cli.main import main
 from wholebody.studies.task_files import TaskFile
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 TASK = (
     figure("human")
     + box("post", [0.05, 0.05, 0.5], [1.5, 0.0, 0.25])
