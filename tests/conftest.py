@@ -13,7 +13,7 @@ import tempfile
 from collections.abc import Callable, Iterator
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import coal
 import numpy as np
@@ -21,10 +21,13 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
+from wholebody.errors import WholebodyError
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.runner import Child, serve
 from wholebody.scene import Scene
+from wholebody.view import screenshot
+from wholebody.view.browser import Browser, find_chromium
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -221,3 +224,35 @@ def _serve_warm(connection: socket.socket, words: int, environment: dict[str, st
     sys.stdout, sys.stderr = os.fdopen(1, "w", 1), os.fdopen(2, "w", 1)
     serve(connection.detach(), parent)
     os._exit(0)  # the process must not close resources of the parent
+
+
+class KeptBrowser(Browser):
+    """A browser that is not ended when it is closed but serves the next one who starts one: to start takes seconds."""
+
+    idle: ClassVar[list[Browser]] = []
+
+    @classmethod
+    def start(cls) -> Browser:
+        """Return an idle browser, or a new one."""
+        return cls.idle.pop() if cls.idle and find_chromium() else cls()
+
+    def close(self) -> None:
+        """Empty the page, and keep the browser."""
+        try:
+            self.visit("about:blank")
+        except WholebodyError:
+            super().close()
+        else:
+            self.idle.append(self)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def kept_browsers() -> Iterator[None]:
+    """Let pictures be drawn by browsers that were started before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(screenshot, "Browser", KeptBrowser.start)
+        os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process
+        yield
+    for browser in KeptBrowser.idle:
+        Browser.close(browser)
+    KeptBrowser.idle.clear()
