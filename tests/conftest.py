@@ -87,6 +87,7 @@ def pytest_collection_finish() -> None:
     """Leave what was imported and collected out of the garbage collector: it is looked through often, and stays."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # what is imported later stays too
 
 
 @pytest.fixture(scope="session")
