@@ -15,6 +15,12 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
 
+from wholebody.runner import ONE_THREAD, Child, serve
+
+# Before numpy is loaded, and for workers and child processes too. Threads of linear algebra wait by computing, which
+# takes three times the processor's time of the computation itself where workers share two cores.
+os.environ.update({name: os.environ.get(name, one) for name, one in ONE_THREAD.items()})
+
 import coal
 import numpy as np
 import pinocchio as pin
@@ -24,7 +30,6 @@ from hypothesis import HealthCheck, settings
 from wholebody.errors import WholebodyError
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
-from wholebody.runner import Child, serve
 from wholebody.scene import Scene
 from wholebody.view import screenshot
 from wholebody.view.browser import Browser, find_chromium
