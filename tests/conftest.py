@@ -53,18 +53,15 @@ sys.dont_write_bytecode = False
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 LONG = (
-    *("motion/test_batch.py", "bench/compare/test_run.py", "test_odd_arguments.py", "examples/test_examples.py"),
-    *("tracking/test_moving_things.py", "bench/test_commands.py", "motion/test_avoidance.py"),
-    *("dynamics/test_scenes.py", "test_compiled.py", "docs/test_pages.py", "methods/newton/test_method.py"),
-    *("view/test_live_page.py", "view/surface/test_surface.py", "test_threads.py", "tracking/test_scenes.py"),
-    *(
-        "tracking/test_dragging.py",
-        "cli/test_commands.py",
-        "motion/test_grips.py",
-        "motion/test_dynamics.py",
-        "studies/test_many.py",
-    ),
-    *("bench/attack/test_running.py", "bench/compare/test_report.py", "studies/test_study.py", "bench/test_motion.py"),
+    *("examples/test_examples.py", "view/test_live_page.py", "motion/test_avoidance.py", "cli/test_show.py"),
+    *("tracking/test_moving_things.py", "test_odd_arguments.py", "view/test_page.py", "docs/test_pages.py"),
+    *("test_compiled.py", "view/test_files.py", "dynamics/test_scenes.py", "bench/compare/test_jobs.py"),
+    *("methods/newton/test_method.py", "figures/test_human_fingers.py", "bench/compare/test_report.py"),
+    *("doctor/test_checks.py", "bench/problem_sets/test_cases.py", "cli/test_commands.py", "view/test_human.py"),
+    *("tracking/test_scenes.py", "test_threads.py", "geometry/test_convex.py", "bench/test_commands.py"),
+    *("bench/stability/test_catalogue.py", "bench/compare/test_run.py", "test_batches.py", "motion/test_batch.py"),
+    *("tracking/test_dragging.py", "motion/bisection/test_method.py", "bench/attack/test_running.py"),
+    *("view/test_legend.py", "methods/test_contradictions.py"),
 )
 """Files that take over six seconds of the processor, and longer by the clock: they begin first.
 
