@@ -31,8 +31,8 @@ from wholebody.errors import WholebodyError
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene import Scene
-from wholebody.view import screenshot
-from wholebody.view.browser import Browser, find_chromium
+from wholebody.view import browser, screenshot
+from wholebody.view.browser import Browser
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -237,7 +237,7 @@ class KeptBrowser(Browser):
     @classmethod
     def start(cls) -> Browser:
         """Return an idle browser, or a new one."""
-        return cls.idle.pop() if cls.idle and find_chromium() else cls()
+        return cls.idle.pop() if cls.idle and browser.find_chromium() else cls()
 
     def close(self) -> None:
         """Empty the page, and keep the browser."""
@@ -256,6 +256,6 @@ def kept_browsers() -> Iterator[None]:
         patch.setattr(screenshot, "Browser", KeptBrowser.start)
         os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process
         yield
-    for browser in KeptBrowser.idle:
-        Browser.close(browser)
+    for kept in KeptBrowser.idle:
+        Browser.close(kept)
     KeptBrowser.idle.clear()
