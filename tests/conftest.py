@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+import faulthandler
 import gc
+import multiprocessing
 import os
 import signal
+import socket
 import sys
 import tempfile
 from collections.abc import Callable, Iterator
+from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+
+from wholebody.runner import ONE_THREAD, Child, serve
+
+# Before numpy is loaded, and for workers and child processes too. Threads of linear algebra wait by computing, which
+# takes three times the processor's time of the computation itself where workers share two cores.
+os.environ.update({name: os.environ.get(name, one) for name, one in ONE_THREAD.items()})
 
 import coal
 import numpy as np
@@ -17,10 +27,12 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
-from wholebody import batches
+from wholebody.errors import WholebodyError
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
 from wholebody.scene import Scene
+from wholebody.view import browser, screenshot
+from wholebody.view.browser import Browser
 
 ROOT = Path(__file__).resolve().parent.parent
 
@@ -41,18 +53,15 @@ sys.dont_write_bytecode = False
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 LONG = (
-    *("motion/test_batch.py", "bench/compare/test_run.py", "test_odd_arguments.py", "examples/test_examples.py"),
-    *("tracking/test_moving_things.py", "bench/test_commands.py", "motion/test_avoidance.py"),
-    *("dynamics/test_scenes.py", "test_compiled.py", "docs/test_pages.py", "methods/newton/test_method.py"),
-    *("view/test_live_page.py", "view/surface/test_surface.py", "test_threads.py", "tracking/test_scenes.py"),
-    *(
-        "tracking/test_dragging.py",
-        "cli/test_commands.py",
-        "motion/test_grips.py",
-        "motion/test_dynamics.py",
-        "studies/test_many.py",
-    ),
-    *("bench/attack/test_running.py", "bench/compare/test_report.py", "studies/test_study.py", "bench/test_motion.py"),
+    *("examples/test_examples.py", "view/test_live_page.py", "motion/test_avoidance.py", "cli/test_show.py"),
+    *("tracking/test_moving_things.py", "test_odd_arguments.py", "view/test_page.py", "docs/test_pages.py"),
+    *("test_compiled.py", "view/test_files.py", "dynamics/test_scenes.py", "bench/compare/test_jobs.py"),
+    *("methods/newton/test_method.py", "figures/test_human_fingers.py", "bench/compare/test_report.py"),
+    *("doctor/test_checks.py", "bench/problem_sets/test_cases.py", "cli/test_commands.py", "view/test_human.py"),
+    *("tracking/test_scenes.py", "test_threads.py", "geometry/test_convex.py", "bench/test_commands.py"),
+    *("bench/stability/test_catalogue.py", "bench/compare/test_run.py", "test_batches.py", "motion/test_batch.py"),
+    *("tracking/test_dragging.py", "motion/bisection/test_method.py", "bench/attack/test_running.py"),
+    *("view/test_legend.py", "methods/test_contradictions.py"),
 )
 """Files that take over six seconds of the processor, and longer by the clock: they begin first.
 
@@ -80,6 +89,7 @@ def pytest_collection_finish() -> None:
     """Leave what was imported and collected out of the garbage collector: it is looked through often, and stays."""
     gc.collect()
     gc.freeze()
+    gc.set_threshold(20_000, 20, 20)  # what is imported later stays too
 
 
 @pytest.fixture(scope="session")
@@ -185,13 +195,67 @@ def least_distance() -> Callable[..., float]:
     return _least_distance
 
 
-@pytest.fixture(scope="module")
-def one_process() -> Iterator[None]:
-    """Let batches of one job at a time use one child process throughout a module: each would start its own otherwise.
+@pytest.fixture(autouse=True, scope="module")
+def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Fork the processes of jobs from that of the tests, which has imported everything: each saves a second.
 
-    A process that ends over a job is replaced as always. Changes of the environment reach it only until it begins.
+    A module that is about processes sets ``FROM_SCRATCH = True``: there they are new interpreters, as for users.
     """
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(batches, "close_own_child", lambda: None)
+        if not getattr(request.module, "FROM_SCRATCH", False):
+            patch.setattr(Child, "_start", _start_warm)
         yield
-    batches.close_own_child()
+
+
+def _start_warm(child: Child) -> None:
+    """Start the process of a `Child` as `Child._start` does, as a fork of this one."""
+    ours, theirs = socket.socketpair()
+    context = multiprocessing.get_context("fork")
+    child._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+    arguments = (theirs, child._words.fileno(), child._environment, os.getpid())
+    child._process = context.Process(target=_serve_warm, args=arguments, daemon=True)
+    child._process.start()
+    theirs.close()
+    child._ear = Connection(ours.detach())
+
+
+def _serve_warm(connection: socket.socket, words: int, environment: dict[str, str], parent: int) -> None:
+    faulthandler.disable()  # jobs that crash on purpose would write of it into the output of the tests
+    os.environ.update(environment)
+    os.dup2(words, 1)
+    os.dup2(words, 2)
+    sys.stdout, sys.stderr = os.fdopen(1, "w", 1), os.fdopen(2, "w", 1)
+    serve(connection.detach(), parent)
+    os._exit(0)  # the process must not close resources of the parent
+
+
+class KeptBrowser(Browser):
+    """A browser that is not ended when it is closed but serves the next one who starts one: to start takes seconds."""
+
+    idle: ClassVar[list[Browser]] = []
+
+    @classmethod
+    def start(cls) -> Browser:
+        """Return an idle browser, or a new one."""
+        return cls.idle.pop() if cls.idle and browser.find_chromium() else cls()
+
+    def close(self) -> None:
+        """Empty the page, and keep the browser."""
+        try:
+            self.visit("about:blank")
+        except WholebodyError:
+            super().close()
+        else:
+            self.idle.append(self)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def kept_browsers() -> Iterator[None]:
+    """Let pictures be drawn by browsers that were started before."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(screenshot, "Browser", KeptBrowser.start)
+        os.register_at_fork(after_in_child=KeptBrowser.idle.clear)  # a browser listens to one process
+        yield
+    for kept in KeptBrowser.idle:
+        Browser.close(kept)
+    KeptBrowser.idle.clear()

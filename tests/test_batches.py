@@ -66,6 +66,8 @@ SCRIPT = """
 import os, pathlib, sys, time
 from wholebody.batches import run_batch
 from wholebody.runner import Job
+
+FROM_SCRATCH = True
 def works(folder, k):
     (pathlib.Path(folder) / f"{os.getpid()}.pid").write_text("")
     time.sleep(60.0)

@@ -30,8 +30,6 @@ from wholebody.view import Viewer
 from wholebody.view.parts import Part, Parts
 from wholebody.view.timeline import timeline
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 ROOT = Path(__file__).resolve().parent.parent
 CIRCLE: list[Any] = []
 CIRCLE.append(CIRCLE)

@@ -16,6 +16,8 @@ import pytest
 from wholebody import runner
 from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, allow_processor, processor_time, run_jobs, tell
 
+FROM_SCRATCH = True
+
 
 @pytest.fixture(params=[False, True], ids=["new", "forked"])
 def child(request: pytest.FixtureRequest) -> Iterator[Child]:

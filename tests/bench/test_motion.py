@@ -18,8 +18,6 @@ from wholebody.cli import main
 from wholebody.motion import avoidance
 from wholebody.motion.ready_equipment import dressed
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 NAME = "sword cut"
 
 

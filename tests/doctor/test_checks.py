@@ -8,6 +8,8 @@ import pytest
 
 from wholebody.doctor import checks
 
+FROM_SCRATCH = True
+
 
 def test_what_works_works_and_what_fails_says_why() -> None:
     outcomes = checks.run("import", ["json", "no_such_module"])

@@ -123,7 +123,7 @@ def test_several_processes_write_one_entry_at_once(folder: Path) -> None:
         "    found = cached((str(k % 4).encode(),), 's', 'm', lambda: mesh_hull(ball.vertices, ball.faces))\n"
         "    assert len(found.pieces) == 1\n"
     )
-    running = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(3)]
-    assert [process.wait(120) for process in running] == [0, 0, 0]
+    running = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
+    assert [process.wait(120) for process in running] == [0, 0]
     assert cache_state().entries == 4
     assert not list(folder.glob("*.part"))

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import json
+import multiprocessing
 import os
 import signal
-import subprocess
 import sys
 import time
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -17,8 +18,6 @@ import pytest
 import wholebody as wb
 from wholebody.cli import main
 from wholebody.motion.batch_table import SHEET, TABLE
-
-pytestmark = pytest.mark.usefixtures("one_process")
 
 
 @pytest.fixture(scope="module")
@@ -97,21 +96,31 @@ def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Pa
         assert not out.exists()
 
 
+def told_to(command: list[str], said: Path) -> None:
+    """Give a command in a process of its own, forked from this one."""
+    os.setsid()
+    with said.open("w") as file, redirect_stdout(file):
+        code = main(command)
+    sys.exit(code)
+
+
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_batch_that_is_ended_goes_on(how: signal.Signals, clip: wb.Clip, tmp_path: Path) -> None:
     """No half file is left, and the case that was made before is not made again."""
     files = [str(clip[k:].write(tmp_path / f"part{k}.npz")) for k in range(3)]
     command = ["clip", "avoid", *files, "--method", "fade", "--out", str(tmp_path / "out")]
-    code = f"import sys; from wholebody.cli import main; sys.exit(main({command!r}))"
-    run = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, start_new_session=True, text=True)
+    run = multiprocessing.get_context("fork").Process(target=told_to, args=(command, tmp_path / "said"))
+    run.start()
     table, ends = tmp_path / "out" / SHEET, time.monotonic() + 120.0
     while not (table.exists() and len(table.read_text().splitlines()) > 1):
         assert time.monotonic() < ends
         time.sleep(0.05)
-    os.kill(run.pid, how)
-    said = run.communicate(timeout=60.0)[0]
-    if run.returncode == 130:
-        assert "the same command goes on" in said
+    os.kill(run.pid or 0, how)
+    run.join(60.0)
+    if run.exitcode == 130:
+        assert "the same command goes on" in (tmp_path / "said").read_text()
+    else:
+        assert run.exitcode == (0 if how == signal.SIGINT else -how)  # it was over before
     before = {path.name: path.stat().st_mtime_ns for path in (tmp_path / "out").glob("*.npz")}
     for name in before:
         wb.read_clip(tmp_path / "out" / name, clip.figure)

@@ -15,8 +15,6 @@ from wholebody.cli.main import main
 from wholebody.studies.study_file import read_study
 from wholebody.studies.task_files import TaskFile
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 TASK = (
     figure("human")
     + box("post", [0.05, 0.05, 0.5], [1.5, 0.0, 0.25])

@@ -26,7 +26,7 @@ SCRIPTS = {
     3: "raise ZeroDivisionError('by nothing')\n",
     4: "import wholebody as wb\nwb.Sphere(-1.0)\n",
     5: RIGHT,
-    6: f"import time\ntime.sleep(1.5)\n{RIGHT}",  # as where others have the processor
+    6: f"import time\ntime.sleep(0.7)\n{RIGHT}",  # as where others have the processor
 }
 FACTS = {"wholebody": "0"}
 
@@ -70,7 +70,7 @@ def cases() -> Iterator[Case]:
 @pytest.mark.usefixtures("scripted")
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_the_attack_goes_on_after_hangs_crashes_and_errors(jobs: int) -> None:
-    found = {ended.case.number: ended for ended in attack(cases(), jobs, lambda: True, deadline=1.0)}
+    found = {ended.case.number: ended for ended in attack(cases(), jobs, lambda: True, deadline=0.4)}
     outcomes = {number: ended.verdict.outcome for number, ended in found.items()}
     assert outcomes == {0: "right", 1: "wrong", 2: "wrong", 3: "wrong", 4: "refused", 5: "right", 6: "right"}
     assert "hangs" in found[1].verdict.words

@@ -9,6 +9,8 @@ import pytest
 from wholebody.batches import close_own_child
 from wholebody.bench.compare.jobs import Task, work
 
+FROM_SCRATCH = True
+
 
 def test_what_a_method_compiles_is_not_taken_for_what_its_solves_cost(
     fakes: ModuleType, monkeypatch: pytest.MonkeyPatch

@@ -18,8 +18,6 @@ from wholebody.bench.statistics import Interval
 from wholebody.cli import main
 from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
 FIGURES = {
     ("robot_arm", "qp", "solved"): Interval(0.98, 0.95, 0.99),

@@ -19,8 +19,6 @@ from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import NAME, Store
 from wholebody.errors import InputError, WholebodyError
 
-pytestmark = pytest.mark.usefixtures("one_process")
-
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
 CAP = 1.0  # s of the processor: much more than a solve takes
 SHORT = 0.1  # s of the processor: of a method that does not come back; by the clock it is ten times as much

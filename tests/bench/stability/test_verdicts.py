@@ -107,7 +107,7 @@ def sleeps(problem: Problem) -> np.ndarray:
 
 
 def waits(problem: Problem) -> np.ndarray:
-    time.sleep(1.5)
+    time.sleep(0.8)
     return start(problem)
 
 
@@ -132,14 +132,14 @@ def test_a_refusal(fake: Fakes) -> None:
 
 
 def test_hanging(fake: Fakes) -> None:
-    found = verdict("conflict", fake(computes), cap=1.0)
+    found = verdict("conflict", fake(computes), cap=0.3)
     assert (found.kind, found.brief) == ("wrong", "hangs")
     assert verdict("conflict", fake(sleeps), cap=0.3).brief == "hangs"
 
 
 def test_waiting_is_no_hanging(fake: Fakes) -> None:
     """Others' work on the machine, which makes a method wait, ends no answer: its limit is of the processor."""
-    assert verdict("conflict", fake(waits), cap=1.0).kind == "honest"
+    assert verdict("conflict", fake(waits), cap=0.5).kind == "honest"
 
 
 def test_crashing(fake: Fakes) -> None:
