@@ -17,13 +17,15 @@ from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress
+from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection import method as method_module
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
-from wholebody.motion.bisection.prediction import path_planes
+from wholebody.motion.bisection.prediction import Predictor, path_planes
 from wholebody.motion.bisection.recursion import SHORT
 from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.ready_equipment import equipment
 
 DEEP = 1e-4  # m
@@ -139,6 +141,22 @@ def test_a_ring_as_it_stands_is_left_free_between_frames_too(swing: Clip) -> Non
     assert result.message == ""
     assert depths(scene, result.q).max() <= DEEP
     assert between(scene, result.q) <= DEEP
+
+
+def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figure) -> None:
+    """They stand in each other by 4 cm and are held 1 mm apart: with 5 mm of room every posture missed a hold."""
+    close = {"left_hip_abduction": -0.06, "right_hip_abduction": -0.06}
+    q, scene = person.with_joints(person.posture("standing"), close), dressed(person, "pouches")
+    terms = frame_terms(scene, np.array([q] * 9), 1 / 30, [wb.StanceFeet()])
+    with scene.borrow() as workspace:
+        method = QP(restarts=0, iterations=50)
+        found = Predictor(scene, terms.q, terms, ("root",), method, 0.005, 5e-5, workspace).predict(4, q)
+    assert found.good
+    assert depths(scene, found.q[None])[0] <= 5e-5
+    state = scene.state(found.q)
+    for foot in terms.feet(4):
+        held = foot.resolve(scene, q).kept_at.translation
+        np.testing.assert_allclose(state.frame(person.frame_id(foot.frame)).translation, held, atol=2e-4)
 
 
 def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> None:

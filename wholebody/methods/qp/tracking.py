@@ -354,28 +354,34 @@ class QPTracker(OfOneRun):
         problem = self.problem
         self._program = StepProgram(problem, self.workspace, self._working_set, self.dt)
         self._lineariser = problem.lineariser(self.workspace, self.dt)
-        self._goals = self._signatures()
+        self._goals, self._constraints = self._of_goals(), self._of_constraints()
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
-        anew = (
-            problem.constraints is not own.constraints
-            or problem.bounds is not own.bounds
-            or problem.measures is not own.measures
-        )
+        anew = problem.bounds is not own.bounds or problem.measures is not own.measures
         if not anew:
-            moved = problem.goals is not own.goals
-            own.take(problem.goals, problem.clearances)
-            anew = moved and self._signatures() != self._goals
+            moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
+            own.take(problem.goals, problem.clearances, problem.constraints)
+            anew = (moved and self._of_goals() != self._goals) or (held and not self._held())
         if anew:
             self._set_up()
             self._working_set.reset()
 
-    def _signatures(self) -> list[tuple[type, float, int]]:
+    def _held(self) -> bool:
+        """Take constraints that moved; False where others are to be held, or by other bounds."""
+        return self._of_constraints() == self._constraints and self._program.hold(self.problem.constraints)
+
+    def _of_goals(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
-        rows = self._lineariser.goal_rows()
-        return [(type(goal), goal.weight, count) for goal, count in zip(self._lineariser.goals, rows, strict=True)]
+        own = self._lineariser
+        return [(type(goal), goal.weight, rows) for goal, rows in zip(own.goals, own.rows(), strict=False)]
+
+    def _of_constraints(self) -> list[tuple[type, bytes, bytes, int]]:
+        """And kind, bounds and number of rows of each constraint."""
+        terms, rows = self._lineariser.constraints, self._lineariser.rows()[len(self._lineariser.goals) :]
+        bounds = [(np.asarray(term.lower).tobytes(), np.asarray(term.upper).tobytes()) for term in terms]
+        return [(type(term), *each, count) for term, each, count in zip(terms, bounds, rows, strict=True)]
 
 
 def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequence[QPStep], dt: float) -> QPStep:
