@@ -125,12 +125,10 @@ class QPTracker(OfOneRun):
             InputError: dt is not a positive finite number.
         """
         self.problem = check_problem(problem, "tracker: problem")
-        self.dt = time_step(dt, "dt")
-        self._method, self._minimising = method, minimising
+        self.dt, self._method, self._minimising = time_step(dt, "dt"), method, minimising
         solver.load()  # not in the middle of a drag
         compiled_escape()
-        self._working_set = WorkingSet(solver)
-        self._query_distance = LEAST_WITHIN
+        self._working_set, self._query_distance = WorkingSet(solver), LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
@@ -351,9 +349,8 @@ class QPTracker(OfOneRun):
 
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
-        problem = self.problem
-        self._program = StepProgram(problem, self.workspace, self._working_set, self.dt)
-        self._lineariser = problem.lineariser(self.workspace, self.dt)
+        self._program = StepProgram(self.problem, self.workspace, self._working_set, self.dt)
+        self._lineariser = self.problem.lineariser(self.workspace, self.dt)
         self._goals, self._constraints = self._of_goals(), self._of_constraints()
 
     def _renew(self) -> None:
