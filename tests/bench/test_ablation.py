@@ -45,9 +45,9 @@ def test_whole_numbers_stay_whole_and_at_least_one() -> None:
 
 def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     constant = Constant("wholebody.methods.contradictions", "NEAREST", contradictions.NEAREST)
-    places = ablation._places(constant)
+    places = ablation.places(constant)
     assert len(places) > 1
-    with ablation._replaced(places, 7.0):
+    with ablation.replaced(places, 7.0):
         assert all(getattr(owner, name) == 7.0 for owner, name in places)
     assert all(getattr(owner, name) == constant.value for owner, name in places)
 

@@ -39,7 +39,7 @@ RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
 NEAR = 0.03  # m: pairs nearer than this have rows
 ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond the others; it doubles
 MOST_ROOM = 5e-3  # m
-THROUGH = 0.05  # m: no rows free a deeper dip, of a limb that goes right through; less = more frames that are followed
+THROUGH = 0.06  # m, as thick as a forearm: no rows free a deeper dip, of a limb that goes right through
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
