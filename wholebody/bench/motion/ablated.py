@@ -167,9 +167,11 @@ def ablation(
     rows: list[Row] = []
     for module in only:
         mine = [case for case in cases if case[2] in USED[module]]
+        if not mine:
+            continue
         before = _together([whole[case] for case in mine])
         for constant in constants_in([f"wholebody.motion.{module}"])[0]:
-            for change, factor in FACTORS.items() if constant.name not in INPUTS and mine else ():
+            for change, factor in FACTORS.items() if constant.name not in INPUTS else ():
                 value = constant.times(factor)
                 if value != constant.value:
                     with replaced(places(constant), value):
