@@ -95,7 +95,7 @@ class Row:
         free: clips that are free.
         deepest_mm, deviation, jerk, sliding_mm: sums over the cases.
         programs: of all cases.
-        seconds: of the processor, of the time without the change; noise is a tenth.
+        seconds: of the processor, of the time without the change; noisy on a busy machine.
     """
 
     what: str
