@@ -155,8 +155,8 @@ class Lineariser:
         self._most: Array | None = None
         self.take(goals, clearances)
 
-    def take(self, goals: Sequence[Goal], clearances: Array) -> None:
-        """Put other goals and clearances in the place of the present ones.
+    def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> None:
+        """Put other goals and clearances in the place of the present ones, and other constraints where they are given.
 
         Raises:
             InputError: there is not one clearance for each pair.
@@ -164,8 +164,10 @@ class Lineariser:
         if clearances.shape != (len(self.workspace.table.pairs),):
             count = len(self.workspace.table.pairs)
             raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
-        if goals is not self.goals:
-            before, self._plan = self._plan, self._again(self._plan, goals)
+        others = None if constraints is self.constraints else constraints
+        if goals is not self.goals or others is not None:
+            self.constraints = self.constraints if others is None else others
+            before, self._plan = self._plan, self._again(self._plan, goals, others)
             if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
                 self._term_wrench, self._packed = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
         self.goals, self.clearances = goals, clearances
@@ -178,12 +180,12 @@ class Lineariser:
         """The terms as arrays."""
         return self._plan
 
-    def goal_rows(self) -> list[int]:
-        """How many rows each goal has."""
+    def rows(self) -> list[int]:
+        """How many rows each goal, and then each constraint, has."""
         others = iter(self._plan.others)
         return [
             next(others).rows if entries is None else sum(entry.rows for entry in entries)
-            for entries in self._plan.goals
+            for entries in (*self._plan.goals, *self._plan.constraints)
         ]
 
     def relaxed(self, depth: float) -> Lineariser:
@@ -274,9 +276,11 @@ class Lineariser:
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
         return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
 
-    def _again(self, plan: TermPlan, goals: Sequence[Goal]) -> TermPlan:
-        """The plan with other goals; made anew where they, or terms of one's own, have other rows than before."""
-        again = plan.with_goals(goals, self.state.model)
+    def _again(
+        self, plan: TermPlan, goals: Sequence[Goal], constraints: Sequence[Constraint] | None = None
+    ) -> TermPlan:
+        """The plan with other terms; made anew where they, or terms of one's own, have other rows than before."""
+        again = plan.with_terms(goals, self.state.model, constraints)
         if again is None or any(np.size(term.value(self.state)) != term.rows for term in again.others):
             return self._planned(goals)
         return again
@@ -343,10 +347,16 @@ class ConstraintValues:
         """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
         self._kernel = compiled_kernel()
         self._plan = plan = make_plan(_NO_LIMITS, (), constraints, (), (), None, state)
-        rows, nv = plan.value_rows, state.model.nv
+        self._model, rows, nv = state.model, plan.value_rows, state.model.nv
         self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
         self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
         self._no_squares = np.zeros((0, nv))
+
+    def take(self, constraints: Sequence[Constraint]) -> bool:
+        """Put others in their place; False, and nothing is done, where these are not of the same classes and frames."""
+        plan = self._plan.with_terms((), self._model, constraints)
+        self._plan = self._plan if plan is None else plan
+        return plan is not None
 
     def at(self, state: State) -> Array:
         """The values (c,) where a state is; overwritten by the next call."""

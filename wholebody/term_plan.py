@@ -76,6 +76,7 @@ class TermPlan(NamedTuple):
         other_bounds: bounds of other classes.
         other_measures: measures of other classes.
         goals: entries of each goal; None for one of another class.
+        constraints: the same of each constraint.
     """
 
     floats: Array
@@ -88,43 +89,54 @@ class TermPlan(NamedTuple):
     other_bounds: tuple[Bound, ...]
     other_measures: tuple[Measure, ...]
     goals: tuple[list[Entry] | None, ...]
+    constraints: tuple[list[Entry] | None, ...]
 
     @property
     def squares(self) -> int:
         """Number of squares that built-in measures are the sum of."""
         return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1] + 3 * self.layout[BALL, 1])
 
-    def with_goals(self, goals: Sequence[Goal], model: pin.Model) -> TermPlan | None:
-        """The plan with other goals, or None where they are not of the same classes for the same frames.
+    def with_terms(
+        self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
+    ) -> TermPlan | None:
+        """The plan with other terms, or None where they are not of the same classes for the same frames.
 
         Args:
             goals: resolved goals.
             model: Pinocchio's model.
+            constraints: resolved constraints; None to keep those that it has.
         """
-        if len(goals) != len(self.goals):
+        terms: list[Goal | Constraint] = [*goals, *(constraints or ())]
+        old = self.goals if constraints is None else (*self.goals, *self.constraints)
+        if len(goals) != len(self.goals) or len(terms) != len(old):
             return None
         floats = self.floats.copy()
         filled = dict.fromkeys(WIDTHS, 0)
         found: list[list[Entry] | None] = []
         others = list(self.others)
         number = 0
-        for goal, known in zip(goals, self.goals, strict=True):
-            entries = entries_of(goal, model)
+        for term, known in zip(terms, old, strict=True):
+            entries = entries_of(term, model)
             found.append(entries)
             if entries is None or known is None:
-                if entries is not known or type(goal) is not type(others[number].term):
+                if entries is not known or type(term) is not type(others[number].term):
                     return None
-                others[number] = with_values(others[number], term=goal, value=goal.error)
+                value = term.error if isinstance(term, Goal) else term.value
+                others[number] = with_values(others[number], term=term, value=value)
                 number += 1
                 continue
             if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
                 return None
-            for entry in entries:
+            for entry, before in zip(entries, known, strict=True):
+                if not np.array_equal(entry.edges, before.edges):
+                    return None
                 start, _, columns = self.layout[entry.table, :3].tolist()
                 place = start + columns * filled[entry.table]
                 floats[place : place + columns] = entry.floats
                 filled[entry.table] += 1
-        return with_values(self, floats=floats, goals=tuple(found), others=tuple(others))
+        kept = self.constraints if constraints is None else tuple(found[len(goals) :])
+        goal_entries = tuple(found[: len(goals)])
+        return with_values(self, floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
 
 
 def make_plan(
@@ -170,8 +182,7 @@ def make_plan(
 
     goal_entries = tuple(add(goal, goal.error) for goal in goals)
     goal_rows = row
-    for constraint in constraints:
-        add(constraint, constraint.value)
+    constraint_entries = tuple(add(constraint, constraint.value) for constraint in constraints)
     parts[BOX], other_bounds = _boxes(bounds, state, dt)
     other_measures, curvature = _measures(measures, model, parts)
     parts[CURVATURE] = [((0,), curvature)]
@@ -198,7 +209,7 @@ def make_plan(
     floats, integers, layout = _packed(parts)
     return TermPlan(
         floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
-        other_bounds, other_measures, goal_entries,
+        other_bounds, other_measures, goal_entries, constraint_entries,
     )  # fmt: skip
 
 

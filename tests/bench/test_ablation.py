@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 import wholebody as wb
 from wholebody.bench import ablation
 from wholebody.bench.ablation import Constant, Row, report
+from wholebody.bench.motion import ablated
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.methods import contradictions, starts
+from wholebody.motion import per_frame
+
+CHANGES = ("free", "deepest_mm", "deviation", "jerk", "sliding_mm", "programs")
 
 
 @pytest.fixture(scope="module")
@@ -45,9 +51,9 @@ def test_whole_numbers_stay_whole_and_at_least_one() -> None:
 
 def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
     constant = Constant("wholebody.methods.contradictions", "NEAREST", contradictions.NEAREST)
-    places = ablation._places(constant)
+    places = ablation.places(constant)
     assert len(places) > 1
-    with ablation._replaced(places, 7.0):
+    with ablation.replaced(places, 7.0):
         assert all(getattr(owner, name) == 7.0 for owner, name in places)
     assert all(getattr(owner, name) == constant.value for owner, name in places)
 
@@ -71,3 +77,25 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
 def test_every_mechanism_that_is_switched_off_is_there() -> None:
     for owner, attribute, _ in ablation.mechanisms("qp").values():
         assert callable(getattr(owner, attribute))
+
+
+def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods(monkeypatch) -> None:
+    monkeypatch.setattr(ablated, "USED", {"per_frame": ("frames",), "bisection.method": ("bisection",)})
+    told: list[str] = []
+    figure = wb.load("human")
+    whole, rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
+    assert whole.free == (True,)
+    assert [row.what for row in rows[::2]] == ["per_frame.MARGIN", "per_frame.ROOM", "per_frame.LIFTS"]
+    assert {row.change for row in rows} == {"halved", "doubled"}
+    assert per_frame.MARGIN == 0.3
+    by_name = {(row.what, row.change): row for row in rows}
+    assert by_name["per_frame.MARGIN", "doubled"].differ == 1  # more frames are passed
+    text = ablated.report([*rows, replace(rows[0], what="x.Y", **dict.fromkeys(CHANGES, 0))])
+    assert "`per_frame.MARGIN`" in text
+    assert "nothing on these cases: " in text
+    assert "`x.Y`" in text.split("nothing on these cases: ")[1]
+
+
+def test_the_modules_whose_constants_are_changed_have_some() -> None:
+    for module in ablated.USED:
+        assert ablation.constants_in([f"wholebody.motion.{module}"])[0], module

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
@@ -37,6 +38,22 @@ def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar
     gap = int(np.argmax(before.between))
     far = np.abs(np.arange(len(clip)) - gap) > 24  # the widest window that is tried
     np.testing.assert_array_equal(q[far], clip.q[far])
+
+
+def test_a_limb_that_goes_right_through_is_kept_on_one_side_before_rows_are_tried(
+    planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No rows free it: twenty programs were solved in vain."""
+    monkeypatch.setattr("wholebody.motion.repair.WindowProgram", None)
+    shoulder = np.concatenate([np.linspace(-0.9, -0.3, 20), np.linspace(0.3, 0.9, 20)])
+    figure = planar_arm((0.5, 0.5), radius=0.03)
+    clip, scene = wb.Clip(figure, np.stack([shoulder, np.full(40, 0.1)], axis=1), DT), wb.Scene(figure)
+    scene.add(wb.Sphere(0.04), name="pole", at=(0.9, 0.0, 0.0))
+    before = wb.check(clip, scene)
+    assert (before.colliding, before.dips) == (0, 1)
+    assert before.deepest_between > 0.06
+    q, _ = repaired(clip, scene, clip.q)
+    assert wb.check(clip.with_q(q), scene).free
 
 
 def test_where_nothing_is_wrong_nothing_is_computed(planar_arm: Callable[..., Figure]) -> None:

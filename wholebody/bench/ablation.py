@@ -10,7 +10,7 @@ import math
 import pkgutil
 import re
 import sys
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -94,9 +94,14 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
     package = import_module(f"wholebody.methods.{method}")
     names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
     names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
+    return constants_in((*names, *SHARED))
+
+
+def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
+    """Constants of modules by name, and those modules whose constants are compiled in; see `constants`."""
     found: list[Constant] = []
     compiled: list[str] = []
-    for name in (*names, *SHARED):
+    for name in modules:
         try:
             module = import_module(name)
         except ModuleNotFoundError as missing:
@@ -155,13 +160,13 @@ def ablation(
         tell(f"{what}, {change}: {rows[-1].differ} differ, {rows[-1].solved:+d} solved")
 
     for name, (owner, attribute, instead) in mechanisms.items():
-        with _replaced([(owner, attribute)], instead):
+        with replaced([(owner, attribute)], instead):
             note(name, "off")
     for constant in constants(method)[0]:
         for change, factor in FACTORS.items():
             value = constant.times(factor)
             if value != constant.value:
-                with _replaced(_places(constant), value):
+                with replaced(places(constant), value):
                     note(f"{constant.module.removeprefix('wholebody.methods.')}.{constant.name}", change)
     return whole, rows
 
@@ -200,7 +205,7 @@ def _is_number(value: Any) -> bool:
     )
 
 
-def _places(constant: Constant) -> list[tuple[Any, str]]:
+def places(constant: Constant) -> list[tuple[Any, str]]:
     """The module of a constant, and those that import it by its name."""
     owner = sys.modules[constant.module]
     others = [
@@ -213,7 +218,7 @@ def _places(constant: Constant) -> list[tuple[Any, str]]:
 
 
 @contextmanager
-def _replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
+def replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
     """Put something in the place of attributes for a while."""
     before = [getattr(owner, name) for owner, name in places]
     for owner, name in places:

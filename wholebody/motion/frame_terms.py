@@ -67,6 +67,11 @@ class FrameTerms:
     grips: Mapping[int, Array] = field(default_factory=dict)
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
+    _state: State = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        """Make the room in which feet are looked at."""
+        object.__setattr__(self, "_state", State(self.scene.model))
 
     def held(self, frame: int) -> tuple[HeldTerm, ...]:
         """Constraints and goals of a frame, resolved at its original posture."""
@@ -94,9 +99,10 @@ class FrameTerms:
     def feet(self, frame: int) -> tuple[Hold, ...]:
         """What holds the feet that stand in a frame, where each of them is held."""
         if frame not in self._feet:
-            found = []
-            for foot in held_feet(self.scene.figure, self.stands[frame]):
-                at = foot.resolve(self.scene, self.q[frame]).kept_at
+            found, figure = [], self.scene.figure
+            state = self._state.update(self.q[frame]) if self.stands[frame] else self._state
+            for foot in held_feet(figure, self.stands[frame]):
+                at = state.frame(figure.frame_id(foot.frame))
                 shift = self.shifts[frame][self.stands[frame].index(foot.frame)]
                 found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
             self._feet[frame] = tuple(found)

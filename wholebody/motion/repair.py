@@ -39,6 +39,7 @@ RADIUS = 0.05  # rad, m: first trust region; postures are nearly free
 NEAR = 0.03  # m: pairs nearer than this have rows
 ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond the others; it doubles
 MOST_ROOM = 5e-3  # m
+THROUGH = 0.06  # m, as thick as a forearm: no rows free a deeper dip, of a limb that goes right through
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
@@ -104,7 +105,8 @@ class Repairer:
         q = one_sided(self._terms, self._following, self._workspace, q, watch)
         for number in range(ROUNDS):
             wrong, gaps = self._faults(q)
-            changed = [self._kept_back(q, gap) for gap in gaps] if number else []  # what rows did not free
+            # what rows cannot free, and later what they did not free
+            changed = [self._kept_back(q, gap, SHALLOW if number else THROUGH) for gap in gaps]
             if any(changed):
                 wrong, gaps = self._faults(q)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
@@ -120,9 +122,9 @@ class Repairer:
         """(n,) frames of postures (n, nq) in which something is wrong, and gaps between others that dip."""
         return faults(self._workspace, self._terms, q, self._clearance)[1:]
 
-    def _kept_back(self, q: Array, gap: int) -> bool:
-        """Keep frames beside a gap on one side of what it passes, in place; whether that succeeded."""
-        if dip_depth(self._workspace, q[gap], q[gap + 1]) <= SHALLOW:
+    def _kept_back(self, q: Array, gap: int, deep: float) -> bool:
+        """Keep frames beside a gap that is deeper on one side of what it passes, in place; whether that succeeded."""
+        if dip_depth(self._workspace, q[gap], q[gap + 1]) <= deep:
             return False
         return keep_back(self._following(), self._workspace, q, gap, len(q))
 

@@ -6,11 +6,14 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.methods.qp import tracking
 from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.step_program import StepProgram
 from wholebody.tasks.base import Goal
 
 SLOW = wb.StepLimit(0.2, root_velocity=0.1, root_turn=0.1)  # steps so short that none is cut
@@ -68,6 +71,28 @@ def test_other_terms_are_followed_as_by_a_new_tracker(scene: wb.Scene) -> None:
     problem.clearances = problem.clearances[:-1]
     with pytest.raises(wb.InputError, match="one for each of the"):
         tracker.step(q)
+
+
+def test_holds_that_moved_are_followed_as_by_a_new_tracker_and_nothing_is_set_up_anew(
+    scene: wb.Scene, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    goals = [wb.Point("right_index_tip", (0.3, -0.3, 1.0))]
+    problem, made = wb.Problem(scene, goals=goals, constraints=FEET), list[object]()
+    tracker, q, first = wb.QP().tracker(problem, 0.02), problem.start, problem.constraints
+    at = np.array(scene.state(q).frame(scene.figure.frame_id("left_foot")).translation)
+    turned = scene.state(q).frame(scene.figure.frame_id("left_foot")).rotation
+    monkeypatch.setattr(tracking, "StepProgram", lambda *given: made.append(given) or StepProgram(*given))
+    for number, left in enumerate((0.0, 0.001, 0.002, 0.002, 0.0), 1):
+        moved = wb.Hold("left_foot", pin.SE3(turned, at + [0.0, left, 0.0])).resolve(scene, problem.start)
+        problem.constraints = (moved, *first[1:])
+        step = tracker.step(q)
+        assert step.displacement == pytest.approx(fresh(problem, q), abs=1e-6)
+        assert len(made) == number  # of the new trackers
+        q = step.q
+        assert np.abs(moved.value(scene.state(q))).max() < 1e-4
+    problem.constraints = (*first, wb.Hold("left_palm", orientation=False).resolve(scene, q))
+    assert tracker.step(q).displacement == pytest.approx(fresh(problem, q), abs=1e-6)
+    assert len(made) == number + 2
 
 
 class _Growing(Goal):

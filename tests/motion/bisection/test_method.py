@@ -14,16 +14,20 @@ import pytest
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.bench.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress
+from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.bisection import method as method_module
 from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
-from wholebody.motion.bisection.prediction import path_planes
+from wholebody.motion.bisection.prediction import Predictor, path_planes
 from wholebody.motion.bisection.recursion import SHORT
 from wholebody.motion.clip import Clip
+from wholebody.motion.frame_terms import frame_terms
+from wholebody.motion.measures import deviation
 from wholebody.motion.ready_equipment import equipment
 
 DEEP = 1e-4  # m
@@ -139,6 +143,32 @@ def test_a_ring_as_it_stands_is_left_free_between_frames_too(swing: Clip) -> Non
     assert result.message == ""
     assert depths(scene, result.q).max() <= DEEP
     assert between(scene, result.q) <= DEEP
+
+
+def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figure) -> None:
+    """They stand in each other by 4 cm and are held 1 mm apart: with 5 mm of room every posture missed a hold."""
+    close = {"left_hip_abduction": -0.06, "right_hip_abduction": -0.06}
+    q, scene = person.with_joints(person.posture("standing"), close), dressed(person, "pouches")
+    terms = frame_terms(scene, np.array([q] * 9), 1 / 30, [wb.StanceFeet()])
+    with scene.borrow() as workspace:
+        method = QP(restarts=0, iterations=50)
+        found = Predictor(scene, terms.q, terms, ("root",), method, 0.005, 5e-5, workspace).predict(4, q)
+    assert found.good
+    assert depths(scene, found.q[None])[0] <= 5e-5
+    state = scene.state(found.q)
+    for foot in terms.feet(4):
+        held = foot.resolve(scene, q).kept_at.translation
+        np.testing.assert_allclose(state.frame(person.frame_id(foot.frame)).translation, held, atol=2e-4)
+
+
+def test_evaluation_points_that_went_far_follow_from_the_next_one_where_that_is_nearer(person: Figure) -> None:
+    """A squat with pouches: from the points before them two went to 0.215 rad, with those after them it is 0.165."""
+    whole, scene = synthetic("squat", person), dressed(person, "pouches")
+    clip = Clip(person, whole.q[::2], 2.0 * whole.dt)
+    result = Bisection().avoid(clip, scene, (wb.StanceFeet(),), None)
+    assert result.message == ""
+    assert depths(scene, result.q).max() <= DEEP
+    assert deviation(clip, clip.with_q(result.q)).angle < 0.19
 
 
 def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> None:

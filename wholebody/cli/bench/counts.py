@@ -13,11 +13,19 @@ from wholebody.cli.bench.command import command, count, measuring, option, publi
     "ablation",
     "what each constant and mechanism of a method is worth, in counts",
     "Change one constant or switch one mechanism off at a time, and count answers that differ.",
-    option("--method", default="qp", choices=("qp", "newton", "ccd"), help="(default: qp)"),
+    option("--method", default="qp", choices=("qp", "newton", "ccd", "motion"), help="motion: of clips (default: qp)"),
+    option("--only", nargs="+", metavar="MODULE", help="modules of wholebody.motion (default: all that are looked at)"),
     count("--count", 6, "problems of every set"),
 )
 def ablation(arguments: argparse.Namespace) -> None:
-    """Measure and report."""
+    """Measure and report.
+
+    Raises:
+        UnknownNameError: there is no such module.
+    """
+    if arguments.method == "motion":
+        _of_motion(arguments)
+        return
     from wholebody.bench import ablation
 
     given = ablation.problems(1 if arguments.quick else arguments.count, arguments.method)
@@ -27,6 +35,17 @@ def ablation(arguments: argparse.Namespace) -> None:
     text = ablation.report(arguments.method, len(given), whole, rows, compiled)
     name = f"ablation-{arguments.method}"
     publish(name, text, arguments, facts=machine(), tables={name: rows})
+
+
+def _of_motion(arguments: argparse.Namespace) -> None:
+    from wholebody.bench.motion import ablated
+    from wholebody.bench.motion.cases import chosen
+    from wholebody.figures import load
+
+    only = chosen(arguments.only, tuple(ablated.USED), "--only")
+    cases = ablated.CASES[-2:] if arguments.quick else ablated.CASES
+    rows = ablated.ablation(load("human"), print, cases, only)[1]
+    publish("ablation-motion", ablated.report(rows), arguments, facts=machine(), tables={"ablation-motion": rows})
 
 
 @command(

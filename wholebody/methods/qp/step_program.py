@@ -5,6 +5,7 @@ What the compiled call does not settle, and what other solvers are to solve, goe
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 from math import sqrt
 from typing import Any, NamedTuple
@@ -105,8 +106,8 @@ class StepProgram:
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
         self._settled, self._curving, self._bend = False, False, 0.0
         self._held = np.flatnonzero(self._subproblem.kind == 0)
-        holding, self._among = _holding(problem, state, self._held)
-        self._holds = ConstraintValues(holding, state)
+        self._holding, self._among = _holding(problem, state, self._held)
+        self._holds = ConstraintValues([problem.constraints[k] for k in self._holding], state)
         self._asked = self._subproblem.bound[0, self._held]
         self._there = State(state.model)
         self._twist = np.empty((state.model.njoints, 6))
@@ -126,6 +127,15 @@ class StepProgram:
         # without goals the measures are the task
         gain = min(1.0, seconds / SETTLING) if self.goals else 1.0
         self._numbers = numbers_of(self._subproblem.scale, gain)
+
+    def hold(self, constraints: Sequence[Constraint]) -> bool:
+        """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
+
+        Returns:
+            Whether they are of the same classes and frames; if not, nothing is done.
+        """
+        self._before[-1], self._curving, self._bend = 0.0, False, 0.0
+        return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
@@ -266,12 +276,12 @@ class StepProgram:
         self._soft_rows, self._first_elastic = floats[ends[5] : ends[6]].reshape(m, n), ends[6]
 
 
-def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[Constraint], NDArray[np.intp]]:
-    """The constraints with equalities, and where these rows, `held` among those of all, are among theirs."""
+def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[int], NDArray[np.intp]]:
+    """Numbers of constraints with equalities, and where these rows, `held` among those of all, are among theirs."""
     sizes = [np.size(constraint.value(state)) for constraint in problem.constraints]
     owner = np.repeat(np.arange(len(sizes)), sizes)
     holding = np.unique(owner[held])
-    return [problem.constraints[k] for k in holding], np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
+    return holding.tolist(), np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
 def numbers_of(scale: float, gain: float) -> Array:

@@ -125,12 +125,10 @@ class QPTracker(NotCopyable):
             InputError: dt is not a positive finite number.
         """
         self.problem = check_problem(problem, "tracker: problem")
-        self.dt = time_step(dt, "dt")
-        self._method, self._minimising = method, minimising
+        self.dt, self._method, self._minimising = time_step(dt, "dt"), method, minimising
         solver.load()  # not in the middle of a drag
         compiled_escape()
-        self._working_set = WorkingSet(solver)
-        self._query_distance = LEAST_WITHIN
+        self._working_set, self._query_distance = WorkingSet(solver), LEAST_WITHIN
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
@@ -353,31 +351,36 @@ class QPTracker(NotCopyable):
 
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
-        problem = self.problem
-        self._program = StepProgram(problem, self.workspace, self._working_set, self.dt)
-        self._lineariser = problem.lineariser(self.workspace, self.dt)
-        self._goals = self._signatures()
+        self._program = StepProgram(self.problem, self.workspace, self._working_set, self.dt)
+        self._lineariser = self.problem.lineariser(self.workspace, self.dt)
+        self._goals, self._constraints = self._of_goals(), self._of_constraints()
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
-        anew = (
-            problem.constraints is not own.constraints
-            or problem.bounds is not own.bounds
-            or problem.measures is not own.measures
-        )
+        anew = problem.bounds is not own.bounds or problem.measures is not own.measures
         if not anew:
-            moved = problem.goals is not own.goals
-            own.take(problem.goals, problem.clearances)
-            anew = moved and self._signatures() != self._goals
+            moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
+            own.take(problem.goals, problem.clearances, problem.constraints)
+            anew = (moved and self._of_goals() != self._goals) or (held and not self._held())
         if anew:
             self._set_up()
             self._working_set.reset()
 
-    def _signatures(self) -> list[tuple[type, float, int]]:
+    def _held(self) -> bool:
+        """Take constraints that moved; False where others are to be held, or by other bounds."""
+        return self._of_constraints() == self._constraints and self._program.hold(self.problem.constraints)
+
+    def _of_goals(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
-        rows = self._lineariser.goal_rows()
-        return [(type(goal), goal.weight, count) for goal, count in zip(self._lineariser.goals, rows, strict=True)]
+        own = self._lineariser
+        return [(type(goal), goal.weight, rows) for goal, rows in zip(own.goals, own.rows(), strict=False)]
+
+    def _of_constraints(self) -> list[tuple[type, bytes, bytes, int]]:
+        """And kind, bounds and number of rows of each constraint."""
+        terms, rows = self._lineariser.constraints, self._lineariser.rows()[len(self._lineariser.goals) :]
+        bounds = [(np.asarray(term.lower).tobytes(), np.asarray(term.upper).tobytes()) for term in terms]
+        return [(type(term), *each, count) for term, each, count in zip(terms, bounds, rows, strict=True)]
 
 
 def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequence[QPStep], dt: float) -> QPStep:

@@ -9,14 +9,14 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
 from wholebody.scene import Scene
-from wholebody.tasks import Effort, Freeze, Plane
+from wholebody.tasks import Effort, Freeze, Hold, Plane
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 from wholebody.workspace import Workspace
@@ -150,6 +150,7 @@ class Predictor:
             measures=self._measures,
             clearance=self._clearance,
         )
+        problem.clearances[self._together(frame)] = 0.0
         if effort_from is not None:
             problem.measures = tuple(measure.resolve(self.scene, effort_from) for measure in self._measures)
         told = itertools.count(1)
@@ -157,6 +158,21 @@ class Predictor:
         solution = self._method.solve(problem.with_start(start), progress)
         free = self.free(solution.q)
         return Prediction(solution.q, free, free and self.holds(frame, solution.q), sum(solution.programs.values()))
+
+    def _together(self, frame: int) -> Mask:
+        """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world.
+
+        No posture has more room between them than where they are held, so none is asked for: feet that stand side by
+        side, hands at one weapon.
+        """
+        number = np.arange(self.scene.model.njoints)
+        for term in self.terms.held(frame):
+            if isinstance(term, Hold):
+                one, other = number[[term.residual.place.joint, term.residual.base.joint]]
+                number[number == one] = other
+        table = self._workspace.table
+        first, second = number[table.joint[table.pairs]].T
+        return np.asarray(first == second)
 
     def good(self, frame: int, q: Array) -> bool:
         """Whether nothing overlaps in a posture of a frame and everything that is held there holds."""
