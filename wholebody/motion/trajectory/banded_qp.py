@@ -21,12 +21,13 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.motion.trajectory import interior_point
 
 _log = logging.getLogger(__name__)
 
 LONG = 3000  # unknowns, frames times degrees of freedom, beyond which OSQP may take minutes
-PIQP_ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
-PIQP_GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
+ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
+GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
 OSQP_ACCURACY = 1e-6
 OSQP_ITERATIONS = 8000
 POLISH = 5  # steps of refinement of OSQP's polishing
@@ -43,6 +44,7 @@ class BandedQP(NamedTuple):
         upper: (m,).
         least: (n,).
         most: (n,).
+        start: (n,) where an iteration may begin; None where nothing is known.
     """
 
     P: Any
@@ -52,6 +54,7 @@ class BandedQP(NamedTuple):
     upper: Array
     least: Array
     most: Array
+    start: Array | None = None
 
 
 class Answer(NamedTuple):
@@ -68,6 +71,12 @@ class Answer(NamedTuple):
     iterations: int
 
 
+def solve_by_bands(program: BandedQP) -> Answer:
+    """Solve by an interior-point method whose factor is one band; see `interior_point`."""
+    found = interior_point.minimise(*program, ACCURACY, GAP)
+    return _answer(found.z, found.solved, found.iterations, program)
+
+
 def solve_by_piqp(program: BandedQP) -> Answer:
     """Solve by PIQP's interior-point method with its multistage backend."""
     import piqp
@@ -76,8 +85,8 @@ def solve_by_piqp(program: BandedQP) -> Answer:
     solver = piqp.SparseSolver()
     settings = solver.settings
     settings.kkt_solver = piqp.KKTSolver.sparse_multistage
-    settings.eps_abs, settings.eps_rel, settings.verbose = PIQP_ACCURACY, PIQP_ACCURACY, False
-    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = PIQP_GAP, PIQP_GAP
+    settings.eps_abs, settings.eps_rel, settings.verbose = ACCURACY, ACCURACY, False
+    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = GAP, GAP
     n = len(program.c)
     none = sp.csc_matrix((0, n))
     solver.setup(
@@ -106,7 +115,7 @@ def solve_by_osqp(program: BandedQP) -> Answer:
 
 
 SOLVERS: Mapping[str, tuple[str, Callable[[BandedQP], Answer]]] = MappingProxyType(
-    {"piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
+    {"banded": ("scipy", solve_by_bands), "piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
 )
 """Name of a solver -> the module that it needs, and the function that asks it."""
 
