@@ -3,14 +3,13 @@
     minimise    1/2 z' P z + c' z
     subject to  lower <= G z <= upper,   least <= z <= most
 
-PIQP's multistage backend finds the blocks by itself and factorises from block to block, so its time is linear in the
-frames. OSQP takes the same program by its general sparse factorisation; where it is taken because PIQP is not
-installed, a warning says so before a long run begins.
+The package's own interior-point method factorises them as one band, in a time that is linear in the frames. PIQP's
+multistage backend finds the blocks by itself and factorises from block to block, linear too. OSQP takes the same
+program by its general sparse factorisation.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -23,9 +22,6 @@ from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.motion.trajectory import interior_point
 
-_log = logging.getLogger(__name__)
-
-LONG = 3000  # unknowns, frames times degrees of freedom, beyond which OSQP may take minutes
 ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
 OSQP_ACCURACY = 1e-6
@@ -120,32 +116,17 @@ SOLVERS: Mapping[str, tuple[str, Callable[[BandedQP], Answer]]] = MappingProxyTy
 """Name of a solver -> the module that it needs, and the function that asks it."""
 
 
-def warn_of_osqp(name: str | None, unknowns: int) -> None:
-    """Say that a program will take long where no solver was chosen and PIQP is not installed.
-
-    Args:
-        name: of the solver that was asked for.
-        unknowns: frames times degrees of freedom.
-    """
-    if name is None and unknowns > LONG and find_spec("piqp") is None:
-        _log.warning(
-            "PIQP is not installed: OSQP may take minutes for this clip, 10 to 100 times as long; install it with: "
-            "pip install piqp"
-        )
-
-
 def banded_solver(name: str | None) -> tuple[str, Callable[[BandedQP], Answer]]:
-    """A solver by name, and its name; for None piqp where it is installed, else osqp.
+    """A solver by name, and its name; for None the package's own.
 
     Raises:
         InputError: not a text.
         UnknownNameError: there is no such solver.
         MissingPackageError: its package is not installed.
     """
-    if name is None:
-        name = next(known for known, (module, _) in SOLVERS.items() if find_spec(module) is not None)
+    name = next(iter(SOLVERS)) if name is None else name
     if not isinstance(name, str):
-        raise InputError(f"solver is {shown(name)}; give 'piqp' or 'osqp'")
+        raise InputError(f"solver is {shown(name)}; give 'banded', 'piqp' or 'osqp'")
     if name not in SOLVERS:
         raise UnknownNameError("solver of trajectories", name, SOLVERS)
     module, solve = SOLVERS[name]

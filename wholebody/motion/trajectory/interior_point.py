@@ -35,6 +35,7 @@ INNER = 0.05  # share of the way between bounds that the beginning keeps from bo
 LEAST = 1e-3  # slack of a row that is missed at the beginning and has no slack of its own
 KEPT = 0.995  # share of the way to the next bound that a step goes
 FIXED = 1e-9  # an unknown whose bounds are no farther apart stays where it is
+HELD = 1e20  # diagonal of such an unknown, beside which all else is nothing
 STUCK = 1e-8  # a step that is a smaller share of Newton's leads nowhere
 
 
@@ -73,37 +74,30 @@ def minimise(
     """
     matrices, bounds = _Matrices(sp.csc_array(P), sp.csc_array(G)), _Bounds(lower, upper, least, most)
     z, s, y = _begun(matrices, bounds, c, least, most, start)
-    count, Pz, Az = len(s), matrices.P @ z, bounds.times(matrices.G @ z, z)
+    count, Pz, Az = max(len(s), 1), matrices.P @ z, bounds.times(matrices.G @ z, z)
     for iteration in range(ITERATIONS):
-        stationarity = Pz + c - bounds.transposed(matrices.transposed, y)
-        stationarity[bounds.fixed] = 0.0
-        missed, mu = Az - bounds.a - s, float(s @ y) / max(count, 1)
+        derivative, missed = Pz + c - bounds.transposed(matrices.transposed, y), Az - bounds.a - s
+        derivative[bounds.fixed] = 0.0
+        mu = float(s @ y) / count
+        largest = max(1.0, float(np.abs(Pz).max(initial=0.0)))
         if (
             np.abs(missed).max(initial=0.0) <= accuracy
-            and np.abs(stationarity).max(initial=0.0) <= 10.0 * accuracy * max(1.0, float(np.abs(Pz).max(initial=0.0)))
+            and np.abs(derivative).max(initial=0.0) <= 10.0 * accuracy * largest
             and mu * count <= gap * max(1.0, abs(float(z @ (0.5 * Pz + c))))
         ):
             return Answered(z, True, iteration)
         factor = matrices.factor(*bounds.diagonals(y / s))
         if factor is None:
-            break
-
-        def direction(products: Array, factor: _Factor = factor) -> tuple[Array, Array, Array, Array]:
-            pull = -stationarity - bounds.transposed(matrices.transposed, (products + y * missed) / s)  # noqa: B023
-            pull[bounds.fixed] = 0.0
-            dz = factor.solve(pull)
-            dz[bounds.fixed] = 0.0
-            change = bounds.times(matrices.G @ dz, dz)
-            ds = change + missed  # noqa: B023
-            return dz, change, ds, -(products + y * ds) / s  # noqa: B023
-
-        _, _, ds, dy = direction(s * y)
+            return Answered(z, False, iteration)
+        newton = _Newton(matrices, bounds, factor, derivative, missed, s, y)
+        _, _, ds, dy = newton.direction(s * y)
         along, across = _share(s, ds), _share(y, dy)
-        ahead = float((s + along * ds) @ (y + across * dy)) / max(count, 1)
-        dz, change, ds, dy = direction(s * y + ds * dy - (ahead / mu) ** 3 * mu)
+        ahead = float((s + along * ds) @ (y + across * dy)) / count
+        centred = ahead * (ahead / mu) ** 2 if mu > 0.0 else 0.0
+        dz, change, ds, dy = newton.direction(s * y + ds * dy - centred)
         along, across = min(1.0, KEPT * _share(s, ds)), min(1.0, KEPT * _share(y, dy))
         if max(along, across) < STUCK:
-            break
+            return Answered(z, False, iteration)
         z, Az = z + along * dz, Az + along * change
         s, y, Pz = s + along * ds, y + across * dy, matrices.P @ z
     return Answered(z, False, ITERATIONS)
@@ -146,13 +140,14 @@ class _Bounds:
         return found
 
     def diagonals(self, values: Array) -> tuple[Array, Array]:
-        """(m,) weights of the rows and (n,) of the unknowns in A' diag(values) A."""
+        """(m,) weights of the rows and (n,) of the unknowns in A' diag(values) A, and of those that are fixed."""
         low, high, under, over = self.parts(values)
         rows, unknowns = np.zeros(self._rows), np.zeros(self._count)
         rows[self.low] += low
         rows[self.high] += high
         unknowns[self.under] += under
         unknowns[self.over] += over
+        unknowns[self.fixed] = HELD
         return rows, unknowns
 
 
@@ -165,6 +160,8 @@ class _Matrices:
         transposed: (n, m) of G.
         slack: indices of the slacks.
         share: (m, slacks) columns of G of the slacks.
+        rows: (m, n - slacks) the other columns.
+        sums, columns: these two transposed.
     """
 
     def __init__(self, P: Any, G: Any) -> None:
@@ -176,6 +173,7 @@ class _Matrices:
         self.share = sp.csc_array(G[:, self.slack])
         self.rows = sp.csr_array(G[:, self.band])
         self.rows.sort_indices()
+        self.columns, self.sums = sp.csr_array(self.rows.T), sp.csr_array(self.share.T)
         self._own = P.diagonal()[self.slack]
         self._spans()
         self._groups()
@@ -188,7 +186,7 @@ class _Matrices:
     def factor(self, rows: Array, unknowns: Array) -> _Factor | None:
         """Of K, with weights (m,) of the rows and (n,) of the unknowns; None where it is singular."""
         own = self._own + unknowns[self.slack]
-        shared = self.share.T @ rows if not len(self.slack) else self._squares.T @ rows
+        shared = self._squares @ rows
         weights = rows.copy()
         single = self._single
         weights[self._alone] *= own[single] / (own[single] + shared[single])
@@ -222,7 +220,7 @@ class _Matrices:
         """The rows of each slack: those of one row, and the others."""
         share = self.share
         many = np.diff(share.indptr)
-        self._squares = share.power(2)
+        self._squares = sp.csr_array(share.power(2).T)
         self._factors = np.zeros(share.shape[0])
         self._factors[share.indices] = share.data
         self._single, self._several = np.flatnonzero(many == 1), np.flatnonzero(many > 1)
@@ -251,11 +249,44 @@ class _Factor(NamedTuple):
         matrices = self.matrices
         found = np.zeros(len(right))
         own = right[matrices.slack]
-        rest = right[matrices.band] - matrices.rows.T @ (self.weights * (matrices.share @ (own / self.slack)))
+        rest = right[matrices.band] - matrices.columns @ (self.weights * (matrices.share @ (own / self.slack)))
         inner, _ = lapack.dpbtrs(self.cholesky, rest, lower=1)
         found[matrices.band] = inner
-        found[matrices.slack] = (own - matrices.share.T @ (self.weights * (matrices.rows @ inner))) / self.slack
+        found[matrices.slack] = (own - matrices.sums @ (self.weights * (matrices.rows @ inner))) / self.slack
         return found
+
+
+class _Newton(NamedTuple):
+    """Newton's equations at one point.
+
+    Attributes:
+        matrices: of the program.
+        bounds: of the program.
+        factor: of K.
+        derivative: (n,) of the Lagrangian.
+        missed: (k,) A z - a - s.
+        s: (k,) slacks.
+        y: (k,) multipliers.
+    """
+
+    matrices: _Matrices
+    bounds: _Bounds
+    factor: _Factor
+    derivative: Array
+    missed: Array
+    s: Array
+    y: Array
+
+    def direction(self, products: Array) -> tuple[Array, Array, Array, Array]:
+        """Changes of z, A z, s and y that take away these products (k,) of slacks and multipliers, to first order."""
+        matrices, bounds, s, y = self.matrices, self.bounds, self.s, self.y
+        pull = -self.derivative - bounds.transposed(matrices.transposed, (products + y * self.missed) / s)
+        pull[bounds.fixed] = 0.0
+        dz = self.factor.solve(pull)
+        dz[bounds.fixed] = 0.0
+        change = bounds.times(matrices.G @ dz, dz)
+        ds = change + self.missed
+        return dz, change, ds, -(products + y * ds) / s
 
 
 def _slacks(P: Any, G: Any) -> Mask:
