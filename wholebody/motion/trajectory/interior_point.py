@@ -35,7 +35,7 @@ INNER = 0.05  # share of the way between bounds that the beginning keeps from bo
 LEAST = 1e-3  # slack of a row that is missed at the beginning and has no slack of its own
 KEPT = 0.995  # share of the way to the next bound that a step goes
 FIXED = 1e-9  # an unknown whose bounds are no farther apart stays where it is
-HELD = 1e20  # diagonal of such an unknown, beside which all else is nothing
+STEEPEST = 1e25  # of a multiplier by its slack; where it is more, rounding is all that is left
 STUCK = 1e-8  # a step that is a smaller share of Newton's leads nowhere
 
 
@@ -72,12 +72,14 @@ def minimise(
             of stationarity.
         gap: of the objective, in parts of it where it is over 1.
     """
+    fixed = most - least <= FIXED
+    if fixed.any():
+        return _without(fixed, P, c, G, lower, upper, least, most, start, accuracy, gap)
     matrices, bounds = _Matrices(sp.csc_array(P), sp.csc_array(G)), _Bounds(lower, upper, least, most)
     z, s, y = _begun(matrices, bounds, c, least, most, start)
     count, Pz, Az = max(len(s), 1), matrices.P @ z, bounds.times(matrices.G @ z, z)
     for iteration in range(ITERATIONS):
         derivative, missed = Pz + c - bounds.transposed(matrices.transposed, y), Az - bounds.a - s
-        derivative[bounds.fixed] = 0.0
         mu = float(s @ y) / count
         largest = max(1.0, float(np.abs(Pz).max(initial=0.0)))
         if (
@@ -86,7 +88,7 @@ def minimise(
             and mu * count <= gap * max(1.0, abs(float(z @ (0.5 * Pz + c))))
         ):
             return Answered(z, True, iteration)
-        factor = matrices.factor(*bounds.diagonals(y / s))
+        factor = matrices.factor(*bounds.diagonals(y / s)) if (y < STEEPEST * s).all() else None
         if factor is None:
             return Answered(z, False, iteration)
         newton = _Newton(matrices, bounds, factor, derivative, missed, s, y)
@@ -103,19 +105,37 @@ def minimise(
     return Answered(z, False, ITERATIONS)
 
 
+def _without(
+    fixed: Mask, P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
+    accuracy: float, gap: float,
+) -> Answered:  # fmt: skip
+    """Solve for the unknowns that are not fixed (n,) alone, and leave out the rows that have no others."""
+    P, G, free = sp.csc_array(P), sp.csc_array(G), np.flatnonzero(~fixed)
+    z = np.where(fixed, 0.5 * (least + most), 0.0)
+    if not len(free):
+        return Answered(z, True, 0)
+    left = G[:, free]
+    rows = np.flatnonzero(np.bincount(left.indices, minlength=len(lower)))
+    there = (G @ z)[rows]
+    found = minimise(
+        P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
+        least[free], most[free], None if start is None else start[free], accuracy, gap,
+    )  # fmt: skip
+    z[free] = found.z
+    return found._replace(z=z)
+
+
 class _Bounds:
     """All bounds as A z >= a: rows from below and above, and unknowns from below and above.
 
     Attributes:
         a: (k,).
-        fixed: (n,) unknowns that bounds leave no room.
     """
 
     def __init__(self, lower: Array, upper: Array, least: Array, most: Array) -> None:
-        self.fixed: Mask = most - least <= FIXED
         self.low, self.high = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
-        self.under = np.flatnonzero(np.isfinite(least) & ~self.fixed)
-        self.over = np.flatnonzero(np.isfinite(most) & ~self.fixed)
+        self.under = np.flatnonzero(np.isfinite(least))
+        self.over = np.flatnonzero(np.isfinite(most))
         self.a = np.concatenate([lower[self.low], -upper[self.high], least[self.under], -most[self.over]])
         self._ends = np.cumsum([len(self.low), len(self.high), len(self.under)])
         self._rows, self._count = len(lower), len(least)
@@ -140,14 +160,13 @@ class _Bounds:
         return found
 
     def diagonals(self, values: Array) -> tuple[Array, Array]:
-        """(m,) weights of the rows and (n,) of the unknowns in A' diag(values) A, and of those that are fixed."""
+        """(m,) weights of the rows and (n,) of the unknowns in A' diag(values) A."""
         low, high, under, over = self.parts(values)
         rows, unknowns = np.zeros(self._rows), np.zeros(self._count)
         rows[self.low] += low
         rows[self.high] += high
         unknowns[self.under] += under
         unknowns[self.over] += over
-        unknowns[self.fixed] = HELD
         return rows, unknowns
 
 
@@ -197,7 +216,14 @@ class _Matrices:
         if len(self._begun) > 1:
             total = (own + shared)[self._several]
             kernel.add_sums(
-                K, self._first, self._begins, self._values, rows * self._factors, self._members, self._begun, -1.0 / total
+                K,
+                self._first,
+                self._begins,
+                self._values,
+                rows * self._factors,
+                self._members,
+                self._begun,
+                -1.0 / total,
             )
         cholesky, failed = lapack.dpbtrf(K.T, lower=1, overwrite_ab=1)
         return None if failed else _Factor(self, cholesky, rows, own + shared)
@@ -281,9 +307,7 @@ class _Newton(NamedTuple):
         """Changes of z, A z, s and y that take away these products (k,) of slacks and multipliers, to first order."""
         matrices, bounds, s, y = self.matrices, self.bounds, self.s, self.y
         pull = -self.derivative - bounds.transposed(matrices.transposed, (products + y * self.missed) / s)
-        pull[bounds.fixed] = 0.0
         dz = self.factor.solve(pull)
-        dz[bounds.fixed] = 0.0
         change = bounds.times(matrices.G @ dz, dz)
         ds = change + self.missed
         return dz, change, ds, -(products + y * ds) / s
@@ -305,7 +329,7 @@ def _begun(
     middle[both] = 0.5 * (least + most)[both]
     z = middle if start is None else start.copy()
     room = INNER * (most - least)[both]
-    z[both] = np.where(bounds.fixed[both], middle[both], np.clip(z[both], least[both] + room, most[both] - room))
+    z[both] = np.clip(z[both], least[both] + room, most[both] - room)
     largest = np.full(matrices.G.shape[0], np.inf)
     price = np.maximum(c[slack], 1.0)
     if len(slack):
