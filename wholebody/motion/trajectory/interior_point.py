@@ -11,9 +11,8 @@ the implementation of a primal-dual interior point method"). They come down to o
 
 An unknown that nothing couples with others but rows, such as the slack of a missed contact, is eliminated: of its rows
 the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left are the
-deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames, whose Cholesky factor
-takes n b^2 operations for n unknowns and a half width of b. Blocks of a general multistage solver are two frames large
-for the same band, which takes four times as many.
+deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames. Its Cholesky factor
+takes n b^2 operations for n unknowns and a half width of b.
 
 It begins at a known point, with shortfalls in the slacks and half of a slack's price as the multiplier of its rows.
 """
