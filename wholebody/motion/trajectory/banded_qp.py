@@ -20,7 +20,6 @@ import numpy as np
 from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
-from wholebody.motion.trajectory import interior_point
 
 ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
@@ -69,6 +68,8 @@ class Answer(NamedTuple):
 
 def solve_by_bands(program: BandedQP) -> Answer:
     """Solve by an interior-point method whose factor is one band; see `interior_point`."""
+    from wholebody.motion.trajectory import interior_point
+
     found = interior_point.minimise(*program, ACCURACY, GAP)
     return _answer(found.z, found.solved, found.iterations, program)
 

@@ -121,7 +121,7 @@ def _without(
         least[free], most[free], None if start is None else start[free], accuracy, gap,
     )  # fmt: skip
     z[free] = found.z
-    return found._replace(z=z)
+    return Answered(z, found.solved, found.iterations)
 
 
 class _Bounds:
