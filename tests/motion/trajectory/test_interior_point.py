@@ -116,6 +116,11 @@ def test_a_program_whose_objective_couples_nothing(rows: int) -> None:
         np.full(3, 0.2), None, ACCURACY, GAP,
     )  # fmt: skip
     assert answer.solved
+    half = minimise(
+        sp.csc_matrix(np.eye(3)), -target, G, np.full(rows, -1.0), np.full(rows, np.inf), np.zeros(3),
+        np.full(3, np.inf), np.zeros(3), ACCURACY, GAP,
+    )  # fmt: skip
+    np.testing.assert_allclose(half.z, np.maximum(target, 0.0), atol=1e-4)
     np.testing.assert_allclose(answer.z, np.clip(target, -0.2, 0.2), atol=1e-4)
 
 

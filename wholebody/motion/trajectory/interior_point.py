@@ -31,7 +31,7 @@ from wholebody.arrays import Array, Indices, Mask
 ITERATIONS = 60
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
 INNER = 0.05  # share of the way between bounds that the beginning keeps from both
-LEAST = 1e-3  # slack of a row that is missed at the beginning and has no slack of its own
+LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
 KEPT = 0.995  # share of the way to the next bound that a step goes
 FIXED = 1e-9  # an unknown whose bounds are no farther apart stays where it is
 STEEPEST = 1e25  # of a multiplier by its slack; where it is more, rounding is all that is left
@@ -139,7 +139,7 @@ class _Bounds:
         self._ends = np.cumsum([len(self.low), len(self.high), len(self.under)])
         self._rows, self._count = len(lower), len(least)
 
-    def parts(self, values: Array) -> list[Array]:
+    def parts(self, values: Array | Indices) -> list[Any]:
         """Values (k,) of the bounds, by their kinds."""
         return list(np.split(values, self._ends))
 
@@ -327,6 +327,7 @@ def _begun(
     middle = np.clip(0.0, least, most)
     middle[both] = 0.5 * (least + most)[both]
     z = middle if start is None else start.copy()
+    z = np.where(both, z, np.clip(z, least + LEAST, most - LEAST))
     room = INNER * (most - least)[both]
     z[both] = np.clip(z[both], least[both] + room, most[both] - room)
     largest = np.full(matrices.G.shape[0], np.inf)
