@@ -7,8 +7,9 @@ import pytest
 import qpsolvers
 import scipy.sparse as sp
 
+from wholebody.motion.trajectory.band import compiled_kernel
 from wholebody.motion.trajectory.banded_qp import ACCURACY, GAP, BandedQP
-from wholebody.motion.trajectory.interior_point import compiled_kernel, minimise
+from wholebody.motion.trajectory.interior_point import minimise
 from wholebody.motion.trajectory.objective import Objective
 
 FRAMES, DOFS = 10, 3

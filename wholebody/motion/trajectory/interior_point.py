@@ -19,7 +19,6 @@ It begins at a known point, with shortfalls in the slacks and half of a slack's 
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +26,7 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from wholebody.arrays import Array, Indices, Mask
+from wholebody.motion.trajectory.band import compiled_kernel
 
 ITERATIONS = 60
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
@@ -361,15 +361,3 @@ def _share(values: Array, change: Array) -> float:
     """The largest share of a change, at most 1, that keeps values positive."""
     less = change < 0.0
     return min(1.0, float((-values[less] / change[less]).min(initial=1.0)))
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or loaded from the cache."""
-    from wholebody.motion.trajectory import banded_kernel
-
-    none, places, band = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 1))
-    begins = np.zeros(1, dtype=np.intp)
-    banded_kernel.add_rows(band, places, begins, none, none)
-    banded_kernel.add_sums(band, places, begins, none, none, places, begins, none)
-    return banded_kernel
