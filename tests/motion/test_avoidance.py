@@ -303,10 +303,11 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
     assert kept.report.missed < 1e-9
 
 
-def test_both_solvers_give_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
-    pytest.importorskip("piqp")
+@pytest.mark.parametrize("name", ["piqp", "osqp"])
+def test_all_solvers_give_the_same_clip(name: str, planar_arm: Callable[..., Figure]) -> None:
+    pytest.importorskip(name)
     clip, scene = arm_and_ball(planar_arm, 90)
-    one, other = (wb.Trajectory(solver=name).avoid(clip, scene, (), None).q for name in ("piqp", "osqp"))
+    one, other = (wb.Trajectory(solver=each).avoid(clip, scene, (), None).q for each in (None, name))
     np.testing.assert_allclose(one, other, atol=2e-3)
 
 

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import importlib.util
-
 import numpy as np
 import pytest
 import qpsolvers
 import scipy.sparse as sp
 
 import wholebody as wb
-from wholebody.motion.trajectory import banded_qp
-from wholebody.motion.trajectory.banded_qp import SOLVERS, BandedQP, banded_solver, warn_of_osqp
+from wholebody.motion.trajectory.banded_qp import SOLVERS, BandedQP, banded_solver
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits, lay_out
@@ -53,20 +50,6 @@ def test_solvers_agree_with_a_dense_one(name: str, seed: int) -> None:
     )  # fmt: skip
     assert answer.solved
     np.testing.assert_allclose(answer.z, dense, atol=2e-4)
-
-
-def test_a_long_run_without_piqp_is_told_before(
-    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    warn_of_osqp(None, 10**6)
-    assert not caplog.records or importlib.util.find_spec("piqp") is None
-    caplog.clear()
-    monkeypatch.setattr(banded_qp, "find_spec", lambda name: None)
-    warn_of_osqp(None, 10)
-    warn_of_osqp("osqp", 10**6)
-    assert not caplog.records
-    warn_of_osqp(None, 10**6)
-    assert "pip install piqp" in caplog.text
 
 
 def test_an_unknown_solver_is_refused() -> None:

@@ -3,14 +3,13 @@
     minimise    1/2 z' P z + c' z
     subject to  lower <= G z <= upper,   least <= z <= most
 
-PIQP's multistage backend finds the blocks by itself and factorises from block to block, so its time is linear in the
-frames. OSQP takes the same program by its general sparse factorisation; where it is taken because PIQP is not
-installed, a warning says so before a long run begins.
+The package's own interior-point method factorises them as one band, in a time that is linear in the frames. PIQP's
+multistage backend finds the blocks by itself and factorises from block to block, linear too. OSQP takes the same
+program by its general sparse factorisation.
 """
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import MappingProxyType
@@ -22,11 +21,8 @@ from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
-_log = logging.getLogger(__name__)
-
-LONG = 3000  # unknowns, frames times degrees of freedom, beyond which OSQP may take minutes
-PIQP_ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
-PIQP_GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
+ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
+GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
 OSQP_ACCURACY = 1e-6
 OSQP_ITERATIONS = 8000
 POLISH = 5  # steps of refinement of OSQP's polishing
@@ -43,6 +39,7 @@ class BandedQP(NamedTuple):
         upper: (m,).
         least: (n,).
         most: (n,).
+        start: (n,) where an iteration may begin; None where nothing is known.
     """
 
     P: Any
@@ -52,6 +49,7 @@ class BandedQP(NamedTuple):
     upper: Array
     least: Array
     most: Array
+    start: Array | None = None
 
 
 class Answer(NamedTuple):
@@ -68,6 +66,14 @@ class Answer(NamedTuple):
     iterations: int
 
 
+def solve_by_bands(program: BandedQP) -> Answer:
+    """Solve by an interior-point method whose factor is one band; see `interior_point`."""
+    from wholebody.motion.trajectory import interior_point
+
+    found = interior_point.minimise(*program, ACCURACY, GAP)
+    return _answer(found.z, found.solved, found.iterations, program)
+
+
 def solve_by_piqp(program: BandedQP) -> Answer:
     """Solve by PIQP's interior-point method with its multistage backend."""
     import piqp
@@ -76,8 +82,8 @@ def solve_by_piqp(program: BandedQP) -> Answer:
     solver = piqp.SparseSolver()
     settings = solver.settings
     settings.kkt_solver = piqp.KKTSolver.sparse_multistage
-    settings.eps_abs, settings.eps_rel, settings.verbose = PIQP_ACCURACY, PIQP_ACCURACY, False
-    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = PIQP_GAP, PIQP_GAP
+    settings.eps_abs, settings.eps_rel, settings.verbose = ACCURACY, ACCURACY, False
+    settings.eps_duality_gap_abs, settings.eps_duality_gap_rel = GAP, GAP
     n = len(program.c)
     none = sp.csc_matrix((0, n))
     solver.setup(
@@ -106,37 +112,22 @@ def solve_by_osqp(program: BandedQP) -> Answer:
 
 
 SOLVERS: Mapping[str, tuple[str, Callable[[BandedQP], Answer]]] = MappingProxyType(
-    {"piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
+    {"banded": ("scipy", solve_by_bands), "piqp": ("piqp", solve_by_piqp), "osqp": ("osqp", solve_by_osqp)}
 )
 """Name of a solver -> the module that it needs, and the function that asks it."""
 
 
-def warn_of_osqp(name: str | None, unknowns: int) -> None:
-    """Say that a program will take long where no solver was chosen and PIQP is not installed.
-
-    Args:
-        name: of the solver that was asked for.
-        unknowns: frames times degrees of freedom.
-    """
-    if name is None and unknowns > LONG and find_spec("piqp") is None:
-        _log.warning(
-            "PIQP is not installed: OSQP may take minutes for this clip, 10 to 100 times as long; install it with: "
-            "pip install piqp"
-        )
-
-
 def banded_solver(name: str | None) -> tuple[str, Callable[[BandedQP], Answer]]:
-    """A solver by name, and its name; for None piqp where it is installed, else osqp.
+    """A solver by name, and its name; for None the package's own.
 
     Raises:
         InputError: not a text.
         UnknownNameError: there is no such solver.
         MissingPackageError: its package is not installed.
     """
-    if name is None:
-        name = next(known for known, (module, _) in SOLVERS.items() if find_spec(module) is not None)
+    name = next(iter(SOLVERS)) if name is None else name
     if not isinstance(name, str):
-        raise InputError(f"solver is {shown(name)}; give 'piqp' or 'osqp'")
+        raise InputError(f"solver is {shown(name)}; give 'banded', 'piqp' or 'osqp'")
     if name not in SOLVERS:
         raise UnknownNameError("solver of trajectories", name, SOLVERS)
     module, solve = SOLVERS[name]

@@ -32,6 +32,7 @@ class Chart:
         dofs = [range(joint.idx_v, joint.idx_v + joint.nv) for joint in list(model.joints)[1:] if joint.nq != joint.nv]
         self.curved: Indices = np.array([index for part in dofs for index in part], dtype=np.intp)
         self.straight: Indices = np.setdiff1d(np.arange(model.nv), self.curved).astype(np.intp)
+        self._both = np.ix_(self.curved, self.curved)
 
     def __len__(self) -> int:
         return len(self.original)
@@ -97,5 +98,5 @@ class Chart:
     def _times(self, rows: Array, matrix: Array) -> Array:
         """A product with a matrix (nv, nv) that is the identity but for its curved joints."""
         curved, result = self.curved, np.array(rows)
-        result[:, curved] = rows[:, curved] @ matrix[np.ix_(curved, curved)]
+        result[:, curved] = rows[:, curved] @ matrix[self._both]
         return result

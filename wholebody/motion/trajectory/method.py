@@ -18,7 +18,7 @@ from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver, warn_of_osqp
+from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun, Freed, WindowSettings
@@ -42,7 +42,8 @@ class Trajectory:
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
             brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s.
         margin: seconds before and after a collision in which frames may be changed.
-        solver: "piqp", "osqp", or None for piqp where it is installed, else osqp.
+        solver: of the quadratic programs: "banded", which is the package's own and the fastest, "piqp", "osqp", or None
+            for "banded".
         iterations: most steps of one run of a window; a step takes one to three quadratic programs.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
@@ -127,7 +128,6 @@ class Trajectory:
         if beyond is not None:
             wrong |= beyond
         found = windows(wrong, max(3, round(self.margin / terms.dt)))
-        warn_of_osqp(self.solver, sum(map(len, found)) * terms.scene.model.nv)
         total, done = max(1, sum(map(len, found))), 0
         missed: dict[Window, str] = {}
         while found:

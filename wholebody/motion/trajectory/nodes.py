@@ -104,6 +104,7 @@ class Looking:
         """
         self.workspace, self.chart, self.clearance, self._terms = workspace, chart, clearance, terms
         self.loads = loads
+        self._known: dict[Node, tuple[Array, float, Rows]] = {}  # where each node was looked at last
 
     def nodes(self) -> list[Node]:
         """Every frame, and its loads if they are looked at."""
@@ -123,8 +124,13 @@ class Looking:
             gap, parts = self.loads.rows(node.loaded, x)
             none = np.zeros((0, self.chart.model.nv))
             return Rows(node, gap, parts, np.arange(len(gap), dtype=np.intp), np.zeros(0), none)
-        if node.share:
-            return self._between(node, x, within)
+        here, known = x[node.frame : node.frame + (2 if node.share else 1)], self._known.get(node)
+        if known is None or known[1] != within or not np.array_equal(known[0], here):
+            found = self._between(node, x, within) if node.share else self._in_frame(node, x, within)
+            known = self._known[node] = here.copy(), within, found
+        return known[2]
+
+    def _in_frame(self, node: Node, x: Array, within: float) -> Rows:
         frame = node.frame
         gap, rows, group = self._contacts(self.chart.posture(frame, x[frame]), within)
         equal, equal_rows = np.zeros(0), np.zeros((0, rows.shape[1]))

@@ -105,9 +105,11 @@ def lay_out(
     D, slowest, fastest = _speed_part(x, dofs, place, limits, size, radius)
     least, most = np.zeros(size), np.full(size, np.inf)
     least[place], most[place] = box(x, limits, radius, dofs)
+    begun = np.zeros(size)
+    begun[place] = x[:, dofs]
     program = BandedQP(
         P, c, sp.csc_matrix(sp.vstack([G, D])), np.concatenate([lower, slowest]),
-        np.concatenate([np.full(len(lower), np.inf), fastest]), least, most,
+        np.concatenate([np.full(len(lower), np.inf), fastest]), least, most, begun,
     )  # fmt: skip
     return Layout(program, place, dofs)
 

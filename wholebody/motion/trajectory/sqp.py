@@ -43,6 +43,7 @@ GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
 PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
 RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
+IDLE = 2  # steps one after the other that bring little and leave as much missed, until the trust region shrinks
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 EARLY = 10  # steps until an early exit; more = longer where normals mislead, fewer = more other starts
 STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
@@ -152,7 +153,7 @@ class WindowProgram:
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)
-        programs, smallest, missed = 0, SHRUNK * radius, list[float]()
+        programs, smallest, missed, idle = 0, SHRUNK * radius, list[float](), 0
         for number in range(self._iterations):
             missed.append(here.worst)
             if (
@@ -179,9 +180,16 @@ class WindowProgram:
             if self._accepted(there, here, entries, gained):
                 entries.append(((1.0 - MARGIN) * here.total, here.objective))
                 multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
-                if there.worst > MET and there.total > HALVED * here.total and longest < 0.9 * radius:
+                left = there.worst > MET and there.total > HALVED * here.total
+                idle = idle + 1 if left and small else 0
+                if left and longest < 0.9 * radius:
                     penalty = min(RAISE * penalty, HIGHEST)
-                radius = min(2.0 * radius, largest) if longest > 0.9 * radius else radius
+                if (
+                    idle >= IDLE
+                ):  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
+                    radius = 0.5 * min(radius, longest)
+                elif longest > 0.9 * radius and not idle:
+                    radius = min(2.0 * radius, largest)
                 here = there
                 counts = counts | more | self._counts(here)
                 if here.worst <= MET and small and not (more & ~counts).any():

@@ -1,0 +1,149 @@
+"""Programs of trajectories by the package's own solver, against dense solvers and the conditions of optimality."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import qpsolvers
+import scipy.sparse as sp
+
+from wholebody.motion.trajectory.band import compiled_kernel
+from wholebody.motion.trajectory.banded_qp import ACCURACY, GAP, BandedQP
+from wholebody.motion.trajectory.interior_point import minimise
+from wholebody.motion.trajectory.objective import Objective
+
+FRAMES, DOFS = 10, 3
+PRICE = 1e3
+
+
+def program(seed: int, fixed: bool = True, contradicting: bool = False) -> BandedQP:
+    """A program as trajectories have them: rows of one frame and of two, with slacks of their own and shared ones.
+
+    The first two rows of a frame share a slack, the third has its own, and two bounds of changes have none.
+    """
+    random = np.random.default_rng(seed)
+    n = FRAMES * (DOFS + 2)
+    place = np.arange(FRAMES)[:, None] * (DOFS + 2) + np.arange(DOFS)
+    P, c, G, lower, upper = np.zeros((n, n)), np.zeros(n), [], [], []
+    bands = Objective(FRAMES, np.ones(DOFS), 0.1, 1.0 / 30.0, (True, True)).bands
+    for dof in range(DOFS):
+        P[np.ix_(place[:, dof], place[:, dof])] += bands
+    for frame in range(FRAMES):
+        shared, own = place[frame, -1] + 1, place[frame, -1] + 2
+        P[shared, shared] = P[own, own] = 1e-2 * PRICE
+        c[shared] = c[own] = PRICE
+        for slack in (shared, shared, own):
+            row = np.zeros(n)
+            row[place[frame]] = random.normal(size=DOFS)
+            if frame + 1 < FRAMES and slack == own:
+                row[place[frame + 1]] = random.normal(size=DOFS)
+            row[slack] = 1.0
+            G.append(row)
+            lower.append(random.normal(0.02, 0.05))
+            upper.append(np.inf)
+        if contradicting:
+            again = -G[-1]
+            again[own] = 1.0
+            G.append(again)
+            lower.append(0.1 - lower[-1])
+            upper.append(np.inf)
+        if frame + 1 < FRAMES:
+            row = np.zeros(n)
+            row[place[frame + 1, 0]], row[place[frame, 0]] = 1.0, -1.0
+            G.append(row)
+            lower.append(-0.03)
+            upper.append(0.02)
+    least, most = np.zeros(n), np.full(n, np.inf)
+    least[place], most[place] = -0.25, 0.25
+    if fixed:
+        least[place[0]] = most[place[0]] = 0.0
+    return BandedQP(
+        sp.csc_matrix(P), c, sp.csc_matrix(np.array(G)), np.array(lower), np.array(upper), least, most, np.zeros(n)
+    )
+
+
+def dense(asked: BandedQP) -> np.ndarray:
+    """The answer of an exact solver."""
+    G, above = asked.G.toarray(), np.isfinite(asked.upper)
+    found = qpsolvers.solve_qp(
+        asked.P.toarray(), asked.c, np.vstack([-G, G[above]]), np.concatenate([-asked.lower, asked.upper[above]]),
+        lb=asked.least, ub=np.minimum(asked.most, 1e3), solver="daqp",
+    )  # fmt: skip
+    assert found is not None
+    return np.asarray(found)
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("fixed", [True, False])
+@pytest.mark.parametrize("contradicting", [True, False])
+@pytest.mark.parametrize("known", [True, False])
+def test_it_agrees_with_an_exact_solver(seed: int, fixed: bool, contradicting: bool, known: bool) -> None:
+    asked = program(seed, fixed, contradicting)
+    asked = asked if known else asked._replace(start=None)
+    answer = minimise(*asked, 1e-7, 1e-10)
+    assert answer.solved
+    np.testing.assert_allclose(answer.z, dense(asked), atol=2e-5)
+
+
+def test_it_takes_few_iterations() -> None:
+    assert max(minimise(*program(seed), ACCURACY, GAP).iterations for seed in range(8)) <= 20
+
+
+def test_a_program_without_an_answer_ends() -> None:
+    """The only unknown is to be above 0.2 and below 0.1."""
+    eye = sp.csc_matrix(np.ones((1, 1)))
+    twice = sp.csc_matrix(np.ones((2, 1)))
+    answer = minimise(
+        eye, np.zeros(1), twice, np.array([0.2, -np.inf]), np.array([np.inf, 0.1]), -np.ones(1), np.ones(1), None,
+        ACCURACY, GAP,
+    )  # fmt: skip
+    assert not answer.solved
+    assert np.isfinite(answer.z).all()
+
+
+def test_unknowns_without_room_stay() -> None:
+    asked = program(0)
+    still = asked._replace(least=np.full(len(asked.c), 0.1), most=np.full(len(asked.c), 0.1))
+    np.testing.assert_array_equal(minimise(*still, ACCURACY, GAP).z, 0.1)
+
+
+@pytest.mark.parametrize("rows", [0, 2])
+def test_a_program_whose_objective_couples_nothing(rows: int) -> None:
+    """Any unknown could be a slack then; the answer is the target, clipped."""
+    target = np.array([0.3, -0.1, 0.05])
+    G = sp.csc_matrix(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])[:rows].reshape(rows, 3))
+    answer = minimise(
+        sp.csc_matrix(np.eye(3)), -target, G, np.full(rows, -1.0), np.full(rows, np.inf), np.full(3, -0.2),
+        np.full(3, 0.2), None, ACCURACY, GAP,
+    )  # fmt: skip
+    assert answer.solved
+    half = minimise(
+        sp.csc_matrix(np.eye(3)), -target, G, np.full(rows, -1.0), np.full(rows, np.inf), np.zeros(3),
+        np.full(3, np.inf), np.zeros(3), ACCURACY, GAP,
+    )  # fmt: skip
+    np.testing.assert_allclose(half.z, np.maximum(target, 0.0), atol=1e-4)
+    np.testing.assert_allclose(answer.z, np.clip(target, -0.2, 0.2), atol=1e-4)
+
+
+def test_squares_of_rows_in_a_band() -> None:
+    random = np.random.default_rng(0)
+    first, lengths = np.array([0, 2, 3, 5, 4]), np.array([3, 4, 1, 0, 3])
+    begins = np.concatenate([[0], np.cumsum(lengths)])
+    values, weights, factors = random.normal(size=begins[-1]), random.normal(size=5), random.normal(size=5)
+    rows = np.zeros((5, 8))
+    for k in range(5):
+        rows[k, first[k] : first[k] + lengths[k]] = values[begins[k] : begins[k + 1]]
+    kernel = compiled_kernel()
+
+    def full(band: np.ndarray) -> np.ndarray:
+        lower = np.array([[band[j, i - j] if 0 <= i - j < band.shape[1] else 0.0 for j in range(8)] for i in range(8)])
+        return lower + np.tril(lower, -1).T
+
+    band = np.zeros((8, 7))
+    kernel.add_rows(band, first, begins, values, weights)
+    np.testing.assert_allclose(full(band), rows.T @ np.diag(weights) @ rows, atol=1e-12)
+
+    band, shares = np.zeros((8, 7)), random.normal(size=2)
+    kernel.add_sums(band, first, begins, values, factors, np.array([0, 1, 2, 3, 4]), np.array([0, 2, 5]), shares)
+    sums = np.array([factors[:2] @ rows[:2], factors[2:] @ rows[2:]])
+    np.testing.assert_allclose(full(band), sums.T @ np.diag(shares) @ sums, atol=1e-12)

@@ -1,0 +1,64 @@
+"""Squares of the rows of a program, added to a band matrix, as compiled loops: see `interior_point`."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices
+from wholebody.compiled import compiled
+
+
+@compiled(fastmath=True)
+def add_rows(band: Array, first: Indices, begins: Indices, values: Array, weights: Array) -> None:
+    """Add the sum over rows r of w_r a_r a_r' to a symmetric band matrix.
+
+    Args:
+        band: (n, k) entry (j, i) is that of row j + i and column j of the matrix; it is changed.
+        first: (m,) column of the first value of each row.
+        begins: (m + 1,) where the values of each row begin; its columns follow each other.
+        values: of all rows, zeros between them included.
+        weights: (m,) of the rows.
+    """
+    for row in range(len(first)):
+        begin, end = begins[row], begins[row + 1]
+        for at in range(begin, end):
+            scaled = weights[row] * values[at]
+            if scaled != 0.0:
+                column = first[row] + at - begin
+                for to in range(at, end):
+                    band[column, to - at] += scaled * values[to]
+
+
+@compiled(fastmath=True)
+def add_sums(
+    band: Array, first: Indices, begins: Indices, values: Array, factors: Array, members: Indices, groups: Indices,
+    weights: Array,
+) -> None:  # fmt: skip
+    """Add the sum over groups g of w_g v_g v_g', where v_g is the sum of the rows of the group times their factors.
+
+    Args:
+        band: as for `add_rows`.
+        first: as for `add_rows`.
+        begins: as for `add_rows`.
+        values: as for `add_rows`.
+        factors: (m,) of the rows.
+        members: rows of the groups, one group after the other.
+        groups: (g + 1,) where the members of each group begin.
+        weights: (g,) of the groups.
+    """
+    total = np.zeros(band.shape[0])
+    for group in range(len(groups) - 1):
+        least, most = band.shape[0], 0
+        for k in range(groups[group], groups[group + 1]):
+            row = members[k]
+            begin, end, column = begins[row], begins[row + 1], first[row]
+            if end > begin:
+                least, most = min(least, column), max(most, column + end - begin)
+                for at in range(begin, end):
+                    total[column + at - begin] += factors[row] * values[at]
+        for column in range(least, most):
+            scaled = weights[group] * total[column]
+            if scaled != 0.0:
+                for to in range(column, most):
+                    band[column, to - column] += scaled * total[to]
+        total[least:most] = 0.0
