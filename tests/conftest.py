@@ -56,7 +56,7 @@ LONG = (
     *("examples/test_examples.py", "view/test_live_page.py", "motion/test_avoidance.py", "cli/test_show.py"),
     *("tracking/test_moving_things.py", "test_odd_arguments.py", "view/test_page.py", "docs/test_pages.py"),
     *("test_compiled.py", "view/test_files.py", "dynamics/test_scenes.py", "bench/compare/test_jobs.py"),
-    *("methods/newton/test_method.py", "figures/test_human_fingers.py", "bench/compare/test_report.py"),
+    *("methods/newton/test_method.py", "figures/human/test_human_fingers.py", "bench/compare/test_report.py"),
     *("doctor/test_checks.py", "bench/problem_sets/test_cases.py", "cli/test_commands.py", "view/test_human.py"),
     *("tracking/test_scenes.py", "test_threads.py", "geometry/test_convex.py", "bench/test_commands.py"),
     *("bench/stability/test_catalogue.py", "bench/compare/test_run.py", "test_batches.py", "motion/test_batch.py"),
