@@ -10,12 +10,13 @@ import signal
 import socket
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
 
-from wholebody.runner import ONE_THREAD, Child, serve
+from wholebody import runner
+from wholebody.runner import ONE_THREAD
 
 # Before numpy is loaded, and for workers and child processes too. Threads of linear algebra wait by computing, which
 # takes three times the processor's time of the computation itself where workers share two cores.
@@ -203,29 +204,29 @@ def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
     """
     with pytest.MonkeyPatch.context() as patch:
         if not getattr(request.module, "FROM_SCRATCH", False):
-            patch.setattr(Child, "_start", _start_warm)
+            patch.setattr(runner, "start_process", _start_warm)
         yield
 
 
-def _start_warm(child: Child) -> None:
-    """Start the process of a `Child` as `Child._start` does, as a fork of this one."""
+def _start_warm(environment: Mapping[str, str]) -> runner.Started:
+    """Start a process as `runner.start_process` does, as a fork of this one."""
     ours, theirs = socket.socketpair()
-    context = multiprocessing.get_context("fork")
-    child._words = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
-    arguments = (theirs, child._words.fileno(), child._environment, os.getpid())
-    child._process = context.Process(target=_serve_warm, args=arguments, daemon=True)
-    child._process.start()
+    output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+    arguments = (theirs, output.fileno(), environment, os.getpid())
+    process = multiprocessing.get_context("fork").Process(target=_serve_warm, args=arguments, daemon=True)
+    process.start()
     theirs.close()
-    child._ear = Connection(ours.detach())
+    return runner.Started(process, Connection(ours.detach()), output)
 
 
-def _serve_warm(connection: socket.socket, words: int, environment: dict[str, str], parent: int) -> None:
+def _serve_warm(connection: socket.socket, output: int, environment: Mapping[str, str], parent: int) -> None:
     faulthandler.disable()  # jobs that crash on purpose would write of it into the output of the tests
+    os.environ.clear()
     os.environ.update(environment)
-    os.dup2(words, 1)
-    os.dup2(words, 2)
+    os.dup2(output, 1)
+    os.dup2(output, 2)
     sys.stdout, sys.stderr = os.fdopen(1, "w", 1), os.fdopen(2, "w", 1)
-    serve(connection.detach(), parent)
+    runner.serve(connection.detach(), parent)
     os._exit(0)  # the process must not close resources of the parent
 
 

@@ -97,6 +97,20 @@ class Outcome(NamedTuple):
     error: EndedError | None
 
 
+class Started(NamedTuple):
+    """A process that reads jobs.
+
+    Attributes:
+        process: it.
+        connection: over which it gets jobs and answers.
+        output: what it writes.
+    """
+
+    process: subprocess.Popen[bytes] | BaseProcess
+    connection: Connection
+    output: IO[bytes]
+
+
 class Child:
     """A child process that does one job at a time; a new one replaces it when it has ended."""
 
@@ -146,7 +160,7 @@ class Child:
             self._fork(job)
             return
         if self._process is None:
-            self._start()
+            self._process, self._connection, self._output = start_process(os.environ | self._environment)
         try:
             self.connection.send((job.seconds, packed((job.function, job.arguments))))
         except (BrokenPipeError, ConnectionResetError):
@@ -181,24 +195,6 @@ class Child:
                 stream.close()
         self._process = self._output = self._connection = None
 
-    def _start(self) -> None:
-        """Start an interpreter that reads jobs."""
-        import wholebody
-
-        ours, theirs = socket.socketpair()
-        root = str(Path(wholebody.__file__).parents[1])
-        self._output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
-        with theirs:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno(), parent=os.getpid())],
-                stdin=subprocess.DEVNULL,
-                stdout=self._output,
-                stderr=self._output,
-                pass_fds=[theirs.fileno()],
-                env=os.environ | self._environment,
-            )
-        self._connection = Connection(ours.detach())
-
     def _fork(self, job: Job) -> None:
         """Fork a process for the job."""
         context = multiprocessing.get_context("fork")
@@ -216,6 +212,25 @@ class Child:
             said = lines[-1].strip()[:LONGEST_LINE] if lines else ""
         self.close()
         return EndedError(code, said)
+
+
+def start_process(environment: Mapping[str, str]) -> Started:
+    """Start an interpreter that reads jobs, with these variables and no others."""
+    import wholebody
+
+    ours, theirs = socket.socketpair()
+    root = str(Path(wholebody.__file__).parents[1])
+    output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+    with theirs:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno(), parent=os.getpid())],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            pass_fds=[theirs.fileno()],
+            env=environment,
+        )
+    return Started(process, Connection(ours.detach()), output)
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:

@@ -51,7 +51,7 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
         assert 0.0 < row.median_us <= row.p95_us
         assert (row.pairs >= 700) == (row.reach != "alone")
         assert row.limit_violation < 1e-9
-        assert row.tool != "placo" or row.ratio == row.ratio_p95 == 1.0
+        assert row.tool != "placo" or row.ratio.value == row.ratio_p95.value == 1.0
     _, times = read_rows(tmp_path / "out" / "step-times.csv", StepTime)
     assert len(times) == len(reaches) * 2 * 2 * 6
     _, costs = read_rows(tmp_path / "out" / "step-person.csv", PersonCostRow)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -386,17 +387,14 @@ class QPTracker(NotCopyable):
 def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequence[QPStep], dt: float) -> QPStep:
     """One step of several that follow each other along a path."""
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
-    programs: dict[str, int] = {}
-    for step in steps:
-        for by, count in step.programs.items():
-            programs[by] = programs.get(by, 0) + count
+    programs = sum((Counter(step.programs) for step in steps), Counter[str]())
     return with_values(
         steps[-1],
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),
         iterations=sum(step.iterations for step in steps),
-        programs=programs,
+        programs=dict(programs),
         share=min(step.share for step in steps),
         path=tuple(path),
     )
