@@ -56,7 +56,7 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
     assert len(times) == len(reaches) * 2 * 2 * 6
     _, costs = read_rows(tmp_path / "out" / "step-person.csv", PersonCostRow)
     assert [row.what for row in costs] == [*(f"{reach} step" for reach in reaches), "shelf solve"]
-    assert all(row.low <= row.ratio <= row.high for row in costs)
+    assert all(row.ratio.low <= row.ratio.value <= row.ratio.high for row in costs)
     page = (docs / "results.md").read_text()
     assert "| placo |" in page
     assert "| shelf solve |" in page
