@@ -241,8 +241,10 @@ class Problem(checks.FixedAttributes):
             workspace: from this problem's `borrow` or `workspace`.
             dt: time step in seconds, for bounds that need one.
         """
-        terms, plan = self._plan
-        known = dt is None and all(map(is_, terms, (self.constraints, self.bounds, self.measures)))
+        known, plan = False, None
+        if dt is None:
+            terms, plan = self._plan
+            known = all(map(is_, terms, (self.constraints, self.bounds, self.measures)))
         return Lineariser(
             workspace,
             self.scene.figure.limits,

@@ -9,7 +9,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.avoider import Watch
+from wholebody.motion.avoider import AvoidProgress, Watch
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.repair import Repairer
 
@@ -54,6 +54,26 @@ def test_a_limb_that_goes_right_through_is_kept_on_one_side_before_rows_are_trie
     assert before.deepest_between > 0.06
     q, _ = repaired(clip, scene, clip.q)
     assert wb.check(clip.with_q(q), scene).free
+
+
+def test_the_caller_ends_it_while_frames_are_kept_on_one_side(planar_arm: Callable[..., Figure]) -> None:
+    """A clip of 200 frames on the wrong side of a pole, of which each is followed."""
+    shoulder = np.concatenate([np.linspace(-0.9, -0.3, 100), np.linspace(0.3, 0.9, 100)])
+    figure = planar_arm((0.5, 0.5), radius=0.03)
+    clip, scene = wb.Clip(figure, np.stack([shoulder, np.full(200, 0.1)], axis=1), DT), wb.Scene(figure)
+    scene.add(wb.Sphere(0.04), name="pole", at=(0.9, 0.0, 0.0))
+    told: list[str] = []
+
+    def stop(progress: AvoidProgress) -> bool:
+        told.append(progress.note)
+        return len(told) == 3
+
+    with scene.borrow() as workspace:
+        repairer = Repairer(frame_terms(scene, clip.q, clip.dt, ()), workspace)
+        repairer.repair(clip.q, Watch(stop))
+    assert len(told) == 3
+    assert told[-1] == "what passes after frame 99 is kept on one side"
+    assert repairer.programs < 100
 
 
 def test_where_nothing_is_wrong_nothing_is_computed(planar_arm: Callable[..., Figure]) -> None:

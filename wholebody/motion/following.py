@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +84,16 @@ class Follower:
         return q
 
 
-def keep_back(follower: Follower, workspace: Workspace, q: Array, gap: int, most: int, first: int = 0) -> bool:
+def keep_back(
+    follower: Follower,
+    workspace: Workspace,
+    q: Array,
+    gap: int,
+    most: int,
+    first: int = 0,
+    *,
+    cancelled: Callable[[], bool] | None = None,
+) -> bool:
     """Keep frames beside a gap on one side of what the motion in it passes, in place, as few as can be.
 
     Args:
@@ -94,6 +103,7 @@ def keep_back(follower: Follower, workspace: Workspace, q: Array, gap: int, most
         gap: the frame before the motion that passes through something.
         most: how many frames may change.
         first: frame of the clip that the first posture belongs to.
+        cancelled: asked before each frame; True ends it.
 
     Returns:
         Whether a way back to the other frames was found; if not, q stays as it is.
@@ -102,6 +112,8 @@ def keep_back(follower: Follower, workspace: Workspace, q: Array, gap: int, most
     found = dict[int, list[Array]]((side, []) for side in ways)
     for _ in range(most):
         for side, way in list(ways.items()):  # in turn, so that the shorter way ends both
+            if cancelled is not None and cancelled():
+                return False
             posture = next(way, None)
             if posture is None:
                 del ways[side]

@@ -106,7 +106,9 @@ class Repairer:
         for number in range(ROUNDS):
             wrong, gaps = self._faults(q)
             # what rows cannot free, and later what they did not free
-            changed = [self._kept_back(q, gap, SHALLOW if number else THROUGH) for gap in gaps]
+            changed = [self._kept_back(q, gap, SHALLOW if number else THROUGH, watch) for gap in gaps]
+            if watch.ended:
+                return q
             if any(changed):
                 wrong, gaps = self._faults(q)
             wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
@@ -122,11 +124,15 @@ class Repairer:
         """(n,) frames of postures (n, nq) in which something is wrong, and gaps between others that dip."""
         return faults(self._workspace, self._terms, q, self._clearance)[1:]
 
-    def _kept_back(self, q: Array, gap: int, deep: float) -> bool:
+    def _kept_back(self, q: Array, gap: int, deep: float, watch: Watch) -> bool:
         """Keep frames beside a gap that is deeper on one side of what it passes, in place; whether that succeeded."""
-        if dip_depth(self._workspace, q[gap], q[gap + 1]) <= deep:
+        if watch.ended or dip_depth(self._workspace, q[gap], q[gap + 1]) <= deep:
             return False
-        return keep_back(self._following(), self._workspace, q, gap, len(q))
+
+        def cancelled() -> bool:
+            return watch.tell(1.0, f"what passes after frame {gap} is kept on one side")
+
+        return keep_back(self._following(), self._workspace, q, gap, len(q), cancelled=cancelled)
 
     def _following(self) -> Follower:
         if self._follower is None:

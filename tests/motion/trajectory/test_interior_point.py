@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 import qpsolvers
@@ -105,6 +107,62 @@ def test_unknowns_without_room_stay() -> None:
     asked = program(0)
     still = asked._replace(least=np.full(len(asked.c), 0.1), most=np.full(len(asked.c), 0.1))
     np.testing.assert_array_equal(minimise(*still, ACCURACY, GAP).z, 0.1)
+
+
+@pytest.mark.parametrize(("asked", "solved"), [(2.0, True), (5.0, False)])
+@pytest.mark.parametrize("free", [0, 1])
+def test_rows_of_unknowns_without_room_hold_or_not(asked: float, solved: bool, free: int) -> None:
+    """Two unknowns are 1 each, and their sum is to be at least so much; others do not enter the row."""
+    n = 2 + free
+    least, most = np.full(n, -3.0), np.full(n, 3.0)
+    least[:2] = most[:2] = 1.0
+    G = sp.csc_matrix(np.array([[1.0, 1.0, 0.0][:n]]))
+    answer = minimise(
+        sp.csc_matrix(np.eye(n)),
+        np.zeros(n),
+        G,
+        np.array([asked]),
+        np.full(1, np.inf),
+        least,
+        most,
+        None,
+        ACCURACY,
+        GAP,
+    )
+    assert answer.solved == solved
+    np.testing.assert_allclose(answer.z[:2], 1.0)
+
+
+def test_bounds_that_cross_have_no_answer() -> None:
+    eye, none = sp.csc_matrix(np.eye(1)), sp.csc_matrix((0, 1))
+    assert not minimise(eye, np.ones(1), none, *[np.zeros(0)] * 2, np.ones(1), -np.ones(1), None, ACCURACY, GAP).solved
+
+
+def test_unknowns_without_bounds_are_found() -> None:
+    eye, none = sp.csc_matrix(np.eye(2)), sp.csc_matrix((0, 2))
+    bound = np.array([np.inf, 0.5])
+    answer = minimise(eye, np.array([-2.0, -2.0]), none, *[np.zeros(0)] * 2, -bound, bound, None, ACCURACY, GAP)
+    assert answer.solved
+    np.testing.assert_allclose(answer.z, [2.0, 0.5], atol=1e-5)
+
+
+def test_slacks_stay_out_of_the_band_beside_an_unknown_that_is_alone() -> None:
+    """One unknown that nothing fixes or couples, and a thousand rows that have it and a slack each."""
+    count = 1000
+    G = sp.csc_matrix(sp.hstack([np.ones((count, 1)), sp.eye(count)]))
+    P = sp.csc_matrix(sp.diags(np.full(count + 1, 1.0)))
+    c = np.concatenate([[0.0], np.full(count, PRICE)])
+    most = np.full(count + 1, np.inf)
+    most[0] = 0.5
+    tracemalloc.start()
+    answer = minimise(
+        P, c, G, np.full(count, 0.2), np.full(count, np.inf), np.zeros(count + 1), most, None, ACCURACY, GAP
+    )
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert answer.solved
+    assert answer.z[0] == pytest.approx(0.2, abs=1e-4)
+    assert peak < 2 * count**2  # bytes; a band of all unknowns takes four times as many
 
 
 @pytest.mark.parametrize("rows", [0, 2])

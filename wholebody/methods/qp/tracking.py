@@ -352,30 +352,31 @@ class QPTracker(NotCopyable):
 
     def _set_up(self) -> None:
         """Take the problem's terms as they are now."""
-        self._program = StepProgram(self.problem, self.workspace, self._working_set, self.dt)
         self._lineariser = self.problem.lineariser(self.workspace, self.dt)
+        self._lay_out()
+
+    def _lay_out(self) -> None:
+        """Make the program of the terms that the lineariser has."""
+        self._program = StepProgram(self.problem, self.workspace, self._working_set, self.dt)
         self._goals, self._constraints = self._of_goals(), self._of_constraints()
+        self._working_set.reset()
 
     def _renew(self) -> None:
         """Take what was replaced of the problem since the last step; where targets moved only, keep what is set up."""
         problem, own = self.problem, self._lineariser
-        anew = problem.bounds is not own.bounds or problem.measures is not own.measures
-        if not anew:
-            moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
-            own.take(problem.goals, problem.clearances, problem.constraints)
-            anew = (moved and self._of_goals() != self._goals) or (held and not self._held())
-        if anew:
+        if problem.bounds is not own.bounds or problem.measures is not own.measures:
             self._set_up()
-            self._working_set.reset()
-
-    def _held(self) -> bool:
-        """Take constraints that moved; False where others are to be held, or by other bounds."""
-        return self._of_constraints() == self._constraints and self._program.hold(self.problem.constraints)
+            return
+        moved, held = problem.goals is not own.goals, problem.constraints is not own.constraints
+        own.take(problem.goals, problem.clearances, problem.constraints)
+        kept = not held or (self._of_constraints() == self._constraints and self._program.hold(problem.constraints))
+        if not kept or (moved and self._of_goals() != self._goals):
+            self._lay_out()
 
     def _of_goals(self) -> list[tuple[type, float, int]]:
         """What programs are set up from: kind, weight and number of rows of each goal."""
-        own = self._lineariser
-        return [(type(goal), goal.weight, rows) for goal, rows in zip(own.goals, own.rows(), strict=False)]
+        goals, rows = self._lineariser.goals, self._lineariser.rows()
+        return [(type(goal), goal.weight, count) for goal, count in zip(goals, rows, strict=False)]
 
     def _of_constraints(self) -> list[tuple[type, bytes, bytes, int]]:
         """And kind, bounds and number of rows of each constraint."""
@@ -387,14 +388,13 @@ class QPTracker(NotCopyable):
 def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequence[QPStep], dt: float) -> QPStep:
     """One step of several that follow each other along a path."""
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
-    programs = sum((Counter(step.programs) for step in steps), Counter[str]())
     return with_values(
         steps[-1],
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),
         iterations=sum(step.iterations for step in steps),
-        programs=dict(programs),
+        programs=dict(sum((Counter(step.programs) for step in steps), Counter[str]())),
         share=min(step.share for step in steps),
         path=tuple(path),
     )

@@ -162,17 +162,22 @@ class Predictor:
     def _together(self, frame: int) -> Mask:
         """(pairs,) which pairs are of pieces that are held at each other in a frame, or both in the world.
 
-        No posture has more room between them than where they are held, so none is asked for: feet that stand side by
-        side, hands at one weapon.
+        No posture has more room between them than where they are held, so none is asked for: hands at one weapon, a
+        foot on the floor. Feet that stand side by side and turn about a toe have little more, and are asked for none
+        either. Otherwise what is held by its place alone may turn, and has its room.
         """
         number = np.arange(self.scene.model.njoints)
+        stands = np.zeros(len(number), dtype=bool)
         for term in self.terms.held(frame):
             if isinstance(term, Hold):
-                one, other = number[[term.residual.place.joint, term.residual.base.joint]]
-                number[number == one] = other
+                held, base = term.residual.place.joint, term.residual.base.joint
+                stands[held] |= base == 0
+                if term.orientation:
+                    one, other = number[[held, base]]
+                    number[number == one] = other
         table = self._workspace.table
-        first, second = number[table.joint[table.pairs]].T
-        return np.asarray(first == second)
+        first, second = table.joint[table.pairs].T
+        return np.asarray((number[first] == number[second]) | (stands[first] & stands[second]))
 
     def good(self, frame: int, q: Array) -> bool:
         """Whether nothing overlaps in a posture of a frame and everything that is held there holds."""

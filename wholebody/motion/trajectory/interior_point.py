@@ -11,8 +11,8 @@ the implementation of a primal-dual interior point method"). They come down to o
 
 An unknown that nothing couples with others but rows, such as the slack of a missed contact, is eliminated: of its rows
 the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left are the
-deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames. Its Cholesky factor
-takes n b^2 operations for n unknowns and a half width of b.
+deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames, of three with loads.
+Its Cholesky factor takes n b^2 operations for n unknowns and a half width of b.
 
 It begins at a known point, with shortfalls in the slacks and half of a slack's price as the multiplier of its rows.
 """
@@ -108,20 +108,24 @@ def _without(
     fixed: Mask, P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
     accuracy: float, gap: float,
 ) -> Answered:  # fmt: skip
-    """Solve for the unknowns that are not fixed (n,) alone, and leave out the rows that have no others."""
+    """Solve for the unknowns that are not fixed (n,) alone; rows that have no others hold or not."""
     P, G, free = sp.csc_array(P), sp.csc_array(G), np.flatnonzero(~fixed)
-    z = np.where(fixed, 0.5 * (least + most), 0.0)
-    if not len(free):
-        return Answered(z, True, 0)
+    z = np.zeros(len(fixed))
+    z[fixed] = 0.5 * (least[fixed] + most[fixed])
     left = G[:, free]
-    rows = np.flatnonzero(np.bincount(left.indices, minlength=len(lower)))
-    there = (G @ z)[rows]
+    asked = np.bincount(left.indices, minlength=len(lower)) > 0
+    rows, value = np.flatnonzero(asked), G @ z
+    missed = np.maximum(lower - value, value - upper)[~asked].max(initial=0.0)
+    holds = bool(missed <= accuracy and (least[fixed] - most[fixed]).max() <= accuracy)
+    if not len(free):
+        return Answered(z, holds, 0)
+    there = value[rows]
     found = minimise(
         P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
         least[free], most[free], None if start is None else start[free], accuracy, gap,
     )  # fmt: skip
     z[free] = found.z
-    return Answered(z, found.solved, found.iterations)
+    return Answered(z, holds and found.solved, found.iterations)
 
 
 class _Bounds:
@@ -200,15 +204,20 @@ class _Matrices:
         width = max(int((at - to).max(initial=0)), self._widest) + 1
         self._base = np.zeros((len(self.band), width))
         self._base[to[at >= to], (at - to)[at >= to]] = inner.data[at >= to]
+        self._K = np.empty_like(self._base)  # one for all iterations: fresh memory of this size costs time
 
     def factor(self, rows: Array, unknowns: Array) -> _Factor | None:
-        """Of K, with weights (m,) of the rows and (n,) of the unknowns; None where it is singular."""
+        """Of K, with weights (m,) of the rows and (n,) of the unknowns; None where it is singular.
+
+        It takes the memory of the factor before.
+        """
         own = self._own + unknowns[self.slack]
         shared = self._squares @ rows
         weights = rows.copy()
         single = self._single
         weights[self._alone] *= own[single] / (own[single] + shared[single])
-        K = self._base.copy()
+        K = self._K
+        K[:] = self._base
         K[:, 0] += unknowns[self.band]
         kernel = compiled_kernel()
         kernel.add_rows(K, self._first, self._begins, self._values, weights)
@@ -313,10 +322,15 @@ class _Newton(NamedTuple):
 
 
 def _slacks(P: Any, G: Any) -> Mask:
-    """(n,) unknowns that P does not couple with others, as far as no row has two of them."""
-    none = np.zeros(P.shape[0], dtype=bool)
-    alone = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0)
-    return none if (np.bincount(G[:, np.flatnonzero(alone)].indices, minlength=1) > 1).any() else alone
+    """(n,) unknowns that P does not couple with others, of each row the last of them: no row has two slacks."""
+    alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0)
+    found = np.flatnonzero(alone)
+    shares = sp.coo_array(G[:, found])
+    row, column = shares.coords
+    last = np.full(shares.shape[0], -1)
+    np.maximum.at(last, row, column)
+    alone[found[column[column < last[row]]]] = False
+    return alone
 
 
 def _begun(
@@ -325,10 +339,10 @@ def _begun(
     """Unknowns (n,), slacks (k,) and multipliers (k,) to begin with."""
     both, slack = np.isfinite(least) & np.isfinite(most), matrices.slack
     middle = np.clip(0.0, least, most)
-    middle[both] = 0.5 * (least + most)[both]
+    middle[both] = 0.5 * (least[both] + most[both])
     z = middle if start is None else start.copy()
     z = np.where(both, z, np.clip(z, least + LEAST, most - LEAST))
-    room = INNER * (most - least)[both]
+    room = INNER * (most[both] - least[both])
     z[both] = np.clip(z[both], least[both] + room, most[both] - room)
     largest = np.full(matrices.G.shape[0], np.inf)
     price = np.maximum(c[slack], 1.0)
