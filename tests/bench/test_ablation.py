@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from dataclasses import replace
 
 import pytest
@@ -11,6 +12,7 @@ from wholebody.bench import ablation
 from wholebody.bench.ablation import Constant, Row, report
 from wholebody.bench.motion import ablated
 from wholebody.bench.problem_sets.registry import SETS
+from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
 from wholebody.motion import per_frame
 
@@ -72,6 +74,26 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
     text = report("qp", len(given), whole, [*rows, Row("x.Y", "ten times", 0, 0, 0, 0.0)], ["a.kernel"])
     assert "`x.Y`" in text
     assert "a.kernel" in text
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--method", "qp", "--only", "per_frame"), "--only chooses modules of --method motion, not of qp"),
+        (("--only", "no-such-module"), "--only"),
+        (("--method", "motion", "--count", "6"), "leave --count out"),
+    ],
+)
+def test_options_that_a_method_does_not_have_are_refused(
+    words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ablation, "problems", None)
+    monkeypatch.setattr(ablated, "ablation", None)
+    parser = argparse.ArgumentParser()
+    command.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["ablation", *words])
+    with pytest.raises(wb.InputError, match=said):
+        arguments.run(arguments)
 
 
 def test_every_mechanism_that_is_switched_off_is_there() -> None:

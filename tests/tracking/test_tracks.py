@@ -103,7 +103,11 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
         (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is no number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
         (lambda lines: lines[:2], "line 2: .*at least two frames"),
-        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step is 0 s; give a positive one"),
+        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step is 0 s; give one between 1e-06 and 1e.06 s"),
+        (
+            lambda lines: [lines[0], *(f"{k}e-9,{line.partition(',')[2]}" for k, line in enumerate(lines[1:]))],
+            "line 3: the time step is 1e-09 s; give one between 1e-06 and 1e.06 s",
+        ),
         (lambda lines: [lines[0], *lines[:0:-1]], "line 3: the time step is -"),
         (
             lambda lines: [*lines[:3], "", lines[3].rsplit(",", 1)[0] + ",nan", *lines[4:]],

@@ -32,10 +32,9 @@ def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> Non
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(flat(rows[0]))
+    text.write(_line(flat(rows[0])))
     for row in rows:
-        writer.writerow([repr(value) if isinstance(value, float) else str(value) for value in flat(row).values()])
+        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in flat(row).values()]))
     write_text(path, text.getvalue())
 
 
@@ -56,15 +55,16 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
         FileFormatError: no file, another kind of file, or a value that is none.
     """
     facts: dict[str, str] = {}
-    lines = read_text(path, "table").splitlines()
-    while lines and lines[0].startswith("# "):
-        name, _, value = lines.pop(0)[2:].partition(": ")
+    rest = read_text(path, "table")
+    while rest.startswith("# "):
+        line, _, rest = rest.partition("\n")
+        name, _, value = line[2:].removesuffix("\r").partition(": ")
         facts[name] = value
     types = get_type_hints(kind)
     parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
     names = [name for each in parts.values() for name in each]
     try:
-        given = list(csv.reader(lines))
+        given = list(csv.reader(io.StringIO(rest, newline="")))  # cells may have line breaks
     except csv.Error as error:
         raise FileFormatError(f"{path}: is no CSV ({error}); measure again") from None
     if not given or given[0] != names:
@@ -136,6 +136,13 @@ def replace_section(path: Path, name: str, text: str) -> None:
             f"{path}: the markers {first} and {last} are not in it; put them where the result belongs"
         )
     write_text(path, f"{head}{first}\n\n{text.strip()}\n\n{last}{tail}")
+
+
+def _line(cells: Iterable[str]) -> str:
+    """A line of CSV; cells with line breaks of any kind are quoted."""
+    line = io.StringIO(newline="")
+    csv.writer(line, lineterminator="\r\n").writerow(cells)  # it quotes only what its own lines end with
+    return line.getvalue().removesuffix("\r\n") + "\n"
 
 
 def _parts(name: str, kind: Any) -> tuple[str, ...]:

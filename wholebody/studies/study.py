@@ -48,8 +48,9 @@ def study(
 
     Args:
         task: a function of a figure, a target and a layout that returns a problem, or a task file. In a task file, a
-            person replaces the figure's sex, stature and mass, a target (3,) the place of the first goal of type point
-            or frame, and a layout the placements of things, by name.
+            person replaces the figure's options by name, and sex, stature, mass, percentile, age and proportions all
+            together where it has one of them; a target (3,) replaces the place of the first goal of type point or
+            frame, and a layout the placements of things, by name.
         people: in a list, or by name in a mapping. A person is a design case of the anthropometric tables ("F5" to
             "M95", percentiles of women and men), a mapping of options of `wb.load("human")` such as `{"sex":
             "female", "stature": 1.6}`, or a figure (for functions).

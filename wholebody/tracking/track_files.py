@@ -47,7 +47,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
 
     Raises:
         FileFormatError: the file cannot be read, a line has another length, a value is no finite number, or the time
-            step changes or is not positive; the line is named.
+            step changes or is not within `TIME_STEP`; the line is named.
         UnknownNameError: a column that is no joint of the figure.
         InputError: joints are missing, or a quaternion is not of unit length; the frame is named.
     """
@@ -90,7 +90,10 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
     dt = float(time[1] - time[0])
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; give a positive one")
+        raise FileFormatError(
+            f"{path.name}, line {places[1]}: the time step is {dt:g} s; "
+            f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
+        )
     late = np.flatnonzero(np.abs(np.diff(time) - dt) > EVEN * abs(dt))
     if len(late):
         line_number = places[int(late[0]) + 1]

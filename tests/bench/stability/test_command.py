@@ -20,10 +20,13 @@ from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.verdict import Result, StabilityRow, result
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.cli.bench import stability
-from wholebody.errors import InputError
+from wholebody.errors import FileFormatError, InputError, MissingPackageError, UnknownNameError
 
 CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
 METHODS = ("qp", "ccd")
+
+
+hard_cases = sys.modules["wholebody.cli.bench.hard_cases"]
 
 
 def bench(*words: str) -> int:
@@ -76,9 +79,70 @@ def test_an_earlier_run_is_told_again_and_nothing_is_asked(
         bench("--methods", "mink", *words)
 
 
+def earlier(path: Path, cells: dict[str, tuple[str, ...]]) -> tuple[str, ...]:
+    """Write a run of cases by methods; return the options that tell it again."""
+    rows = [
+        StabilityRow(case, method, "solved", True, "", "solved", 0, 0, 0, 0, 0, 1, 1.0, "")
+        for case, methods in cells.items()
+        for method in methods
+    ]
+    write_rows(path / "earlier.csv", {"processor": "another one"}, rows)
+    return "--from", str(path / "earlier.csv"), "--out", str(path / "out")
+
+
+def test_an_earlier_run_is_told_with_the_cases_and_methods_that_it_has(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No package of a method needs to be there, as nothing is asked."""
+    monkeypatch.setattr(registry, "find_spec", lambda module: None)
+    methods = ("mink", "newton/kkt", "ccd", "newton/slack")
+    words = earlier(tmp_path, dict.fromkeys(("edge-on-edge", "out-by-1-mm"), methods))
+    table = tmp_path / "out" / "stability.md"
+    assert bench(*words) == 0
+    assert "| case | mink | newton/kkt | ccd | newton/slack |" in table.read_text()
+    assert "Of 2 cases each" in table.read_text()
+    assert bench("--cases", "edge-on-edge", "--methods", "newton", "mink", *words) == 0
+    assert "| case | newton/kkt | newton/slack | mink |" in table.read_text()
+    assert "Of 1 cases each" in table.read_text()
+    assert bench("--methods", "all", *words) == 0
+    assert "| case | mink | newton/kkt | ccd | newton/slack |" in table.read_text()
+    with pytest.raises(UnknownNameError, match="no method is called 'mimk'; did you mean mink"):
+        bench("--methods", "mimk", *words)
+
+
+def test_an_earlier_run_that_lacks_what_is_asked_for_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="no answer of ccd to out-by-1-mm"):
+        bench(*earlier(tmp_path, {"edge-on-edge": ("qp", "ccd"), "out-by-1-mm": ("qp",)}))
+    words = earlier(tmp_path, {"edge-on-edge": ("qp",)})
+    with pytest.raises(InputError, match="no answer of newton to edge-on-edge"):
+        bench("--methods", "newton", *words)
+    (tmp_path / hard_cases.PAGE).touch()
+    with pytest.raises(InputError, match="no answer of"):  # the page has all cases and the methods of the page
+        bench(*words, "--update-docs", str(tmp_path))
+    with pytest.raises(UnknownNameError, match=r"earlier\.csv: no case is called 'edge-in-edge'"):
+        bench(*earlier(tmp_path, {"edge-in-edge": ("qp",)}))
+    path = tmp_path / "earlier.csv"
+    path.write_text("".join(path.read_text().splitlines(keepends=True)[:2]))
+    with pytest.raises(FileFormatError, match="has no answers"):
+        bench(*words)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_of_an_earlier_run_needs_the_packages_of_its_methods(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its pictures are of answers that are asked for again; it is told before anything is written."""
+    monkeypatch.setattr(registry, "find_spec", lambda module: None)
+    words = earlier(tmp_path, {case.name: page.METHODS for case in cases()})
+    (tmp_path / hard_cases.PAGE).touch()
+    with pytest.raises(MissingPackageError, match="placo is not installed"):
+        bench(*words, "--update-docs", str(tmp_path))
+    assert not (tmp_path / "out").exists()
+
+
 def test_pictures_of_an_earlier_run_show_what_it_found(found: Result, monkeypatch: pytest.MonkeyPatch) -> None:
     """The drawn answers alone are asked for, and one of which something else comes now is not drawn."""
-    hard_cases, drawn = sys.modules["wholebody.cli.bench.hard_cases"], []
+    drawn: list[tuple[str, str]] = []
     rows = {key: replace(row, verdict="solved") if row.case == CASES[0] else row for key, row in found.rows.items()}
     monkeypatch.setattr("wholebody.bench.stability.pictures.draw", lambda result, cells, *rest: drawn.extend(cells))
     hard_cases._drawn(Result(found.cases, found.methods, rows), adapters(METHODS), Path("nowhere"), 1)

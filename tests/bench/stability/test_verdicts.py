@@ -196,6 +196,27 @@ def test_lengths(metres: float, words: str) -> None:
     assert length(metres) == words
 
 
+@pytest.mark.parametrize(
+    ("figure", "brief"),
+    [
+        ("ValueError: q is out of limits", "error"),
+        ("NaN in a goal: ValueError: goal is inside", "error"),
+        ("RuntimeError: 3 mm inside", "error"),
+        ("OverflowError: 2.5 times too fast", "error"),
+        ("ends its process with code 3", "error"),
+        ("crashes: SIGSEGV\nsecond", "crashes"),
+        ("2e-06 rad out of limits", "2e-06 rad"),
+        ("1.23e+03 m inside, says solved", "1.23e+03 m"),
+        ("12 mm inside on the way: tip and\nplate, frame 3", "12 mm way"),
+        ("a constraint missed by 3 mm (or mrad), says solved", "3 mm"),
+        ("69.1 mm inside; alone, pink solves it", "69.1 mm"),
+        ("misreports what is left by 50 µm", "misreports"),
+    ],
+)
+def test_a_failure_is_an_error_whatever_words_it_has(figure: str, brief: str) -> None:
+    assert Verdict("wrong", figure, False).brief == brief
+
+
 def test_what_is_our_adapters_fault_is_not_called_wrong_of_the_tool() -> None:
     wrong = Verdict("wrong", "69.1 mm inside", False)
     theirs = audited("narrow-passage", "pink", wrong)

@@ -141,7 +141,7 @@ class Difference(NamedTuple):
 
 
 def differences(published: Locked, found: Locked) -> list[Difference]:
-    """Intervals that differ beyond their intervals, in the order of the lock file.
+    """Figures that differ by more than their intervals, in the order of the lock file.
 
     Raises:
         InputError: the two have no figure in common.

@@ -26,8 +26,8 @@ def names() -> tuple[str, ...]:
     return tuple(case.name for case in _CASES)
 
 
-def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
-    """The cases of these names, in the order of reports; all of them where None.
+def cases(chosen: Iterable[str] | None = None, where: str = "") -> tuple[HardCase, ...]:
+    """The cases of these names, in the order of reports; all of them where None. `where` is for the message.
 
     Raises:
         UnknownNameError: there is no such case.
@@ -37,5 +37,5 @@ def cases(chosen: Iterable[str] | None = None) -> tuple[HardCase, ...]:
     wanted = tuple(chosen)
     for name in wanted:
         if name not in names():
-            raise UnknownNameError("case", name, names())
+            raise UnknownNameError("case", name, names(), where)
     return tuple(case for case in _CASES if case.name in wanted)

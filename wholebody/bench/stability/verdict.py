@@ -13,11 +13,13 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, cast
 
+from wholebody.bench.adapters import registry
+from wholebody.bench.stability import catalogue
 from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE, Judged
 from wholebody.bench.tables import filled, read_rows
-from wholebody.errors import InputError
+from wholebody.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.records import with_values
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
@@ -37,21 +39,23 @@ WORDS: dict[Kind, str] = {
 }
 
 
+_NUMBER = r"[\d.]+(?:e[+-]\d+)?"
+_AMOUNT = rf"({_NUMBER} (?:rad|m|mm|µm))"
 BRIEF = {
     r"(hangs|crashes): .*": r"\1",
     r"takes .*": "takes it",
     r"refuses with .* only": "unclear",
     r"answers|NaN": r"\g<0>",
-    r"(.*) out of limits": r"\1",
-    r"(.*) inside on the way: .*": r"\1 way",
-    r"(.*) inside, not deeper": r"\1 in",
-    r"(.*) inside(, says \w+)?": r"\1",
-    r"a constraint missed by (.*) \(or mrad\).*": r"\1",
-    r"(.*) times too fast": r"\1 × speed",
-    r"claims solved, (.*) left": r"claims \1",
-    r"misreports .*": "misreports",
+    rf"{_AMOUNT} out of limits": r"\1",
+    rf"{_AMOUNT} inside on the way: .*": r"\1 way",
+    rf"{_AMOUNT} inside, not deeper": r"\1 in",
+    rf"{_AMOUNT} inside(, says \w+)?": r"\1",
+    rf"a constraint missed by {_AMOUNT} \(or mrad\)(, says \w+)?": r"\1",
+    rf"({_NUMBER}) times too fast": r"\1 × speed",
+    rf"claims solved, {_AMOUNT} left": r"claims \1",
+    rf"misreports what is left by {_AMOUNT}": "misreports",
 }
-"""How figures are shortened for the cell of a table; any other wrong answer is an error."""
+"""How figures are shortened for the cell of a table; any other wrong answer is an error, whatever words it has."""
 
 
 class Verdict(NamedTuple):
@@ -77,7 +81,7 @@ class Verdict(NamedTuple):
         """The figure for the cell of a table."""
         words = self.figure.partition("; alone")[0]
         for pattern, short in BRIEF.items():
-            if found := re.fullmatch(pattern, words):
+            if found := re.fullmatch(pattern, words, re.DOTALL):
                 return found.expand(short)
         return "error" if self.kind in ("wrong", "adapter") else words
 
@@ -269,20 +273,50 @@ def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Iterable[Ce
     return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys}, placed)
 
 
-def read_result(path: Path, cases: Sequence[HardCase], methods: Sequence[str]) -> tuple[Result, dict[str, str]]:
-    """Some cells of an earlier run, from the file of its rows; and the facts of the machine that it ran on.
+def read_result(
+    path: Path, cases: Iterable[str] | None = None, methods: Iterable[str] | None = None
+) -> tuple[Result, dict[str, str]]:
+    """Cells of an earlier run, from the file of its rows; and the facts of the machine that it ran on.
+
+    Args:
+        path: the file.
+        cases: names; None for all that the file has.
+        methods: names; None for all that the file has. "all", and the name of a method with several adapters, such as
+            "newton", mean those that the file has. Their packages need not be installed.
 
     Raises:
-        FileFormatError: the file is none of such rows.
+        FileFormatError: the file is none of such rows, or has none.
         InputError: it lacks a cell.
+        UnknownNameError: there is no such case or method.
     """
     facts, read = read_rows(path, StabilityRow)
+    if not read:
+        raise FileFormatError(f"{path}: has no answers; give the stability.csv of a run")
     rows = {(row.case, row.method): row for row in read}
-    keys = [(case.name, method) for case in cases for method in methods]
+    asked = tuple(dict.fromkeys(row.method for row in read))
+    if methods is not None:
+        asked = tuple(dict.fromkeys(each for name in methods for each in _meant(name, asked)))
+    if cases is None:
+        chosen = catalogue.cases(dict.fromkeys(row.case for row in read), str(path))
+    else:
+        chosen = catalogue.cases(cases)
+    keys = [(case.name, method) for case in chosen for method in asked]
     for case, method in keys:
         if (case, method) not in rows:
             raise InputError(f"{path}: has no answer of {method} to {case}; ask for others, or run it")
-    return Result(tuple(cases), tuple(methods), {key: rows[key] for key in keys}), facts
+    return Result(chosen, asked, {key: rows[key] for key in keys}), facts
+
+
+def _meant(name: str, known: Sequence[str]) -> Sequence[str]:
+    """The methods of a file that a name means; the name itself where the file lacks it."""
+    if name == registry.ALL:
+        return known
+    every = registry.names()
+    if name in known or name in every:
+        return (name,)
+    if name not in {each.partition("/")[0] for each in every}:
+        raise UnknownNameError("method", name, {*known, *every, registry.ALL})
+    return [each for each in known if each.startswith(f"{name}/")] or (name,)
 
 
 def _row(cell: Cell, best: float | None) -> StabilityRow:

@@ -7,6 +7,9 @@ from pathlib import Path
 
 from wholebody.bench.machine import machine
 from wholebody.cli.bench.command import command, count, measuring, option, publish
+from wholebody.errors import InputError
+
+PROBLEMS = 6  # of every set, where --count is left out
 
 
 @measuring(
@@ -14,21 +17,31 @@ from wholebody.cli.bench.command import command, count, measuring, option, publi
     "what each constant and mechanism of a method is worth, in counts",
     "Change one constant or switch one mechanism off at a time, and count answers that differ.",
     option("--method", default="qp", choices=("qp", "newton", "ccd", "motion"), help="motion: of clips (default: qp)"),
-    option("--only", nargs="+", metavar="MODULE", help="modules of wholebody.motion (default: all that are looked at)"),
-    count("--count", 6, "problems of every set"),
+    option(
+        "--only",
+        nargs="+",
+        metavar="MODULE",
+        help="with --method motion: modules of wholebody.motion (default: all that are looked at)",
+    ),
+    count("--count", None, f"problems of every set, for the other methods (default: {PROBLEMS})"),
 )
 def ablation(arguments: argparse.Namespace) -> None:
     """Measure and report.
 
     Raises:
+        InputError: an option that the method does not have.
         UnknownNameError: there is no such module.
     """
     if arguments.method == "motion":
+        if arguments.count is not None:
+            raise InputError("--method motion takes clips and no problems; leave --count out")
         _of_motion(arguments)
         return
+    if arguments.only is not None:
+        raise InputError(f"--only chooses modules of --method motion, not of {arguments.method}; leave it out")
     from wholebody.bench import ablation
 
-    given = ablation.problems(1 if arguments.quick else arguments.count, arguments.method)
+    given = ablation.problems(1 if arguments.quick else arguments.count or PROBLEMS, arguments.method)
     named = ablation.mechanisms(arguments.method)
     whole, rows = ablation.ablation(arguments.method, given, named, print)
     compiled = ablation.constants(arguments.method)[1]

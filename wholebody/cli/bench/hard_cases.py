@@ -36,8 +36,12 @@ INTERRUPTED = 130  # exit code after Ctrl-C
     "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
     "honest best effort, a clear refusal, or WRONG. With --from an earlier run is told again: its table, its "
     "chart, and with --update-docs the page, for whose pictures a few answers are asked for anew.",
-    listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page)"),
-    listed("--cases", "cases (default: all; with --quick a few)"),
+    listed(
+        "--methods",
+        "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page; with --from those of "
+        "the file)",
+    ),
+    listed("--cases", "cases (default: all, with --from those of the file; with --quick a few)"),
     option(
         "--from", dest="earlier", type=Path, metavar="CSV", help="stability.csv of an earlier run, instead of asking"
     ),
@@ -50,16 +54,22 @@ def stability(arguments: argparse.Namespace) -> None:
     from wholebody.bench.stability.verdict import read_result, result
 
     _check_page(arguments)
-    usual = page.METHODS if arguments.update_docs or arguments.earlier else filter(installed, page.METHODS)
-    asked = adapters(arguments.methods or tuple(usual))
-    chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
-    methods = [adapter.name for adapter in asked]
+    whole = arguments.update_docs is not None
+    cases = arguments.cases or (catalogue.QUICK if arguments.quick else None)
+    asked: Sequence[Adapter] = ()
     if arguments.earlier is not None:
-        found, facts = read_result(arguments.earlier, chosen, methods)
+        every = (catalogue.names(), page.METHODS) if whole else (None, None)
+        found, facts = read_result(arguments.earlier, cases or every[0], arguments.methods or every[1])
+        if whole:
+            asked = adapters(found.methods)
     else:
+        asked = adapters(arguments.methods or [name for name in page.METHODS if whole or installed(name)])
+        chosen = catalogue.cases(cases)
         facts = machine()
         found = result(
-            chosen, methods, _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
+            chosen,
+            [adapter.name for adapter in asked],
+            _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs),
         )
         write_rows(arguments.out / "stability.csv", facts, list(found.rows.values()))
     report = page.report(found, facts)
