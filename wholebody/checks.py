@@ -29,6 +29,8 @@ NUMERIC = "fiu"
 FAR = 1e15  # values beyond this get no hint at a wrong unit
 TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
+TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
+"""The end of a message about a time step that is out of that range."""
 
 LONGEST_LIKELY = 10.0
 """Seconds of a step beyond which a number of frames a second was probably meant."""

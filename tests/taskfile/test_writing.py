@@ -68,7 +68,10 @@ def test_a_problem_of_a_script_goes_round(tmp_path: Path, root: Path) -> None:
 )
 def test_what_a_person_keeps_by_default_goes_round(tmp_path: Path, asked: dict[str, bool]) -> None:
     problem = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_palm", (0.4, -0.2, 1.2))], **asked)
-    same(problem, wb.read_task(wb.write_task(problem, tmp_path / "task.toml")).problem)
+    again = wb.read_task(wb.write_task(problem, tmp_path / "task.toml")).problem
+    same(problem, again)
+    assert [type(term) for term in again.defaults] == [type(term) for term in problem.defaults]
+    assert (wb.RangeOfMotion in map(type, again.defaults)) == asked.get("range_of_motion", True)
 
 
 def test_joints_of_things_go_round(tmp_path: Path) -> None:

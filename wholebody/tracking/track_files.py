@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.checks import TIME_STEP, instance, is_number, known, shown
+from wholebody.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
@@ -90,10 +90,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
     dt = float(time[1] - time[0])
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(
-            f"{path.name}, line {places[1]}: the time step is {dt:g} s; "
-            f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
-        )
+        raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
     late = np.flatnonzero(np.abs(np.diff(time) - dt) > EVEN * abs(dt))
     if len(late):
         line_number = places[int(late[0]) + 1]

@@ -65,7 +65,10 @@ def read_motion(path: Path) -> SkeletonMotion:
     poses, places = _numbers(arrays["poses"], f"{name}: poses"), _numbers(arrays["trans"], f"{name}: trans")
     frequency = _numbers(rate, f"{name}: frame rate")
     if frequency.size != 1 or not 1.0 / TIME_STEP[1] <= float(frequency.ravel()[0]) <= 1.0 / TIME_STEP[0]:
-        raise FileFormatError(f"{name}: the frame rate is {one_line(str(frequency.tolist()), 30)}; give a positive one")
+        raise FileFormatError(
+            f"{name}: the frame rate is {one_line(str(frequency.tolist()), 30)}; "
+            f"give one number between {1.0 / TIME_STEP[1]:g} and {1.0 / TIME_STEP[0]:g} frames a second"
+        )
     frames = len(poses) if poses.ndim == 2 else 0
     if not 0 < frames <= MOST_FRAMES or poses.shape[1] < 3 * BODY or poses.shape[1] % 3:
         raise FileFormatError(

@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass, field
 
 from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP
+from wholebody.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.errors import FileFormatError, one_line
 from wholebody.motion.files.text import number as read_number
 from wholebody.motion.files.text import table
@@ -75,7 +75,7 @@ def parsed(text: str, name: str) -> BvhText:
     number = lines[rest - 1][0]
     dt = read_number(step, f"{name}, line {number}")
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; give a positive one")
+        raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; {TIME_STEP_ASKED}")
     wide = sum(len(joint.channels) for joint in place.joints)
     rows = [(number, line.split()) for number, line in lines[rest:]]
     values = table(name, rows[:count], wide)

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP
+from wholebody.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.files import read_text
@@ -125,7 +125,7 @@ def _head(name: str, row: tuple[int, list[str]]) -> float:
         raise FileFormatError(f"{name}, line {line}: {len(words)} values where the time step is due")
     dt = number(words[0], f"{name}, line {line}")
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(f"{name}, line {line}: the time step is {dt:g} s; give a positive one")
+        raise FileFormatError(f"{name}, line {line}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
     return dt
 
 
