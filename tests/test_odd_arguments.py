@@ -676,8 +676,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "ReachMap.counts", Call(mapped.counts, {})
     kept = wb.Records([wb.SolveRecord("a")])
     yield "Records.counts", Call(kept.counts, {})
-    yield "Records.first_refused", Call(kept.first_refused, {})
+    yield "Records.first_without_answer", Call(kept.first_without_answer, {})
     yield "Records.rows", Call(kept.rows, {})
+    yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
     yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}

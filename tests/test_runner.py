@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import os
 import signal
 import subprocess
@@ -123,6 +124,16 @@ def test_the_folders_of_the_package_hide_no_other_package(tmp_path: Path, monkey
         assert path[-1] == str(Path(runner.__file__).parents[1])
         assert "" not in path
         assert child.call(os.getenv, "OMP_NUM_THREADS", seconds=60.0) == "1"
+    finally:
+        child.close()
+
+
+def test_a_process_finds_the_modules_that_its_parent_finds(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "module_of_a_script.py").write_text("def twice(x): return 2 * x")
+    monkeypatch.syspath_prepend(tmp_path)
+    child = Child()
+    try:
+        assert child.call(importlib.import_module("module_of_a_script").twice, 3, seconds=60.0) == 6
     finally:
         child.close()
 

@@ -36,10 +36,10 @@ ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
 LONGEST_LINE = 200  # most characters kept of the last line that a process wrote
 
 _START = (
-    "import sys; sys.path[:] = [{root!r}, *filter(None, sys.path)]; from wholebody.runner import serve; "
-    "sys.path.remove({root!r}); sys.path.append({root!r}); serve({descriptor}, {parent})"
+    "import sys; sys.path[:] = [{root!r}, *filter(None, {path!r})]; from wholebody.runner import serve; "
+    "sys.path[:] = {path!r} + [{root!r}]; serve({descriptor}, {parent})"
 )
-"""The code of a new interpreter. It imports our package first, and then restores the order of the search path."""
+"""The code of a new interpreter: it imports our package first, and then searches where its parent does."""
 
 _parent: Connection | None = None  # in a process that serves jobs: the connection to the parent
 
@@ -219,11 +219,11 @@ def start_process(environment: Mapping[str, str]) -> Started:
     import wholebody
 
     ours, theirs = socket.socketpair()
-    root = str(Path(wholebody.__file__).parents[1])
+    root, path = str(Path(wholebody.__file__).parents[1]), [str(folder) for folder in sys.path]
     output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
     with theirs:
         process = subprocess.Popen(
-            [sys.executable, "-c", _START.format(root=root, descriptor=theirs.fileno(), parent=os.getpid())],
+            [sys.executable, "-c", _START.format(root=root, path=path, descriptor=theirs.fileno(), parent=os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=output,
             stderr=output,

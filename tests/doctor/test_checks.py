@@ -1,6 +1,5 @@
 from __future__ import annotations
 
-import os
 import sys
 from pathlib import Path
 
@@ -24,7 +23,7 @@ def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / "crashes.py").write_text("import os, signal; os.kill(os.getpid(), signal.SIGSEGV)")
     (tmp_path / "talks.py").write_text('print("[[not a report]]")')
     (tmp_path / "hangs.py").write_text("import time; time.sleep(60)")
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
+    monkeypatch.syspath_prepend(tmp_path)
     return tmp_path
 
 
@@ -37,9 +36,9 @@ def test_a_package_that_crashes_is_named_and_the_others_are_still_tried() -> Non
 
 @pytest.mark.usefixtures("hostile")
 def test_a_package_that_hangs_is_ended() -> None:
-    outcomes = checks.run("import", ["json", "hangs"], timeout=8)
+    outcomes = checks.run("import", ["json", "hangs"], timeout=5)
     assert outcomes["json"].works
-    assert outcomes["hangs"] == (False, "no answer within 8 s")
+    assert outcomes["hangs"] == (False, "no answer within 5 s")
 
 
 def test_the_current_folder_does_not_hide_packages(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -48,13 +47,10 @@ def test_the_current_folder_does_not_hide_packages(tmp_path: Path, monkeypatch: 
     assert checks.run("import", ["colorsys"])["colorsys"].works
 
 
-@pytest.mark.parametrize("name", ["osqp", "daqp", "quadprog"])
-def test_solvers_solve(name: str) -> None:
-    assert checks.run("program", [name])[name].works
-
-
-def test_a_solver_that_is_not_there_fails() -> None:
-    assert not checks.run("program", ["no_such_solver"])["no_such_solver"].works
+def test_solvers_solve_and_one_that_is_not_there_fails() -> None:
+    outcomes = checks.run("program", ["osqp", "no_such_solver", "daqp", "quadprog"])
+    works = {name: outcome.works for name, outcome in outcomes.items()}
+    assert works == {"osqp": True, "no_such_solver": False, "daqp": True, "quadprog": True}
 
 
 def test_every_method_poses() -> None:

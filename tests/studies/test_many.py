@@ -55,7 +55,7 @@ def test_answers_are_those_of_single_solves_whatever_jobs_is(arm: wb.Figure) -> 
 
 
 def test_warm_starts_are_the_same_whatever_jobs_is_and_solve_each_goal(arm: wb.Figure) -> None:
-    problems = [problem(arm, (0.4, 0.02 * k - 0.2, 0.5)) for k in range(20)]
+    problems = [problem(arm, (0.4, 0.02 * k - 0.2, 0.5)) for k in range(10)]
     one, two = (wb.solve_many(problems, jobs=jobs, warm_start=True) for jobs in (1, 2))
     for k, (a, b) in enumerate(zip(one, two, strict=True)):
         assert a.solved
@@ -71,6 +71,9 @@ def test_a_process_that_ends_costs_its_own_problem_alone(arm: wb.Figure) -> None
         assert good.solved
         assert (fatal.outcome, fatal.q) == ("ended", None)
         assert "SIGKILL" in fatal.message
+    told = repr(wb.Records([fatal]))
+    assert "first ended: fatal, the process ended with SIGKILL" in told
+    assert "goal missed most: none" in told
 
 
 class Failing(Fatal):

@@ -168,7 +168,9 @@ def test_what_was_refused_is_told_with_its_reason() -> None:
     def task(figure: wb.Figure, target: object, layout: object) -> wb.Problem:
         return wb.Problem(wb.Scene(figure), goals=[wb.Point("no such frame", (0.0, 0.0, 1.0))])
 
-    assert "first refused: F5, Point: no frame is called 'no such frame'" in repr(wb.study(task, people=["F5"]))
+    told = repr(wb.study(task, people=["F5"]))
+    assert "first refused: F5, Point: no frame is called 'no such frame'" in told
+    assert "goal missed most: none" in told
     told = repr(wb.accommodation(task, count=1))
     assert told.startswith("Accommodation of 2 people: 0%")
     assert "first refused: " in told

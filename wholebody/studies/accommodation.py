@@ -52,7 +52,8 @@ class Accommodation:
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{self.records.first_refused()}"
+        why = self.records.first_without_answer()
+        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{why}"
 
 
 def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[str, dict[str, Any]]:
@@ -109,6 +110,7 @@ def accommodation(
 
     Raises:
         InputError: a value of the wrong kind or range.
+        UnknownNameError: there is no such task file or method.
         FileFormatError: the task file cannot be read.
     """
     point = None if sees is None else inputs.point(sees, "accommodation: sees")

@@ -44,7 +44,7 @@ def draw_slices(found: Any, path: Path) -> Path:
     columns = -(-len(shown) // rows)
     deep, wide = (float(np.ptp(places)) + 0.1 for places in (found.x, found.y))
     high = INCHES * min(max(deep / wide, 0.4), 2.5) + LETTERS
-    chart, axes = _chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 4.0)))
+    chart, axes = new_chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 4.0)))
     values = heat(found)
     image: Any = None
     for axis in axes.flat[len(shown) :]:
@@ -55,17 +55,17 @@ def draw_slices(found: Any, path: Path) -> Path:
     bar.set_label(MEANING, fontsize="x-small")
     bar.ax.tick_params(labelsize="x-small")
     chart.suptitle(f"{found.frame}: {found.share:.0%} of {found.verdict.size} places reached, seen from above")
-    return write(path, _png(chart))
+    return write(path, png(chart))
 
 
 def write_page(found: Any, path: Path) -> Path:
     """Write a page with one picture a height and a slider; returns the path."""
     values, images = heat(found), []
     for k in range(len(found.z)):
-        chart, axes = _chart(1, 1, (6.4, 5.2))
+        chart, axes = new_chart(1, 1, (6.4, 5.2))
         image = _slice(axes[0, 0], found, values, k)
         chart.colorbar(image, ax=axes[0, 0]).set_label(MEANING, fontsize="small")
-        data = base64.b64encode(_png(chart)).decode()
+        data = base64.b64encode(png(chart)).decode()
         images.append(f'<img alt="places at {found.z[k]:.2f} m" src="data:image/png;base64,{data}">')
     facts = {**found.counts(), "solves": found.solves, "reach volume": f"{found.volume:.3g}"}
     text = _PAGE.format(
@@ -116,17 +116,18 @@ def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
     return image
 
 
-def _chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
+def new_chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
     """A chart and its axes; without pyplot, which keeps state of its own."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    chart = Figure(figsize=size, layout="constrained")
+    chart = Figure(figsize=size, dpi=DPI, layout="constrained")
     FigureCanvasAgg(chart)
     return chart, chart.subplots(rows, columns, squeeze=False)
 
 
-def _png(chart: Any) -> bytes:
+def png(chart: Any) -> bytes:
+    """A chart as the bytes of a PNG file, the same for the same chart."""
     stream = io.BytesIO()
-    chart.savefig(stream, format="png", dpi=DPI, metadata={"Software": None})
+    chart.canvas.print_png(stream, metadata={"Software": None})  # `savefig` would draw twice, for the layout
     return stream.getvalue()

@@ -20,6 +20,7 @@ from wholebody.files import check_writable, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
+COLUMN = "target"  # the factor that has columns in a chart; the others have rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +108,11 @@ class Records(Sequence[SolveRecord]):
     """The records of many solves, in the order in which they were asked."""
 
     def __init__(self, records: Sequence[SolveRecord]) -> None:
-        """Keep the records."""
+        """Keep the records.
+
+        Raises:
+            InputError: records is no list, or an entry is no `SolveRecord`.
+        """
         listed = checks.listed(records, "Records: records", "those of wb.solve_many")
         for one in listed:
             checks.instance(one, SolveRecord, "Records: a record", "give those of wb.solve_many")
@@ -125,17 +130,21 @@ class Records(Sequence[SolveRecord]):
     def __repr__(self) -> str:
         counts = ", ".join(f"{number} {outcome}" for outcome, number in self.counts().items()) or "none"
         seconds = sum(one.seconds for one in self._records)
-        worst = max(self._records, key=lambda one: one.goal_error, default=None)
+        placed = [one for one in self._records if one.q is not None]
+        worst = max(placed, key=lambda one: one.goal_error, default=None)
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
             f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
-            f"  goal missed most: {missed}{self.first_refused()}"
+            f"  goal missed most: {missed}{self.first_without_answer()}"
         )  # fmt: skip
 
-    def first_refused(self) -> str:
-        """A line about the first that was refused, with its message; "" for none."""
-        first = next((one for one in self._records if one.outcome == REFUSED), None)
-        return "" if first is None else f"\n  first refused: {first.name}, {first.message}"
+    def first_without_answer(self) -> str:
+        """Lines about the first that was refused and the first whose process ended, and why; "" for none."""
+        lines = ""
+        for outcome in (REFUSED, ENDED):
+            first = next((one for one in self._records if one.outcome == outcome), None)
+            lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"
+        return lines
 
     def counts(self) -> dict[str, int]:
         """How many records have each outcome."""
@@ -161,6 +170,26 @@ class Records(Sequence[SolveRecord]):
         except ImportError:
             return self.rows()
         return pandas.DataFrame(self.rows())
+
+    def chart(self, path: str | os.PathLike[str]) -> Path:
+        """Draw the outcomes as a table into a PNG file; returns the path.
+
+        Targets are columns, people and layouts are rows; without factors each record is a row. A cell has the colour of
+        its outcome, and where it is not solved the distance that is left, in millimetres.
+
+        Raises:
+            InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
+                outcome that no solve has; the file cannot be written.
+        """
+        from wholebody.studies.outcome_chart import Cell, draw_outcomes
+
+        file, cells = check_writable(checks.path(path, "chart: path")), []
+        for one in self._records:
+            others = [value for factor, value in (one.factors or {}).items() if factor != COLUMN]
+            row = ", ".join(others) if one.factors else one.name
+            left = 0.0 if one.solved else one.goal_error
+            cells.append(Cell(row, (one.factors or {}).get(COLUMN, ""), one.outcome, left))
+        return draw_outcomes(cells, file)
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
         """Write the rows as CSV; returns the path.
