@@ -22,7 +22,7 @@ def heap(seed: int) -> tuple[Array, ...]:
     mass = np.array([0.0, 1.0, 0.5, 2.0])
     inertia = np.array([np.zeros((3, 3)), *(np.diag(rng.uniform(0.5, 2.0, 3)) for _ in range(3))])
     laid = np.empty((5, 3, 3)), np.empty((5, 3, 2, 6)), np.empty((5, 3, 2, 6)), np.empty((5, 2))
-    contact_kernel.lay(bodies, normal, point, position, mass, inertia, *laid)
+    contact_kernel.write_rows(bodies, normal, point, position, mass, inertia, *laid)
     return bodies, rng.normal(size=(4, 6)) * np.array([[0.0], [1.0], [1.0], [1.0]]), *laid
 
 

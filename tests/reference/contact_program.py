@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.dynamics.solve_kernel import EVERY, EXACTER, MORE, NEARLY, ROUGH
+from wholebody.dynamics.solve_kernel import EXTRA_VISITS, FULL_SWEEP_PERIOD, JOINT_PRECISION, NEAR_TARGET, UNCONVERGED
 
 Array = np.ndarray
 
@@ -65,7 +65,7 @@ def solve(
             u, side = jacobian[rows[c]] @ twist, np.linalg.eigvalsh(gram[c][1:, 1:])[1]
             normal = max(0.0, p[c, 0] - (u[0] - target[c]) / gram[c][0, 0])
             if normal == 0.0 and not p[c].any():
-                if u[0] - target[c] < NEARLY:
+                if u[0] - target[c] < NEAR_TARGET:
                     bearing.append(c)
                 continue
             bearing.append(c)
@@ -84,15 +84,15 @@ def solve(
             step = np.linalg.solve(gram[c], off)
             twist += answer[:, rows[c]] @ step
             p[c] += step
-            change, square = max(change, EXACTER * np.abs(off).max()), square + step @ off
+            change, square = max(change, JOINT_PRECISION * np.abs(off).max()), square + step @ off
         left -= len(chosen) + joints
-        spent = left <= 0 and (change < ROUGH * tolerance or left <= (1 - MORE) * visits)
+        spent = left <= 0 and (change < UNCONVERGED * tolerance or left <= (1 - EXTRA_VISITS) * visits)
         if full:
             listed = sorted(bearing)
             way[[c for c in range(m - joints) if c not in listed]] = 0.0
             if change < tolerance or sweep >= most - 1 or spent:
                 return p, twist, sweep + 1
-        full = change < tolerance or spent or sweep >= most - 2 or sweep % EVERY == EVERY - 1
+        full = change < tolerance or spent or sweep >= most - 2 or sweep % FULL_SWEEP_PERIOD == FULL_SWEEP_PERIOD - 1
         share, last = (square / last if last else np.nan), square
         for c in [*listed, *range(m - joints, m)]:
             farther = share * way[c] if share < 1.0 else np.zeros(3)

@@ -4,7 +4,7 @@ At a point of the contact of bodies A and B, with the unit normal n from A to B 
 changes the velocities by M^-1 J^T p, and u = J v is the velocity of B's point relative to A's.
 
 The loops share these arrays: `bodies` (m, 2) has A and B of every point, `jacobian` (m, 3, 2, 6) the rows of J along
-n, t1, t2 for the velocity and angular velocity of A and of B, `answer` (m, 3, 2, 6) the same of J M^-1, `mobility`
+n, t1, t2 for the velocity and angular velocity of A and of B, `response` (m, 3, 2, 6) the same of J M^-1, `mobility`
 (m, 2) the change of u by a unit impulse, along n and the most along a tangent, `twist` (n, 6) the velocities of all.
 """
 
@@ -17,7 +17,7 @@ from wholebody.compiled import compiled
 
 
 @compiled()
-def lay(
+def write_rows(
     bodies: Indices,
     normal: Array,
     point: Array,
@@ -26,7 +26,7 @@ def lay(
     inverse_inertia: Array,
     axes: Array,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
 ) -> None:
     """Write what the program needs of every contact point.
@@ -40,7 +40,7 @@ def lay(
         inverse_inertia: (n, 3, 3) along the world's axes.
         axes: (m, 3, 3) room for the rows n, t1, t2.
         jacobian: (m, 3, 2, 6) room.
-        answer: (m, 3, 2, 6) room.
+        response: (m, 3, 2, 6) room.
         mobility: (m, 2) room.
     """
     gram = np.zeros((3, 3))
@@ -65,27 +65,27 @@ def lay(
                     turn -= (point[c, j] - position[body, j]) * axes[c, row, i]
                     jacobian[c, row, side, k] = sign * axes[c, row, k]
                     jacobian[c, row, side, 3 + k] = sign * turn
-                    answer[c, row, side, k] = inverse_mass[body] * sign * axes[c, row, k]
+                    response[c, row, side, k] = inverse_mass[body] * sign * axes[c, row, k]
                 for k in range(3):
                     total = 0.0
                     for i in range(3):
                         total += inverse_inertia[body, k, i] * jacobian[c, row, side, 3 + i]
-                    answer[c, row, side, 3 + k] = total
+                    response[c, row, side, 3 + k] = total
         for row in range(3):
             for other in range(3):
-                gram[row, other] = coupling(c, row, other, jacobian, answer)
+                gram[row, other] = coupling(c, row, other, jacobian, response)
         mobility[c, 0] = gram[0, 0]
         mean = 0.5 * (gram[1, 1] + gram[2, 2])
         mobility[c, 1] = mean + np.sqrt((0.5 * (gram[1, 1] - gram[2, 2])) ** 2 + gram[1, 2] ** 2)
 
 
 @compiled(inner=True)
-def coupling(c: int, row: int, other: int, jacobian: Array, answer: Array) -> float:
+def coupling(c: int, row: int, other: int, jacobian: Array, response: Array) -> float:
     """Change of the relative velocity along one axis of a point by a unit impulse along another."""
     total = 0.0
     for side in range(2):
         for k in range(6):
-            total += jacobian[c, row, side, k] * answer[c, other, side, k]
+            total += jacobian[c, row, side, k] * response[c, other, side, k]
     return total
 
 
@@ -100,12 +100,12 @@ def relative(c: int, row: int, bodies: Indices, jacobian: Array, twist: Array) -
 
 
 @compiled(inner=True)
-def push(c: int, row: int, impulse: float, bodies: Indices, answer: Array, twist: Array) -> None:
+def push(c: int, row: int, impulse: float, bodies: Indices, response: Array, twist: Array) -> None:
     """Change the velocities by an impulse along an axis of a contact point: on B, and its opposite on A."""
     a, b = bodies[c, 0], bodies[c, 1]
     for k in range(6):
-        twist[a, k] += impulse * answer[c, row, 0, k]
-        twist[b, k] += impulse * answer[c, row, 1, k]
+        twist[a, k] += impulse * response[c, row, 0, k]
+        twist[b, k] += impulse * response[c, row, 1, k]
 
 
 @compiled()
@@ -117,12 +117,12 @@ def rates(bodies: Indices, jacobian: Array, twist: Array, result: Array) -> None
 
 
 @compiled()
-def apply(bodies: Indices, answer: Array, twist: Array, impulse: Array) -> None:
+def apply(bodies: Indices, response: Array, twist: Array, impulse: Array) -> None:
     """Change the velocities by the impulses (m, 3) of all points."""
     for c in range(len(bodies)):
         for row in range(3):
             if impulse[c, row] != 0.0:
-                push(c, row, impulse[c, row], bodies, answer, twist)
+                push(c, row, impulse[c, row], bodies, response, twist)
 
 
 @compiled()

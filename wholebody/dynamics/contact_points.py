@@ -38,7 +38,7 @@ class ContactFinder:
     """Finds near pairs and their contact points for one run of the engine."""
 
     def __init__(self, pieces: Pieces) -> None:
-        """Lay tables for the pieces."""
+        """Build the tables of the pieces."""
         self.pieces = pieces
         self._proximity = PlacedProximity(pieces.table)
         self._rows = ContactRowBuilder(pieces.table, POINTS, SAME_NORMAL)

@@ -18,6 +18,7 @@ from wholebody.arrays import Array
 from wholebody.checks import TIME_STEP, number, posture, time_step
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
+SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
 STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
 MASS = DAMPING**2 / (4.0 * STIFFNESS)  # kg: a hand's 0.4, with which the spring is critically damped
 BLOCKED = 1e-3  # rad, m: by which contact keeps a joint from where the spring wants it; less is the method's accuracy
@@ -34,7 +35,7 @@ class Spring:
         mass: m [kg].
 
     Raises:
-        InputError: K or m is not positive, R is negative, one is not finite, or the mass is not within 1e-9 and 1e6 kg.
+        InputError: K is not within 1e-9 and 1e12 N/m, R not within 0 and 1e12 N s/m, or m not within 1e-9 and 1e6 kg.
     """
 
     stiffness: float = STIFFNESS
@@ -43,8 +44,8 @@ class Spring:
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        number(self.stiffness, "Spring: stiffness", LIGHTEST, 1e12, "N/m")
-        number(self.damping, "Spring: damping", 0.0, 1e12, "N s/m")
+        number(self.stiffness, "Spring: stiffness", SOFTEST, GREATEST, "N/m")
+        number(self.damping, "Spring: damping", 0.0, GREATEST, "N s/m")
         number(self.mass, "Spring: mass", LIGHTEST, HEAVIEST, "kg")
 
     def transition(self, time: float) -> Array:
@@ -54,7 +55,7 @@ class Spring:
         S = sinh(s t) / s, or cos and sin where s^2 is negative.
 
         Raises:
-            InputError: the time is not positive and finite.
+            InputError: the time is not within 1e-6 and 1e6 s.
         """
         time = number(time, "time", *TIME_STEP, "s")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
@@ -82,7 +83,11 @@ class Coupling:
     """
 
     def __init__(self, model: pin.Model, q: Array, spring: Spring | None = None) -> None:
-        """Begin at rest, at the posture q (nq,), which is tracked too."""
+        """Begin at rest, at the posture q (nq,), which is tracked too.
+
+        Raises:
+            InputError: q has another shape, or a value that is not finite.
+        """
         self.spring = Spring() if spring is None else spring
         self._model = model
         self._shown = self._tracked = posture(q, model.nq)
@@ -94,6 +99,9 @@ class Coupling:
         Args:
             tracked: (nq,) where the tracker is at the end of the frame.
             dt: seconds.
+
+        Raises:
+            InputError: tracked is no posture of the figure, or dt is not within 1e-6 and 1e6 s.
         """
         dt, model = time_step(dt, "dt"), self._model
         tracked = posture(tracked, model.nq, "tracked")

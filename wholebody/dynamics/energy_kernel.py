@@ -26,7 +26,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
 from wholebody.dynamics.contact_kernel import join
-from wholebody.dynamics.motion_kernel import angular_momentum
+from wholebody.dynamics.motion_kernel import angular_momentum, invert
 
 LARGEST = 1.05  # of s: an island with joints that hardly moves is not made to move by what rounding left
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
@@ -311,13 +311,8 @@ def _as_one(
                 for k in range(3):
                     gathered[k, i] += column[k] - mass[b] * lever[k] * lever[i]
                 gathered[i, i] += mass[b] * square
-    determinant = 0.0
-    for k in range(3):
-        i, j = (k + 1) % 3, (k + 2) % 3
-        determinant += gathered[0, k] * (gathered[1, i] * gathered[2, j] - gathered[1, j] * gathered[2, i])
-    for row in range(3):  # by cofactors: numba's solver loads scipy.linalg
-        for other in range(3):
-            i, j = (other + 1) % 3, (other + 2) % 3
-            k, m = (row + 1) % 3, (row + 2) % 3
-            cofactor = gathered[i, k] * gathered[j, m] - gathered[i, m] * gathered[j, k]
-            whole[3 + row] += cofactor / determinant * turning[other]
+    inverse = np.empty((3, 3))
+    invert(gathered, inverse)
+    for row in range(3):
+        for k in range(3):
+            whole[3 + row] += inverse[row, k] * turning[k]

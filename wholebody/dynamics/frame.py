@@ -48,7 +48,7 @@ class EngineFrame(NamedTuple):
         energy: kinetic and potential energy of the bodies that move by themselves, joules.
         work: energy that they were given, joules: by what is moved, during the frame, and by pushes since the one
             before. The energy grows by no more.
-        signorini: largest residual of the programs, m/s; see `contact_kernel.residuals`.
+        signorini: largest residual of the programs, m/s; see `solve_kernel.residuals`.
         coulomb: likewise.
         steps: how many steps were made, those made again included.
         sleeping: bodies that sleep.

@@ -33,11 +33,11 @@ def resolve(
     bodies: Indices,
     axes: Array,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
     restitution: Array,
     friction: Array,
-    held: Array,
+    effective_mass: Array,
     jointed: Mask,
     twist: Array,
     slow: float,
@@ -53,11 +53,11 @@ def resolve(
         bodies: (m, 2).
         axes: (m - j, 3, 3).
         jacobian: (m, 3, 2, 6).
-        answer: (m, 3, 2, 6).
+        response: (m, 3, 2, 6).
         mobility: (m, 2).
         restitution: (m - j,).
         friction: (m - j,).
-        held: (j, 3, 3) as in `solve_kernel.solve`; the last j points are those of joints.
+        effective_mass: (j, 3, 3) as in `solve_kernel.solve`; the last j points are those of joints.
         jointed: (n,) bodies that have joints.
         twist: (n, 6) changed in place.
         slow: approach that is no impact, m/s.
@@ -68,7 +68,7 @@ def resolve(
     Returns:
         How many events there were, and whether all are resolved.
     """
-    joints = len(held)
+    joints = len(effective_mass)
     chosen, before = np.empty(len(touching) + joints, dtype=np.intp), np.zeros((len(touching) + joints, 3))
     target, hold = np.zeros(len(pair)), np.zeros((joints, 3))
     for event in range(most):
@@ -97,15 +97,15 @@ def resolve(
             times = JOINTED
         if count == 1:
             _single(
-                worst, bodies, jacobian, answer, mobility, restitution[worst], friction[worst], twist, before[0],
+                worst, bodies, jacobian, response, mobility, restitution[worst], friction[worst], twist, before[0],
                 impulse[worst],
             )  # fmt: skip
         else:
             solve(
-                chosen[:count], bodies, jacobian, answer, mobility, friction, target, held, hold, twist, impulse, EXACT,
-                times * VISITS, times * SWEEPS,
+                chosen[:count], bodies, jacobian, response, mobility, friction, target, effective_mass, hold, twist,
+                impulse, EXACT, times * VISITS, times * SWEEPS,
             )  # fmt: skip
-            _lose(chosen[:count], bodies, jacobian, answer, twist, before, impulse)
+            _remove_gain(chosen[:count], bodies, jacobian, response, twist, before, impulse)
         events[event, 0], events[event, 1] = worst, -speed
         events[event, 2:] = 0.0
         for number in range(points):
@@ -120,7 +120,7 @@ def _single(
     c: int,
     bodies: Indices,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
     restitution: float,
     friction: float,
@@ -130,14 +130,14 @@ def _single(
 ) -> None:
     """The impulse at one point; eqs. 8 to 10."""
     normal = -(1.0 + restitution) * before[0] / mobility[c, 0]
-    push(c, 0, normal, bodies, answer, twist)
+    push(c, 0, normal, bodies, response, twist)
     impulse[0] = normal
     sliding = np.sqrt(before[1] ** 2 + before[2] ** 2)
     if sliding < 1e-12 or friction == 0.0:
         return
     one, two = before[1] / sliding, before[2] / sliding
-    along = one * one * coupling(c, 1, 1, jacobian, answer) + two * two * coupling(c, 2, 2, jacobian, answer)
-    along += 2.0 * one * two * coupling(c, 1, 2, jacobian, answer)
+    along = one * one * coupling(c, 1, 1, jacobian, response) + two * two * coupling(c, 2, 2, jacobian, response)
+    along += 2.0 * one * two * coupling(c, 1, 2, jacobian, response)
     now = one * relative(c, 1, bodies, jacobian, twist) + two * relative(c, 2, bodies, jacobian, twist)
     size = min(friction * normal, max(0.0, now / along))
     # energy added by the share f of friction: lost + f linear + f^2 square
@@ -146,16 +146,16 @@ def _single(
     if lost + linear + square > 0.0:
         size *= max(0.0, (-linear + np.sqrt(max(linear * linear - 4.0 * square * lost, 0.0))) / (2.0 * square))
     for row, part in ((1, -size * one), (2, -size * two)):
-        push(c, row, part, bodies, answer, twist)
+        push(c, row, part, bodies, response, twist)
         impulse[row] = part
 
 
 @compiled(inner=True)
-def _lose(
+def _remove_gain(
     chosen: Indices,
     bodies: Indices,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     twist: Array,
     before: Array,
     impulse: Array,
@@ -173,5 +173,5 @@ def _lose(
     share = max(0.0, -2.0 * linear / square)
     for c in chosen:
         for row in range(3):
-            push(c, row, (share - 1.0) * impulse[c, row], bodies, answer, twist)
+            push(c, row, (share - 1.0) * impulse[c, row], bodies, response, twist)
             impulse[c, row] *= share

@@ -6,6 +6,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.compiled import compiled
+from wholebody.dynamics.motion_kernel import invert
 
 
 @compiled()
@@ -28,30 +29,30 @@ def place(
             off[c, k] = 0.0
         for side in range(2):
             body, sign = bodies[c, side], 1.0 if side == 1 else -1.0
-            held = side == 0 and world[c]
+            fixed = side == 0 and world[c]
             for k in range(3):
                 total = anchor[c, side, k]
-                if not held:
+                if not fixed:
                     total = 0.0
                     for i in range(3):
                         total += rotation[body, k, i] * anchor[c, side, i]
                 lever[c, side, k] = total
-                off[c, k] += sign * (total if held else total + position[body, k])
+                off[c, k] += sign * (total if fixed else total + position[body, k])
 
 
 @compiled()
-def lay(
+def write_rows(
     bodies: Indices,
     world: Mask,
     lever: Array,
     inverse_mass: Array,
     inverse_inertia: Array,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
-    held: Array,
+    effective_mass: Array,
 ) -> None:
-    """Write what the program needs of every joint point: rows along the world's axes, as `contact_kernel.lay` does.
+    """Write what the program needs of every joint point, whose rows are along the world's axes.
 
     Args:
         bodies: (j, 2).
@@ -60,9 +61,9 @@ def lay(
         inverse_mass: (n,) zero for bodies that joints do not move.
         inverse_inertia: (n, 3, 3) along the world's axes.
         jacobian: (j, 3, 2, 6) room.
-        answer: (j, 3, 2, 6) room.
+        response: (j, 3, 2, 6) room.
         mobility: (j, 2) room; zero where nothing moves.
-        held: (j, 3, 3) room for the inverse of J M^-1 J^T; zero where nothing moves.
+        effective_mass: (j, 3, 3) room for the inverse of J M^-1 J^T; zero where nothing moves.
     """
     gram = np.zeros((3, 3))
     for c in range(len(bodies)):
@@ -79,27 +80,19 @@ def lay(
                 jacobian[c, row, side, 3 + i] = sign * lever[c, side, j]
                 jacobian[c, row, side, 3 + j] = -sign * lever[c, side, i]
                 for k in range(3):
-                    answer[c, row, side, k] = inverse_mass[body] * jacobian[c, row, side, k]
+                    response[c, row, side, k] = inverse_mass[body] * jacobian[c, row, side, k]
                     total = 0.0
                     for i in range(3):
                         total += inverse_inertia[body, k, i] * jacobian[c, row, side, 3 + i]
-                    answer[c, row, side, 3 + k] = total
+                    response[c, row, side, 3 + k] = total
         for row in range(3):
             for other in range(3):
                 gram[row, other] = 0.0
                 for side in range(2):
                     for k in range(6):
-                        gram[row, other] += jacobian[c, row, side, k] * answer[c, other, side, k]
+                        gram[row, other] += jacobian[c, row, side, k] * response[c, other, side, k]
         largest = max(gram[0, 0], gram[1, 1], gram[2, 2])
         mobility[c, 0], mobility[c, 1] = largest, largest
-        determinant = 0.0
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            determinant += gram[0, k] * (gram[1, i] * gram[2, j] - gram[1, j] * gram[2, i])
-        for row in range(3):
-            for other in range(3):
-                held[c, row, other] = 0.0
-                if largest > 0.0:
-                    i, j = (other + 1) % 3, (other + 2) % 3
-                    k, m = (row + 1) % 3, (row + 2) % 3
-                    held[c, row, other] = (gram[i, k] * gram[j, m] - gram[i, m] * gram[j, k]) / determinant
+        effective_mass[c] = 0.0
+        if largest > 0.0:
+            invert(gram, effective_mass[c])

@@ -26,12 +26,12 @@ SHORTEST_AXIS = 1e-3  # m: between the two points of a hinge
 
 
 class JointRows(NamedTuple):
-    """What the program needs of joints; see `joint_kernel.lay`."""
+    """What the program needs of joints; see `joint_kernel.write_rows`."""
 
     jacobian: Array
-    answer: Array
+    response: Array
     mobility: Array
-    held: Array
+    effective_mass: Array
 
 
 class Joints:
@@ -106,7 +106,7 @@ class Joints:
         """Write the rows of all joint points; `movable` (n,) are the bodies that joints move."""
         inverse_mass = np.where(movable, 1.0 / state.pieces.mass, 0.0)
         lever = self._place(state)[0]
-        joint_kernel.lay(
+        joint_kernel.write_rows(
             self.bodies, self._world, lever, inverse_mass, state.inverse_inertia(movable), *rows
         )  # fmt: skip
 
@@ -121,6 +121,6 @@ class Joints:
         self.write_rows(state, movable, rows)
         none = np.zeros(0)
         solve_kernel.solve(
-            np.arange(count), self.bodies, rows.jacobian, rows.answer, rows.mobility, none, none, rows.held,
-            np.zeros((count, 3)), twist, np.zeros((count, 3)), KEPT * solve_kernel.EXACTER, VISITS, SWEEPS,
+            np.arange(count), self.bodies, rows.jacobian, rows.response, rows.mobility, none, none, rows.effective_mass,
+            np.zeros((count, 3)), twist, np.zeros((count, 3)), KEPT * solve_kernel.JOINT_PRECISION, VISITS, SWEEPS,
         )  # fmt: skip

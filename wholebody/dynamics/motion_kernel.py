@@ -112,6 +112,20 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
 
 
 @compiled(inner=True)
+def invert(matrix: Array, result: Array) -> None:
+    """Write the inverse (3, 3) of a matrix that has one, by cofactors: numba's solver loads scipy.linalg."""
+    determinant = 0.0
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        determinant += matrix[0, k] * (matrix[1, i] * matrix[2, j] - matrix[1, j] * matrix[2, i])
+    for row in range(3):
+        for column in range(3):
+            i, j = (column + 1) % 3, (column + 2) % 3
+            k, m = (row + 1) % 3, (row + 2) % 3
+            result[row, column] = (matrix[i, k] * matrix[j, m] - matrix[i, m] * matrix[j, k]) / determinant
+
+
+@compiled(inner=True)
 def _write(rotation: Array, result: Array) -> None:
     for i in range(3):
         for j in range(3):

@@ -84,7 +84,7 @@ def check_passing(
     doubts = np.zeros(len(near.pair), dtype=bool)
     count = passing_kernel.doubtful(
         near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
-        near.placements, after.placements, pieces.body, state.position - before.kept[0], angle, pieces.levers, fall,
+        near.placements, after.placements, pieces.body, state.position - before.kept[0], angle, pieces.lever, fall,
         PASSING, *pieces.heights, doubts,
     )  # fmt: skip
     if count > DOUBTS:
@@ -110,9 +110,9 @@ def _meeting(
     shift = state.position - before.kept[0]
     turns = [pin.log3(state.rotation[k] @ before.kept[1][k].T) for k in (a, b)]
     shapes = [pieces.table.geometry.geometryObjects[k].geometry for k in pair]
-    sag = 0.125 * float(angle[a] ** 2 * pieces.levers[a] + angle[b] ** 2 * pieces.levers[b]) + fall
+    sag = 0.125 * float(angle[a] ** 2 * pieces.lever[a] + angle[b] ** 2 * pieces.lever[b]) + fall
     both, way = float(angle[a] + angle[b]), float(np.linalg.norm(shift[b] - shift[a]))
-    size = float(pieces.levers[a] + pieces.levers[b])
+    size = float(pieces.lever[a] + pieces.lever[b])
     placed = placements.copy()
 
     def place(at: float) -> None:

@@ -11,7 +11,6 @@ from wholebody import checks
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.errors import InputError
 from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Kinematics, PairTable, Proximity
 from wholebody.matter.inertia import MassProperties, mass_properties
 from wholebody.matter.materials import MATERIALS, Material, surface
@@ -63,7 +62,8 @@ class Pieces:
         table: pieces and pairs.
         restitution: (pairs,).
         friction: (pairs,).
-        levers: (n,) greatest distance of a body's swept points from its centre of mass, metres; 0 for a half-space.
+        lever: (n,) greatest distance of a body's swept points from its centre of mass, metres; 0 for a half-space.
+        heights: the last six arguments of `passing_kernel.highest`.
         notes: what was assumed about masses.
     """
 
@@ -160,30 +160,25 @@ class Pieces:
     def _add_swept_points(self) -> None:
         """Arrays for `passing_kernel.highest`, and the distances of points from centres of mass."""
         swept = self.table.swept
-        self.points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])
-        self.count: Indices = np.array([len(one.points) for one in swept], dtype=np.intp)
-        self.start: Indices = (np.cumsum(self.count) - self.count).astype(np.intp)
-        self.radius = np.array([one.radius for one in swept], dtype=float)
-        self.axes, self.plane = np.zeros((len(swept), 3)), np.zeros((len(swept), 4))
+        points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])
+        count: Indices = np.array([len(one.points) for one in swept], dtype=np.intp)
+        start: Indices = (np.cumsum(count) - count).astype(np.intp)
+        radius = np.array([one.radius for one in swept], dtype=float)
+        axes, plane = np.zeros((len(swept), 3)), np.zeros((len(swept), 4))
         centres = self.centre[self.body]
-        offset = np.linalg.norm(self.local[:, 3] - centres, axis=1)
-        self.lever = offset.copy()
+        lever = np.linalg.norm(self.local[:, 3] - centres, axis=1)
         for k, (one, piece) in enumerate(zip(swept, self.table.geometry.geometryObjects, strict=True)):
             if len(one.points):
                 placed = one.points @ self.local[k, :3] + self.local[k, 3] - centres[k]
-                self.lever[k] = float(np.linalg.norm(placed, axis=1).max())
+                lever[k] = float(np.linalg.norm(placed, axis=1).max())
             elif np.isinf(one.reach):
-                self.plane[k], self.lever[k] = one.faces[0], FARTHEST
+                plane[k], lever[k] = one.faces[0], 0.0
             else:
-                self.axes[k] = piece.geometry.radii
-                self.lever[k] += one.reach
-        self.levers = np.zeros(len(self.names))
-        np.maximum.at(self.levers, self.body, np.where(np.isinf([one.reach for one in swept]), 0.0, self.lever))
-
-    @property
-    def heights(self) -> tuple[Array, Indices, Indices, Array, Array, Array]:
-        """The last six arguments of `passing_kernel.highest`."""
-        return self.points, self.start, self.count, self.radius, self.axes, self.plane
+                axes[k] = piece.geometry.radii
+                lever[k] += one.reach
+        self.heights = (points, start, count, radius, axes, plane)
+        self.lever = np.zeros(len(self.names))
+        np.maximum.at(self.lever, self.body, lever)
 
 
 def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:

@@ -47,8 +47,8 @@ MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come 
 STOPS = 8  # early ends of steps in a frame, at most ...
 FEW = 12  # ... while so many bodies move; fewer with more of them: each stop costs a step of all bodies
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
-FASTEST = 1e3  # m/s2: of gravity
-STRONGEST = 1e6  # N s
+STRONGEST_GRAVITY = 1e3  # m/s2
+STRONGEST_PUSH = 1e6  # N s
 SEPARATIONS = 4  # rounds of parting pieces after a step
 CLOSINGS = 6  # programs of a step with joints, at most: each closes what the one before left by bodies' turning
 FINE = 1e-5  # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity
@@ -67,12 +67,17 @@ class RigidBodies:
     def __init__(self, scene: Scene, gravity: tuple[float, float, float] = GRAVITY) -> None:
         """Put all bodies where the scene has them; the figure stands in its first posture.
 
+        Args:
+            scene: figure and things; at least one has a `wb.Body`.
+            gravity: (3,) m/s2, each entry within 1000.
+
         Raises:
-            InputError: nothing in the scene has a body, two things overlap of which one moves, or two materials do not
-                know each other.
+            InputError: nothing in the scene has a body, two things overlap of which one moves, two materials do not
+                know each other, a thing has a joint to itself, or gravity is out of range.
+            UnknownNameError: a joint names a thing that is not there.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
-        self.gravity = _bounded(gravity, FASTEST, "gravity")
+        self.gravity = _bounded(gravity, STRONGEST_GRAVITY, "gravity")
         pieces = Pieces(scene)
         if not pieces.dynamic.any():
             raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
@@ -120,7 +125,7 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
-            InputError: the place is not three finite numbers.
+            InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         return self._velocity(number, point - self.state.position[number])
@@ -134,7 +139,7 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
-            InputError: the place is not three finite numbers.
+            InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
         lever = pin.skew(point - self.state.position[number])
@@ -155,10 +160,11 @@ class RigidBodies:
 
         Raises:
             UnknownNameError: there is none of that name.
-            InputError: impulse or place are not three finite numbers, or the body does not move by itself.
+            InputError: the impulse is not three numbers within 1e6 N s, the place not three within 1e6 m, or the body
+                does not move by itself.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        impulse = _bounded(impulse, STRONGEST, "impulse")
+        impulse = _bounded(impulse, STRONGEST_PUSH, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
         lever, jointed = point - self.state.position[number], self._joints.jointed[number]
@@ -356,7 +362,7 @@ class RigidBodies:
     def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
         state = self.state
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.levers
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> float:

@@ -1,4 +1,4 @@
-"""Bodies that lie still sleep: they cost nothing until something touches them."""
+"""Bodies that lie still sleep: they are left out of programs until something touches them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.geometry.proximity import Contacts
 
 STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
-PATIENCE = 0.5  # s that all bodies of an island are so slow before they sleep
+SLEEP_AFTER = 0.5  # s that all bodies of an island are so slow before they sleep
 TOUCHING = 1e-3  # m: nearer bodies wake each other
 
 
@@ -36,10 +36,10 @@ class Sleepers:
     def update(self, near: Contacts, dt: float) -> None:
         """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
         state = self._state
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.lever
         slow = speed < STILL
         self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
-        if not (self._slow_for[state.moving] >= PATIENCE).any():
+        if not (self._slow_for[state.moving] >= SLEEP_AFTER).any():
             return
         body = self._touching(near)
         island = np.empty(len(state.position), dtype=np.intp)
@@ -47,10 +47,10 @@ class Sleepers:
         least = np.full(len(island), np.inf)
         waiting = np.where(state.pieces.dynamic, np.where(state.moving, self._slow_for, np.inf), np.inf)
         np.minimum.at(least, island, waiting)
-        tired = state.moving & (least[island] >= PATIENCE)
-        state.moving &= ~tired
-        state.velocity[tired] = state.spin[tired] = 0.0
-        self._island[tired] = island[tired]
+        falling_asleep = state.moving & (least[island] >= SLEEP_AFTER)
+        state.moving &= ~falling_asleep
+        state.velocity[falling_asleep] = state.spin[falling_asleep] = 0.0
+        self._island[falling_asleep] = island[falling_asleep]
 
     def wake(self, near: Contacts) -> bool:
         """Wake what is touched by a body that moves; whether anything woke."""
@@ -59,7 +59,7 @@ class Sleepers:
         if not asleep.any():
             return False
         body = self._touching(near)
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.levers
+        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.lever
         pushing = (speed > STILL) & (state.moving | state.given)
         for one, other in ((0, 1), (1, 0)):
             touched = body[pushing[body[:, one]] & asleep[body[:, other]], other]

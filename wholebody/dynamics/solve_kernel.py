@@ -18,12 +18,12 @@ from wholebody.arrays import Array, Indices
 from wholebody.compiled import compiled
 from wholebody.dynamics.contact_kernel import join
 
-EXACTER = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
-NEARLY = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
-EVERY = 8  # sweeps over the points that bear something between sweeps over all
-ROUGH = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
-MORE = 6  # ... until they are so many times as many
-ALONE = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
+JOINT_PRECISION = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
+NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
+FULL_SWEEP_PERIOD = 8  # sweeps over the points that bear something between sweeps over all
+UNCONVERGED = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
+EXTRA_VISITS = 6  # ... until they are so many times as many
+ISLAND_SWEEPS = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
@@ -42,14 +42,14 @@ def _rates(c: int, bodies: Indices, rows: Array, twist: Array) -> tuple[float, f
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
 def _push(
-    c: int, bodies: Indices, answers: Array, one: float, two: float, three: float, twist: Array, impulse: Array
+    c: int, bodies: Indices, responses: Array, one: float, two: float, three: float, twist: Array, impulse: Array
 ) -> None:
     """Add to the impulse of a point, and change the velocities of A and B by that."""
     a, b = bodies[c, 0], bodies[c, 1]
     for k in range(6):
-        twist[a, k] += one * answers[c, 0, k] + two * answers[c, 1, k] + three * answers[c, 2, k]
+        twist[a, k] += one * responses[c, 0, k] + two * responses[c, 1, k] + three * responses[c, 2, k]
     for k in range(6, 12):
-        twist[b, k - 6] += one * answers[c, 0, k] + two * answers[c, 1, k] + three * answers[c, 2, k]
+        twist[b, k - 6] += one * responses[c, 0, k] + two * responses[c, 1, k] + three * responses[c, 2, k]
     impulse[c, 0] += one
     impulse[c, 1] += two
     impulse[c, 2] += three
@@ -60,7 +60,7 @@ def _visit(
     c: int,
     bodies: Indices,
     rows: Array,
-    answers: Array,
+    responses: Array,
     mobility: Array,
     across: Array,
     friction: Array,
@@ -78,7 +78,7 @@ def _visit(
     before, first, second = impulse[c, 0], impulse[c, 1], impulse[c, 2]
     now = max(0.0, before - open_by / each)
     if now == 0.0 and before == 0.0 and first == 0.0 and second == 0.0:
-        return 0.0, 0.0, open_by < NEARLY
+        return 0.0, 0.0, open_by < NEAR_TARGET
     step, side = now - before, mobility[c, 1]
     one = first - (one + across[c, 0] * step) / side
     two = second - (two + across[c, 1] * step) / side
@@ -86,7 +86,7 @@ def _visit(
     if size > most:
         one, two = one * (most / size), two * (most / size)
     one, two = one - first, two - second
-    _push(c, bodies, answers, step, one, two, twist, impulse)
+    _push(c, bodies, responses, step, one, two, twist, impulse)
     impulse[c, 0] = now  # without rounding: none is less than zero
     change = max(abs(step) * each, max(abs(one), abs(two)) * side)
     return change, step * step * each + (one * one + two * two) * side, True
@@ -98,9 +98,9 @@ def _hold(
     chosen: Indices,
     bodies: Indices,
     rows: Array,
-    answers: Array,
+    responses: Array,
     mobility: Array,
-    held: Array,
+    effective_mass: Array,
     hold: Array,
     twist: Array,
     impulse: Array,
@@ -112,15 +112,16 @@ def _hold(
         c = chosen[place]
         if mobility[c, 0] <= 0.0:
             continue
-        number = c - len(bodies) + len(held)
+        number = c - len(bodies) + len(effective_mass)
         one, two, three = _rates(c, bodies, rows, twist)
         one, two, three = hold[number, 0] - one, hold[number, 1] - two, hold[number, 2] - three
-        p = held[number, 0, 0] * one + held[number, 0, 1] * two + held[number, 0, 2] * three
-        q = held[number, 1, 0] * one + held[number, 1, 1] * two + held[number, 1, 2] * three
-        r = held[number, 2, 0] * one + held[number, 2, 1] * two + held[number, 2, 2] * three
+        own = effective_mass[number]
+        p = own[0, 0] * one + own[0, 1] * two + own[0, 2] * three
+        q = own[1, 0] * one + own[1, 1] * two + own[1, 2] * three
+        r = own[2, 0] * one + own[2, 1] * two + own[2, 2] * three
         for row in range(3):
             before[place, row] = impulse[c, row]
-        _push(c, bodies, answers, p, q, r, twist, impulse)
+        _push(c, bodies, responses, p, q, r, twist, impulse)
         change = max(change, abs(one), abs(two), abs(three))
         square += p * one + q * two + r * three
     return change, square
@@ -131,11 +132,11 @@ def solve(
     chosen: Indices,
     bodies: Indices,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
     friction: Array,
     target: Array,
-    held: Array,
+    effective_mass: Array,
     hold: Array,
     twist: Array,
     impulse: Array,
@@ -149,28 +150,29 @@ def solve(
         chosen: (k,) points of the program, in order; the last j of all m are those of joints.
         bodies: (m, 2).
         jacobian: (m, 3, 2, 6).
-        answer: (m, 3, 2, 6).
+        response: (m, 3, 2, 6).
         mobility: (m, 2).
         friction: (m - j,) coefficients.
         target: (m - j,) least u_n after it, m/s.
-        held: (j, 3, 3) impulses of a joint point by a unit velocity: inverses of its J M^-1 J^T.
+        effective_mass: (j, 3, 3) impulses of a joint point by a unit velocity: inverses of its J M^-1 J^T.
         hold: (j, 3) u of the joint points after it, m/s.
         twist: (n, 6) velocities with the impulses at the start; changed in place.
         impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
         tolerance: a sweep over all that changes no u by more ends it, m/s.
-        visits: of points, after which the next sweep over all ends it; `MORE` times as many where impulses change much.
+        visits: of points, after which the next sweep over all ends it; `EXTRA_VISITS` times as many where impulses
+            change much.
         most: sweeps, the last of which is always one of projection over all.
     """
-    count, joints = len(chosen), len(bodies) - len(held)
-    rows, answers = jacobian.reshape(len(bodies), 3, 12), answer.reshape(len(bodies), 3, 12)
+    count, joints = len(chosen), len(bodies) - len(effective_mass)
+    rows, responses = jacobian.reshape(len(bodies), 3, 12), response.reshape(len(bodies), 3, 12)
     before, way, across = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((joints, 2))
     contacts = 0
     for c in chosen:
         if c < joints:
             contacts += 1
             for k in range(12):
-                across[c, 0] += rows[c, 1, k] * answers[c, 0, k]
-                across[c, 1] += rows[c, 2, k] * answers[c, 0, k]
+                across[c, 0] += rows[c, 1, k] * responses[c, 0, k]
+                across[c, 1] += rows[c, 2, k] * responses[c, 0, k]
     listed = np.arange(count)
     bearing, last, full, left = 0, np.inf, True, visits
     for sweep in range(most):
@@ -186,7 +188,7 @@ def solve(
             for row in range(3):
                 before[place, row] = impulse[c, row]
             largest, moved, bears = _visit(
-                c, bodies, rows, answers, mobility, across, friction, target, twist, impulse
+                c, bodies, rows, responses, mobility, across, friction, target, twist, impulse
             )  # fmt: skip
             change, square = max(change, largest), square + moved
             if full and bears:
@@ -197,11 +199,11 @@ def solve(
                     way[place, row] = 0.0
         if contacts < count:
             largest, moved = _hold(
-                contacts, chosen, bodies, rows, answers, mobility, held, hold, twist, impulse, before
+                contacts, chosen, bodies, rows, responses, mobility, effective_mass, hold, twist, impulse, before
             )  # fmt: skip
-            change, square = max(change, EXACTER * largest), square + moved
+            change, square = max(change, JOINT_PRECISION * largest), square + moved
         left -= size + count - contacts
-        spent = left <= 0 and (change < ROUGH * tolerance or left <= (1 - MORE) * visits)
+        spent = left <= 0 and (change < UNCONVERGED * tolerance or left <= (1 - EXTRA_VISITS) * visits)
         if full:
             bearing = kept
             if sweep % 2 == 1:  # in the order of the points again
@@ -210,7 +212,7 @@ def solve(
                     listed[index], listed[other] = listed[other], listed[index]
             if change < tolerance or sweep >= most - 1 or spent:
                 return sweep + 1
-        full = change < tolerance or spent or sweep >= most - 2 or sweep % EVERY == EVERY - 1
+        full = change < tolerance or spent or sweep >= most - 2 or sweep % FULL_SWEEP_PERIOD == FULL_SWEEP_PERIOD - 1
         share, last = square / last, square
         for index in range(bearing + count - contacts):
             place = listed[index] if index < bearing else contacts + index - bearing
@@ -221,7 +223,7 @@ def solve(
                 way[place, 1] = two + impulse[c, 1] - before[place, 1]
                 way[place, 2] = three + impulse[c, 2] - before[place, 2]
                 if one != 0.0 or two != 0.0 or three != 0.0:
-                    _push(c, bodies, answers, one, two, three, twist, impulse)
+                    _push(c, bodies, responses, one, two, three, twist, impulse)
             else:
                 for row in range(3):
                     way[place, row] = 0.0
@@ -232,11 +234,11 @@ def solve(
 def solve_islands(
     bodies: Indices,
     jacobian: Array,
-    answer: Array,
+    response: Array,
     mobility: Array,
     friction: Array,
     target: Array,
-    held: Array,
+    effective_mass: Array,
     hold: Array,
     twist: Array,
     impulse: Array,
@@ -252,31 +254,31 @@ def solve_islands(
     Args:
         bodies: (m, 2); all arrays and the tolerance are as in `solve`.
         jacobian: (m, 3, 2, 6).
-        answer: (m, 3, 2, 6).
+        response: (m, 3, 2, 6).
         mobility: (m, 2).
         friction: (m - j,).
         target: (m - j,).
-        held: (j, 3, 3).
+        effective_mass: (j, 3, 3).
         hold: (j, 3).
         twist: (n, 6).
         impulse: (m, 3).
         tolerance: m/s.
-        visits: of all points; an island has as many sweeps as that allows them all, and `MORE` times as many where
-            impulses change much.
+        visits: of all points; an island has as many sweeps as that allows them all, and `EXTRA_VISITS` times as many
+            where impulses change much.
         most: sweeps over an island.
     """
-    count, joints = len(bodies), len(bodies) - len(held)
-    rows, answers = jacobian.reshape(count, 3, 12), answer.reshape(count, 3, 12)
+    count, joints = len(bodies), len(bodies) - len(effective_mass)
+    rows, responses = jacobian.reshape(count, 3, 12), response.reshape(count, 3, 12)
     across, before, everything = np.zeros((joints, 2)), np.zeros((count, 3)), np.arange(count)
     movable = np.zeros(len(twist), dtype=np.bool_)
     for c in range(count):
         for side in range(2):
-            movable[bodies[c, side]] |= answers[c, 0, 6 * side] != 0.0 or answers[c, 1, 6 * side] != 0.0
-            movable[bodies[c, side]] |= answers[c, 2, 6 * side] != 0.0
+            movable[bodies[c, side]] |= responses[c, 0, 6 * side] != 0.0 or responses[c, 1, 6 * side] != 0.0
+            movable[bodies[c, side]] |= responses[c, 2, 6 * side] != 0.0
         if c < joints:
             for k in range(12):
-                across[c, 0] += rows[c, 1, k] * answers[c, 0, k]
-                across[c, 1] += rows[c, 2, k] * answers[c, 0, k]
+                across[c, 0] += rows[c, 1, k] * responses[c, 0, k]
+                across[c, 1] += rows[c, 2, k] * responses[c, 0, k]
     usual = min(most, visits // max(count, 1) + 1)
     listed, points = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
     changes, worst = np.zeros(count), np.zeros(len(twist))
@@ -288,7 +290,7 @@ def solve_islands(
             if mobility[c, 0] <= 0.0:
                 continue
             changes[c], _, bears = _visit(
-                c, bodies, rows, answers, mobility, across, friction, target, twist, impulse
+                c, bodies, rows, responses, mobility, across, friction, target, twist, impulse
             )  # fmt: skip
             change = max(change, changes[c])
             if bears:
@@ -298,9 +300,9 @@ def solve_islands(
             if mobility[c, 0] <= 0.0:
                 continue
             largest, _ = _hold(
-                c, everything[: c + 1], bodies, rows, answers, mobility, held, hold, twist, impulse, before
+                c, everything[: c + 1], bodies, rows, responses, mobility, effective_mass, hold, twist, impulse, before
             )  # fmt: skip
-            changes[c] = EXACTER * largest
+            changes[c] = JOINT_PRECISION * largest
             change = max(change, changes[c])
             listed[bearing] = c
             bearing += 1
@@ -323,14 +325,14 @@ def solve_islands(
         solved = True
         for island in range(len(twist)):
             start = first[island - 1] if island > 0 else 0
-            if worst[island] < tolerance or swept[island] >= min(most, MORE * usual):
+            if worst[island] < tolerance or swept[island] >= min(most, EXTRA_VISITS * usual):
                 continue
-            if swept[island] >= usual and worst[island] < ROUGH * tolerance:
+            if swept[island] >= usual and worst[island] < UNCONVERGED * tolerance:
                 continue
             solved = False
             swept[island] += solve(
-                points[start : first[island]], bodies, jacobian, answer, mobility, friction, target, held, hold, twist,
-                impulse, 0.5 * tolerance, ALONE * count, ALONE,
+                points[start : first[island]], bodies, jacobian, response, mobility, friction, target, effective_mass,
+                hold, twist, impulse, 0.5 * tolerance, ISLAND_SWEEPS * count, ISLAND_SWEEPS,
             )  # fmt: skip
         if solved:
             return sweeps

@@ -31,14 +31,14 @@ class Impulses(NamedTuple):
         pair: (k,) pair of each point.
         local: (k, 3) the point in the first body's axes.
         impulse: (k, 3) on the second body, in the world, N s.
-        held: (j, 3) of the joints, likewise.
+        joint: (j, 3) of the joint points, likewise.
         time: of the step, seconds.
     """
 
     pair: Indices
     local: Array
     impulse: Array
-    held: Array
+    joint: Array
     time: float
 
     @staticmethod
@@ -49,7 +49,7 @@ class Impulses(NamedTuple):
     def over(self, time: float) -> Impulses:
         """The same forces during another time."""
         share = time / self.time
-        return with_values(self, impulse=share * self.impulse, held=share * self.held, time=time)
+        return with_values(self, impulse=share * self.impulse, joint=share * self.joint, time=time)
 
 
 class _PointRows(NamedTuple):
@@ -58,9 +58,9 @@ class _PointRows(NamedTuple):
     bodies: Indices
     axes: Array
     jacobian: Array
-    answer: Array
+    response: Array
     mobility: Array
-    held: Array
+    effective_mass: Array
 
 
 class StepProgram:
@@ -70,12 +70,12 @@ class StepProgram:
         points: the contact points.
         speed: (m,) rate of each gap before the step, m/s.
         hits: (m,) time to the impact of each point; infinite where there is none.
-        impulse: (m + j, 3) answer of `solve` along the axes of each point, N s; those of joints are at the end.
+        impulse: (m + j, 3) what `solve` found, along the axes of each point, N s; those of joints are at the end.
         residuals: Signorini's and Coulomb's, m/s.
     """
 
     def __init__(self, state: BodiesState, points: ContactPoints, gravity: Array, joints: Joints) -> None:
-        """Lay out the points."""
+        """Compute the rows of the points."""
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
@@ -111,12 +111,12 @@ class StepProgram:
             bodies, np.empty((count, 3, 3)), np.empty((whole, 3, 2, 6)), np.empty((whole, 3, 2, 6)),
             np.empty((whole, 2)), np.empty((len(joints), 3, 3)),
         )  # fmt: skip
-        contact_kernel.lay(
+        contact_kernel.write_rows(
             points.bodies, points.normal, points.point, state.position, np.where(movable, 1.0 / state.pieces.mass, 0.0),
-            state.inverse_inertia(movable), rows.axes, rows.jacobian, rows.answer, rows.mobility,
+            state.inverse_inertia(movable), rows.axes, rows.jacobian, rows.response, rows.mobility,
         )  # fmt: skip
         if len(joints):
-            own = (rows.jacobian[count:], rows.answer[count:], rows.mobility[count:], rows.held)
+            own = (rows.jacobian[count:], rows.response[count:], rows.mobility[count:], rows.effective_mass)
             joints.write_rows(state, movable, JointRows(*own))
         return rows
 
@@ -139,15 +139,15 @@ class StepProgram:
         self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
-        bodies, jacobian, answer, mobility = (
+        bodies, jacobian, response, mobility = (
             np.concatenate([one[:count], other[: len(gap)], one[count:]])
             for one, other in (
-                (rows.bodies, own.bodies), (rows.jacobian, own.jacobian), (rows.answer, own.answer),
+                (rows.bodies, own.bodies), (rows.jacobian, own.jacobian), (rows.response, own.response),
                 (rows.mobility, own.mobility),
             )
         )  # fmt: skip
         axes = np.concatenate([rows.axes, own.axes])
-        self._rows = _PointRows(bodies.astype(np.intp), axes, jacobian, answer, mobility, rows.held)
+        self._rows = _PointRows(bodies.astype(np.intp), axes, jacobian, response, mobility, rows.effective_mass)
         # what bears a body is known to the next points that join the step
         self.impulse = np.concatenate([self.impulse[:count], np.zeros((len(gap), 3)), self.impulse[count:]])
 
@@ -163,9 +163,9 @@ class StepProgram:
         rows = self._point_rows(state.moving | weighed) if weighed.any() else self._rows
         twist, events = state.twist.copy(), np.zeros((MOST_EVENTS, 5))
         count, ended = impact_kernel.resolve(
-            np.flatnonzero(self._touching), points.pair, rows.bodies, rows.axes, rows.jacobian, rows.answer,
-            rows.mobility, self._restitution, self._friction, rows.held, self.joints.jointed, twist, SLOW, MOST_EVENTS,
-            np.zeros_like(self.impulse), events,
+            np.flatnonzero(self._touching), points.pair, rows.bodies, rows.axes, rows.jacobian, rows.response,
+            rows.mobility, self._restitution, self._friction, rows.effective_mass, self.joints.jointed, twist, SLOW,
+            MOST_EVENTS, np.zeros_like(self.impulse), events,
         )  # fmt: skip
         state.twist[state.moving] = twist[state.moving]
         return events[:count], ended
@@ -243,10 +243,10 @@ class StepProgram:
                 start.pair, start.local, start.impulse, head, points.pair, self._local, rows.axes, SAME_POINT,
                 self.impulse,
             )  # fmt: skip
-        self.impulse[count:] = start.held
-        contact_kernel.apply(rows.bodies, rows.answer, state.twist, self.impulse)
+        self.impulse[count:] = start.joint
+        contact_kernel.apply(rows.bodies, rows.response, state.twist, self.impulse)
         solve_kernel.solve_islands(
-            rows.bodies, rows.jacobian, rows.answer, rows.mobility, self._friction, target, rows.held, hold,
+            rows.bodies, rows.jacobian, rows.response, rows.mobility, self._friction, target, rows.effective_mass, hold,
             state.twist, self.impulse, TOLERANCE, VISITS, MOST,
         )  # fmt: skip
         self.residuals = solve_kernel.residuals(
@@ -283,8 +283,9 @@ class StepProgram:
         points, rows = self.points, self._rows
         way = np.zeros_like(self.state.twist)
         solve_kernel.solve_islands(
-            rows.bodies, rows.jacobian, rows.answer, rows.mobility, np.zeros(len(points.gap)), gap - points.gap,
-            rows.held, -self.joints.gaps(self.state), way, np.zeros_like(self.impulse), 0.01 * gap, VISITS, MOST,
+            rows.bodies, rows.jacobian, rows.response, rows.mobility, np.zeros(len(points.gap)), gap - points.gap,
+            rows.effective_mass, -self.joints.gaps(self.state), way, np.zeros_like(self.impulse), 0.01 * gap,
+            VISITS, MOST,
         )  # fmt: skip
         return way
 

@@ -101,8 +101,9 @@ class World(NotCopyable):
             spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default.
 
         Raises:
-            InputError: no posture near the start is free, or two things overlap of which one moves by itself.
-            UnknownNameError: another overlap.
+            InputError: no posture near the start is free, two things overlap of which one moves by itself, or a
+                value of the wrong kind, shape or range.
+            UnknownNameError: another overlap, or a joint names a thing that is not there.
         """
         self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
         instance(spring, (Spring, type(None)), "World: spring", "give wb.Spring(mass=0.4), or leave it out")
@@ -137,7 +138,7 @@ class World(NotCopyable):
             tracked: (nq,) where the tracker is at the end of the frame; None for where it was.
 
         Raises:
-            InputError: objects were added to or removed from the scene.
+            InputError: objects were added to or removed from the scene, or tracked consists of no numbers.
         """
         self._check_fresh()
         began, note = time.perf_counter(), ""
@@ -212,7 +213,7 @@ class World(NotCopyable):
 
 def _scene_instead(given: object) -> str:
     """What to do where no scene was given."""
-    mend = "make one with wb.Scene(figure)"
+    correction = "make one with wb.Scene(figure)"
     if isinstance(given, AssemblyBodies):
-        mend += "; an assembly has no motion of its own: add its bodies as things with wb.Body(joints=...)"
-    return mend
+        correction += "; an assembly has no motion of its own: add its bodies as things with wb.Body(joints=...)"
+    return correction
