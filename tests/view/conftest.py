@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wholebody.view import screenshot
 from wholebody.view.browser import Browser, find_chromium
 
 
@@ -103,9 +104,22 @@ def chromium() -> str:
     return found
 
 
+_RARELY = "window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 100)"
+
+
 @pytest.fixture(scope="session")
-def _browser(chromium: str) -> Iterator[Browser]:
-    with Browser((320, 240)) as browser:
+def draw_rarely() -> Callable[[Browser], None]:
+    """Return a function: pages that a browser opens from now on draw ten times a second.
+
+    Without a GPU sixty times keep a core busy, and no test asks for them.
+    """
+    return lambda browser: browser._call("Page.addScriptToEvaluateOnNewDocument", source=_RARELY) and None
+
+
+@pytest.fixture(scope="session")
+def _browser(chromium: str, draw_rarely: Callable[[Browser], None]) -> Iterator[Browser]:
+    with screenshot.Browser() as browser:  # one that drew pictures before, if there is one
+        draw_rarely(browser)
         yield browser
 
 

@@ -21,25 +21,26 @@ pytestmark = pytest.mark.browser
 
 @pytest.mark.parametrize("detail", ["capsules", "hulls"])
 def test_the_human_in_a_scene_is_where_pinocchio_says(
-    detail: str, browser: Browser, as_pinocchio_says: Any, nodes: Any, tmp_path: Path
+    detail: str, browser: Browser, as_pinocchio_says: Any, nodes: Any
 ) -> None:
     figure = load("human", detail=detail)
     scene = Scene(figure)
     scene.add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
     scene.add(Box((0.5, 1.2, 0.03)), name="table", at=(0.6, 0.0, 0.75))
     scene.attach(Sphere(0.08), to="thorax", name="pouch", at=(0.25, 0.0, 0.0))
-    viewer = Viewer(scene)
-    viewer.show(figure.posture("standing"), pieces=True)
-    scene.move("table", at=(0.8, 0.1, 0.7, 0.0, 0.0, 0.38268343, 0.92387953))
-    q = figure.posture("arms_forward")
-    viewer.show(q, pieces=True)
-    browser.open(viewer.save(tmp_path / "scene.html").as_uri())
-    as_pinocchio_says(scene, q)
-    scene.remove("pouch")
-    viewer.show(q, pieces=True)
-    browser.open(viewer.save(tmp_path / "scene.html").as_uri())
-    as_pinocchio_says(scene, q)
-    assert nodes(["/objects/pouch"]) == [None]
+    with Viewer(scene) as viewer:
+        viewer.show(figure.posture("standing"), pieces=True)
+        scene.move("table", at=(0.8, 0.1, 0.7, 0.0, 0.0, 0.38268343, 0.92387953))
+        q = figure.posture("arms_forward")
+        viewer.show(q, pieces=True)
+        browser.open(viewer.url)
+        assert viewer.sync(10.0)
+        as_pinocchio_says(scene, q)
+        scene.remove("pouch")
+        viewer.show(q, pieces=True)
+        assert viewer.sync(10.0)
+        as_pinocchio_says(scene, q)
+        assert nodes(["/objects/pouch"]) == [None]
 
 
 def test_a_picture_of_the_human(chromium: str, tmp_path: Path) -> None:
@@ -62,12 +63,11 @@ def test_a_body_that_is_small_in_the_picture_is_drawn_with_fewer_triangles(brows
     figure = load("human")
     viewer = Viewer(Scene(figure))
     viewer.show(figure.posture("standing"))
-    drawn = []
-    for far in (1.2, 12.0):
-        viewer.look((far, 0.0, 1.0), (0.0, 0.0, 1.0))
-        browser.open(viewer.save(tmp_path / "page.html").as_uri())
-        drawn.append(browser.evaluate("(viewer.render(), viewer.renderer.info.render.triangles)"))
-    near, small = drawn
+    viewer.look((1.2, 0.0, 1.0), (0.0, 0.0, 1.0))
+    browser.open(viewer.save(tmp_path / "page.html").as_uri())
+    count = "(viewer.render(), viewer.renderer.info.render.triangles)"
+    near = browser.evaluate(count)
+    small = browser.evaluate(f"viewer.camera.position.x = 12.0; {count}")
     surface = surface_of(figure)
     assert surface is not None
     fine = sum(len(patch.faces) for patch in surface.patches())

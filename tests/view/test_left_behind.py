@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
 import tempfile
@@ -63,3 +64,23 @@ def running(pid: int) -> bool:
         return ") Z " not in Path(f"/proc/{pid}/stat").read_text()
     except OSError:
         return False
+
+
+@pytest.mark.browser
+@pytest.mark.usefixtures("chromium")
+def test_a_browser_ends_by_itself_while_a_forked_process_holds_its_pipes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such as those of `multiprocessing`: Chromium does not see that its pipe ends, so it is told."""
+    started = Browser((64, 64))
+    forked = os.fork()
+    if forked == 0:
+        time.sleep(60)
+        os._exit(0)
+    killed: list[int] = []
+    try:
+        with monkeypatch.context() as patch:
+            patch.setattr(os, "killpg", lambda group, _: killed.append(group))
+            started.close()
+    finally:
+        os.kill(forked, signal.SIGKILL)
+        os.waitpid(forked, 0)
+    assert not killed

@@ -53,53 +53,51 @@ def press(browser: Browser, text: str) -> None:
     browser.evaluate(script)
 
 
-def raised(browser: Browser, client: Any, drag: LiveDrag, x: float, y: float, before: Any) -> bool:
-    """Press on the palm's handle and move up; whether the palm follows. If not, the handle was not yet drawn."""
-    client.camera.position, client.camera.look_at = EYE, TARGET  # where there is no handle the mouse turns the camera
-    until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
-    time.sleep(3.0)
-    browser.mouse("mouseMoved", x, y)
-    browser.mouse("mousePressed", x, y, pressed=True)
-    for share in np.linspace(0.0, 1.0, 7)[1:]:
-        browser.mouse("mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
-    end = time.monotonic() + 20.0
-    while time.monotonic() < end:
-        if drag.place("right_palm")[2] > before[2] + 0.05:
-            return True
-        time.sleep(0.05)
-    browser.mouse("mouseReleased", x + 12, y - 24)
-    return False
+def reached(browser: Browser, x: float, y: float) -> bool:
+    """Move the mouse to a pixel; whether the page has drawn a handle there, of which its cursor tells."""
+    for side in (3, 0):  # a mouse that stays tells nothing
+        browser.mouse("mouseMoved", x + side, y)
+    return bool(browser.evaluate("[...document.querySelectorAll('canvas')].some(c => c.style.cursor === 'pointer')"))
 
 
 @pytest.mark.timeout(500)
-def test_mouse_drags_holds_undoes_and_saves(page: LivePage, tmp_path: Path) -> None:
+def test_mouse_drags_holds_undoes_and_saves(
+    page: LivePage, browser: Browser, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     drag, start = page.drag, page.drag.q.copy()
-    with Browser(SIZE, timeout=240.0) as browser:
-        browser.visit(page.url)
-        client = until(lambda: list(page.server.get_clients().values()))[0]
-        until(lambda: client.camera.fov)
-        before = drag.place("right_palm")
-        x, y = pixel(before, client.camera.fov)
-        until(lambda: raised(browser, client, drag, x, y, before), 240.0)
-        browser.mouse("mouseReleased", x + 12, y - 24)
+    monkeypatch.setattr(browser, "timeout", 240.0)
+    browser.resize(SIZE)
+    page.server.initial_camera.position, page.server.initial_camera.look_at = EYE, TARGET
+    browser.visit(page.url)
+    client = until(lambda: list(page.server.get_clients().values()))[0]
+    until(lambda: client.camera.fov)
+    until(lambda: np.allclose(client.camera.position, EYE, atol=1e-3))
+    before = drag.place("right_palm")
+    x, y = pixel(before, client.camera.fov)
+    until(lambda: reached(browser, x, y))
+    browser.mouse("mousePressed", x, y, pressed=True)
+    for share in np.linspace(0.0, 1.0, 7)[1:]:
+        browser.mouse("mouseMoved", x + 12 * share, y - 24 * share, pressed=True)
+    until(lambda: drag.place("right_palm")[2] > before[2] + 0.05)
+    browser.mouse("mouseReleased", x + 12, y - 24)
 
-        def away() -> float:  # pixels from the mouse
-            across, down = pixel(drag.place("right_palm"), client.camera.fov)
-            return float(np.hypot(across - x - 12, down - y + 24))
+    def away() -> float:  # pixels from the mouse
+        across, down = pixel(drag.place("right_palm"), client.camera.fov)
+        return float(np.hypot(across - x - 12, down - y + 24))
 
-        until(lambda: away() < 6 and not drag.taken)  # it goes on to where the mouse let it go
-        assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
-        seen = pixel(drag.place("right_palm"), client.camera.fov)
+    until(lambda: away() < 6 and not drag.taken)  # it goes on to where the mouse let it go
+    assert np.linalg.norm(drag.place("left_sole") - drag.place_at(start, "left_sole")) < 2e-3
+    seen = pixel(drag.place("right_palm"), client.camera.fov)
 
-        browser.mouse("mouseMoved", *seen)
-        browser.mouse("mousePressed", *seen, pressed=True)
-        browser.mouse("mouseReleased", *seen)
-        until(lambda: "right_palm" in drag.held)
+    browser.mouse("mouseMoved", *seen)
+    browser.mouse("mousePressed", *seen, pressed=True)
+    browser.mouse("mouseReleased", *seen)
+    until(lambda: "right_palm" in drag.held)
 
-        press(browser, "save")
-        until((tmp_path / "posture.toml").exists)
-        saved = wb.read_task(tmp_path / "posture.toml").problem
-        assert len(saved.constraints) - len(saved.defaults) == 3
-        press(browser, "undo")
-        until(lambda: np.array_equal(drag.q, start))
-        assert not browser.errors
+    press(browser, "save")
+    until((tmp_path / "posture.toml").exists)
+    saved = wb.read_task(tmp_path / "posture.toml").problem
+    assert len(saved.constraints) - len(saved.defaults) == 3
+    press(browser, "undo")
+    until(lambda: np.array_equal(drag.q, start))
+    assert not browser.errors

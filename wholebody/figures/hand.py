@@ -27,7 +27,9 @@ MESH = "meshes/ellipsoid.obj"
 """The unit polyhedron that the URDF scales to each part."""
 
 FINGERS = {"thumb": ("pp", "dp"), **dict.fromkeys(("index", "middle", "ring", "little"), ("pp", "mp", "dp"))}
-_PART = {"pp": "proximal", "mp": "middle", "dp": "distal"}
+PARTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
+"""Key of a part of a finger in the table "hand" to the end of its segment's name."""
+
 _JOINT = {f"{kind}_flex": f"{kind}_flexion" for kind in ("cmc", "mcp", "pip", "dip", "ip")}
 _JOINT |= {f"{kind}_abd": f"{kind}_abduction" for kind in ("cmc", "mcp")}
 
@@ -74,7 +76,7 @@ def hand_spec(side: str = "right", person: Person | None = None) -> BodySpec:
     for finger, parts in FINGERS.items():
         parent, origin = f"{side}_hand", finger_base(size, side, finger)
         for part in parts:
-            key, segment = f"{finger}_{part}", f"{side}_{finger}_{_PART[part]}"
+            key, segment = f"{finger}_{part}", f"{side}_{finger}_{PARTS[part]}"
             for joint in finger_joints(side, finger, key, parent, segment, origin):
                 joints.append(joint)
                 virtual += [Link(joint.child)] if joint.child != segment else []
@@ -141,6 +143,11 @@ def part_radii(size: Dimensions, part: str) -> tuple[float, float, float]:
         keyed_hand(part, "depth") * size.hand_breadth,
         0.5 * keyed_hand(part, "length") * size.hand_length,
     )
+
+
+def part_radius(size: Dimensions, part: str) -> float:
+    """Mean radius of a part of the table "hand" across its length, metres."""
+    return 0.5 * (keyed_hand(part, "width") + keyed_hand(part, "depth")) * size.hand_breadth
 
 
 def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:

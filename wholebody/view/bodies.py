@@ -47,20 +47,20 @@ class Body:
         return style.tinted(self.color, state, amount)
 
 
-class Dressed(NamedTuple):
+class DrawnFigure(NamedTuple):
     """A figure of which a surface, or the visuals of its file, are drawn in place of pieces.
 
     Attributes:
         prefix: of its segments among the owners of pieces, and of its joints in the model.
         root: node of the surface, below the figure's or a ghost's.
-        look: the surface or the visuals.
+        visual: the surface or the visuals.
         nodes: node of each joint that carries them.
         color: of all of it; each patch's own if None.
     """
 
     prefix: str
     root: str
-    look: Skin | LinkVisuals
+    visual: Skin | LinkVisuals
     nodes: Mapping[str, str]
     color: Color | None
 
@@ -68,14 +68,14 @@ class Dressed(NamedTuple):
         """Put it in the scene graph, below the node `root`; in a colour if there is one."""
         nodes = {joint: root + path for joint, path in self.nodes.items()}
         paint = self.color if color is None else color
-        if isinstance(self.look, Skin):
-            return self.look.build(graph, root + self.root, nodes, paint)
-        return self.look.build(graph, nodes, paint)
+        if isinstance(self.visual, Skin):
+            return self.visual.build(graph, root + self.root, nodes, paint)
+        return self.visual.build(graph, nodes, paint)
 
     def owns(self, owner: str, things: Collection[str]) -> bool:
         """Whether it is drawn in place of the pieces of an owner."""
-        if isinstance(self.look, LinkVisuals):
-            return owner.removeprefix(self.prefix) in self.look.links and owner.startswith(self.prefix)
+        if isinstance(self.visual, LinkVisuals):
+            return owner.removeprefix(self.prefix) in self.visual.links and owner.startswith(self.prefix)
         return owner.startswith(self.prefix) if self.prefix else owner not in things
 
 
@@ -106,33 +106,33 @@ class Bodies:
             self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
         self.carriers = {body.carrier: body.joint for body in self.all}
         self.pieces = pieces
-        self._dressed = () if pieces else tuple(self._dress())
+        self._drawn = () if pieces else tuple(self._drawn_figures())
         self._owned = frozenset(
-            owner for owner in scene.piece_owner for figure in self._dressed if figure.owns(owner, numbers)
+            owner for owner in scene.piece_owner for figure in self._drawn if figure.owns(owner, numbers)
         )
         self._patches: list[tuple[str, Skinned]] = []
         shown = enumerate(self.all)
         self._things = [index for index, body in shown if body.thing is not None and not self._hidden(index)]
 
-    def _dress(self) -> Iterator[Dressed]:
+    def _drawn_figures(self) -> Iterator[DrawnFigure]:
         """The figures that have a surface or visuals; their joints' nodes join the carriers."""
         scene = self.scene
         figures = scene.figures if isinstance(scene, ViewedAssembly) else {"": (scene.figure, None)}
         for name, (figure, color) in figures.items():
             surface = surface_of(figure)
-            look: Skin | LinkVisuals | None = None
+            visual: Skin | LinkVisuals | None = None
             if surface is not None:
-                look = Skin(surface, figure)
+                visual = Skin(surface, figure)
             elif isinstance(figure, Figure) and figure.visual is not figure.geometry:
-                look = LinkVisuals(figure)
-            if look is None:
+                visual = LinkVisuals(figure)
+            if visual is None:
                 continue
             prefix = f"{name}/" if name else ""
             folder = f"{style.FIGURE_NODE}/{node(name)}" if name else style.FIGURE_NODE
-            nodes = {joint: f"{folder}/{node(joint)}" for joint in look.joints}
+            nodes = {joint: f"{folder}/{node(joint)}" for joint in visual.joints}
             for joint, path in nodes.items():
                 self.carriers[path] = int(self.scene.model.getJointId(f"{prefix}{joint}"))
-            yield Dressed(prefix, f"{folder}/body", look, nodes, color)
+            yield DrawnFigure(prefix, f"{folder}/body", visual, nodes, color)
 
     def _thing_color(self, thing: str, number: int, piece: Any) -> Color:
         given = getattr(self.scene.objects[thing], "color", None)
@@ -150,7 +150,7 @@ class Bodies:
         graph.remove(style.FIGURE_NODE)
         graph.remove(style.OBJECT_NODE)
         self._patches = [
-            (f"{figure.prefix}{patch.segment}", patch) for figure in self._dressed for patch in figure.build(graph)
+            (f"{figure.prefix}{patch.segment}", patch) for figure in self._drawn for patch in figure.build(graph)
         ]
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
@@ -201,7 +201,7 @@ class Bodies:
     def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
         root = f"{style.GHOST_NODE}/{number}"
-        for figure in self._dressed:
+        for figure in self._drawn:
             figure.build(graph, root, color)
             for path in figure.nodes.values():
                 graph.place(f"{root}{path}", data.oMi[self.carriers[path]].homogeneous)

@@ -11,6 +11,7 @@ import select
 import shutil
 import signal
 import time
+from contextlib import suppress
 from typing import Any
 
 from wholebody.errors import MissingPackageError, WholebodyError
@@ -212,7 +213,10 @@ class Browser:
             return
         atexit.unregister(self.close)
         pid, self._pid = self._pid, None
-        os.close(self._out)  # Chromium ends when its pipe does
+        os.set_blocking(self._out, False)
+        with suppress(OSError):
+            os.write(self._out, b'{"id": 0, "method": "Browser.close"}\0')
+        os.close(self._out)  # Chromium ends when its pipe does too, but a forked process may still hold the pipe
         os.close(self._in)
         if not _ended(pid, 3.0):
             os.killpg(pid, signal.SIGKILL)

@@ -92,7 +92,7 @@ class Composition:
         contacts = self.scene.contacts(q, within=self._contact_distance)
         color_contacts(keyframe, bodies, contacts)
         mark_contacts(keyframe, bodies, contacts)
-        keyframe.looked = self._contact_distance >= 0.0
+        keyframe.contacts_shown = self._contact_distance >= 0.0
         keyframe.overlapping = int(np.sum(contacts.distance < -PENETRATION))
         keyframe.touching = len(contacts.distance) - keyframe.overlapping
         keyframe.overlap = max(0.0, -float(np.min(contacts.distance, initial=0.0)))

@@ -57,7 +57,7 @@ def status(keyframes: Sequence[Keyframe], dt: float, found: Assessment | None) -
     if found is not None and found.goal_errors:
         angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > SMALLEST_ANGLE else ""
         said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
-    if not all(keyframe.looked for keyframe in keyframes):
+    if not all(keyframe.contacts_shown for keyframe in keyframes):
         return "; ".join(said)
     touching = max(keyframe.touching + keyframe.overlapping for keyframe in keyframes)
     said.append(f"{'at most ' if len(keyframes) > 1 else ''}{touching} contact{'' if touching == 1 else 's'}")

@@ -24,6 +24,7 @@ EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
 RADIUS = 0.04  # m: of a handle
 SETTLING = 90  # frames after the mouse lets go in which the figure still follows to where it let go
 THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
+ENDING = 1.0  # s: how long the server is waited for; open tabs keep it for 6 s, in threads that end with the process
 
 
 class LivePage:
@@ -78,7 +79,9 @@ class LivePage:
         """End the page and its thread."""
         self._stopped.set()
         self._loop.join(timeout=5.0)
-        self.server.stop()
+        ending = threading.Thread(target=self.server.stop, name="wholebody drag ends", daemon=True)
+        ending.start()
+        ending.join(timeout=ENDING)
 
     def wait(self) -> None:
         """Wait until the page is stopped, or Ctrl-C."""

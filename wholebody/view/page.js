@@ -5,7 +5,7 @@
   const THREE = MeshCat.THREE;
   const pane = document.getElementById("meshcat-pane");
   const viewer = new MeshCat.Viewer(pane, pane.dataset.still === undefined); // a page for pictures draws when asked to
-  const obey = viewer.handle_command.bind(viewer);
+  const handle_meshcat = viewer.handle_command.bind(viewer);
   const labels = new Map();
   const page = { ready: false, seek: seek, play: play, bytes: bytes, resize: resize, capture: capture };
   window.viewer = viewer;
@@ -21,7 +21,7 @@
   // meshcat's world is z up; three's is y up, and the scene is turned to match.
   const three = p => new THREE.Vector3(p[0], p[2], -p[1]);
 
-  function dress() {
+  function set_up_scene() {
     for (const name of ["SpotLight", "PointLightNegativeX", "PointLightPositiveX", "AmbientLight", "FillLight"]) {
       viewer.scene_tree.find(["Lights", name, "<object>"]).object.visible = false;
     }
@@ -91,9 +91,9 @@
   }
 
   // The title, one line about the picture, and the meaning of its colours.
-  let told = null;
+  let panel_message = null;
   function panel(cmd) {
-    told = cmd;
+    panel_message = cmd;
     const box = document.getElementById("panel");
     const line = (kind, text) => {
       const made = document.createElement(kind);
@@ -231,7 +231,7 @@
 
   // A picture of the drawing, PNG as a data address; with the panel in the corner that hides least of the figure.
   function capture(legend) {
-    if (!legend || !told) return viewer.capture_image();
+    if (!legend || !panel_message) return viewer.capture_image();
     viewer.render();
     const canvas = document.createElement("canvas"), source = viewer.renderer.domElement;
     [canvas.width, canvas.height] = [source.width, source.height];
@@ -245,9 +245,10 @@
   function write_panel(ctx, width, height) {
     const unit = Math.max(11, Math.round(height / 55)), line = 1.45 * unit, pad = 0.8 * unit, most = LARGEST * width;
     const font = weight => `${weight} ${unit}px "Helvetica Neue", Arial, "DejaVu Sans", sans-serif`;
-    const lines = [{ text: told.title, weight: "bold" }];
-    for (const part of told.status ? told.status.split("; ") : []) lines.push({ text: part, weight: "normal" });
-    for (const [text, ...rgb] of told.legend) lines.push({ text, weight: "normal", rgb });
+    const lines = [{ text: panel_message.title, weight: "bold" }];
+    const { status, legend } = panel_message;
+    for (const text of status ? status.split("; ") : []) lines.push({ text, weight: "normal" });
+    for (const [text, ...rgb] of legend) lines.push({ text, weight: "normal", rgb });
     let wide = 0;
     for (const one of lines) {
       ctx.font = font(one.weight);
@@ -347,7 +348,7 @@
     else if (cmd.type === "skeleton") skeleton(cmd);
     else if (cmd.type === "skin") skin(cmd);
     else if (cmd.type === "panel") panel(cmd);
-    else obey(cmd);
+    else handle_meshcat(cmd);
     if (cmd.type === "set_animation") show_bar(cmd.animations.length > 0);
     viewer.set_dirty();
   };
@@ -423,7 +424,7 @@
     fetch(location.href).then(() => location.reload(), () => setTimeout(again, 1000));
   }
 
-  dress();
+  set_up_scene();
   const picture = document.getElementById("picture");
   if (picture) {
     page.take(bytes(picture.textContent.trim()));

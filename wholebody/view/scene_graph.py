@@ -41,7 +41,7 @@ class Keyframe:
         transforms: placement (4, 4) by node, relative to the node above.
         colors: by node.
         markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
-        looked: whether all pairs that overlap are shown.
+        contacts_shown: whether all pairs that overlap are shown.
         touching, overlapping: numbers of pairs that are shown as touching, and that overlap.
         overlap: depth of the deepest overlap, metres.
     """
@@ -49,7 +49,7 @@ class Keyframe:
     transforms: dict[str, Array] = field(default_factory=dict)
     colors: dict[str, Color] = field(default_factory=dict)
     markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
-    looked: bool = True
+    contacts_shown: bool = True
     touching: int = 0
     overlapping: int = 0
     overlap: float = 0.0

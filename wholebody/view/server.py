@@ -205,7 +205,7 @@ class Hub:
             self.syncs.clear()
 
 
-def called(host: str) -> frozenset[str]:
+def accepted_names(host: str) -> frozenset[str]:
     """Host names that a server at `host` accepts in requests: another name would be DNS rebinding."""
     names = {*LOCAL, host.lower()}
     if host not in LOCAL:
@@ -227,7 +227,7 @@ def make_application(hub: Hub, host: str) -> Any:
     from tornado.web import Application, HTTPError, RequestHandler
     from tornado.websocket import WebSocketHandler
 
-    names = called(host)
+    names = accepted_names(host)
 
     class LocalOnly(RequestHandler):  # type: ignore[misc]
         """Refuses requests that reached this machine under a foreign name (DNS rebinding)."""

@@ -78,12 +78,14 @@ def checked_scene(scene: Any) -> Any:
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):
         return scene
     if isinstance(scene, Assembly):
-        mend = "none of its bodies has a shape; give some with body(name, shape=...), or use wholebody.view.parts.Parts"
+        correction = (
+            "none of its bodies has a shape; give some with body(name, shape=...), or use wholebody.view.parts.Parts"
+        )
     elif hasattr(scene, "scene"):  # a problem
-        mend = f"give the scene of the {type(scene).__name__}"
+        correction = f"give the scene of the {type(scene).__name__}"
     else:
-        mend = "make one with wb.Scene(figure)"
-    raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {mend}")
+        correction = "make one with wb.Scene(figure)"
+    raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {correction}")
 
 
 class ViewedContacts(Protocol):

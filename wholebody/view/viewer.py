@@ -271,7 +271,8 @@ class Viewer:
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
-            ViewerClosedError: the server could not be started.
+            ViewerClosedError: the server could not be started. `open`, `wait`, `wait_until_closed` and `sync` raise the
+                same, and an InputError for a time that is negative or no number.
         """
         return self._live().url
 

@@ -19,12 +19,14 @@ from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (
     FINGERS,
+    PARTS,
     finger_base,
     finger_degrees,
     finger_joints,
     massive_links,
     palm_axes,
     part_radii,
+    part_radius,
     thumb_metacarpal,
 )
 from wholebody.figures.human.hulls import hull_of
@@ -33,8 +35,6 @@ HANDS = ("rigid", "fingers")
 """What a person's hands can be: one segment each, or palms with fingers."""
 
 SIDES = ("left", "right")
-
-SEGMENTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
 
 EFFORT = 0.2
 """Weight of a finger's joint in a person's effort, beside 1 of the arm's. ESTIMATE: fingers move before an arm."""
@@ -145,7 +145,7 @@ def _parts(size: Dimensions, side: str) -> Iterator[_Part]:
         parent = f"{side}_hand"
         origin = _zero_metacarpal(size, side) if finger == "thumb" else finger_base(size, side, finger)
         for name in ("mc", *names) if finger == "thumb" else names:
-            key, segment = f"{finger}_{name}", f"{side}_{finger}_{SEGMENTS[name]}"
+            key, segment = f"{finger}_{name}", f"{side}_{finger}_{PARTS[name]}"
             yield _Part(key, segment, parent, origin)
             parent, origin = segment, place(z=-keyed_hand(key, "length") * size.hand_length)
 
@@ -164,15 +164,11 @@ def _tips(size: Dimensions, side: str) -> Iterator[Landmark]:
 
 def _solids(size: Dimensions, side: str, parts: list[_Part]) -> Iterator[Solid]:
     """The palm up to the knuckles as a box, each part of a finger as a capsule that ends at the fingertip."""
-    palm = FINGER_BASES["middle"][1] * size.hand_length + 0.5 * _radius(size, "middle_pp")
+    palm = FINGER_BASES["middle"][1] * size.hand_length + 0.5 * part_radius(size, "middle_pp")
     box = coal.Box(size.hand_breadth, 2.0 * size.palm_half_thickness, palm)
     yield Solid(f"{side}_hand:0", f"{side}_hand", box, place(z=-0.5 * palm))
     for part in parts:
-        length, radius = keyed_hand(part.key, "length") * size.hand_length, _radius(size, part.key)
+        length, radius = keyed_hand(part.key, "length") * size.hand_length, part_radius(size, part.key)
         start = 0.3 * length if part.key == "thumb_mc" else 0.0
         end = length - radius if part.key.endswith("_dp") else length
         yield Solid(part.segment, part.segment, coal.Capsule(radius, end - start), place(z=-0.5 * (start + end)))
-
-
-def _radius(size: Dimensions, key: str) -> float:
-    return 0.5 * (keyed_hand(key, "width") + keyed_hand(key, "depth")) * size.hand_breadth

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from wholebody.arrays import Array
 
-INFLUENCES = 4
-"""Bones that a vertex follows."""
+BONES_EACH = 4
+"""Bones that move a vertex: as many as a page's shader takes."""
 
 NEAREST = 0.05
 """Share of an edge that is left on either side of a cut: less makes slivers."""
@@ -43,9 +43,14 @@ class Bound(NamedTuple):
 
     def strongest(self) -> tuple[NDArray[np.uint8], Array]:
         """(n, 4) the bones with the greatest influences, and (n, 4) these, which add up to 1."""
-        bones = np.argsort(-self.weights, axis=1, kind="stable")[:, :INFLUENCES]
-        weights = np.take_along_axis(self.weights, bones, axis=1)
-        return bones.astype(np.uint8), weights / weights.sum(axis=1, keepdims=True)
+        return strongest(self.weights)
+
+
+def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
+    """The bones (n, 4) with the greatest weights (n, b), the strongest first, and these (n, 4), which add up to 1."""
+    bones = np.argsort(-weights, axis=1, kind="stable")[:, :BONES_EACH]
+    chosen = np.take_along_axis(weights, bones, axis=1)
+    return bones.astype(np.uint8), np.asarray(chosen / chosen.sum(axis=1, keepdims=True))
 
 
 def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.int64], NDArray[np.int64]]:

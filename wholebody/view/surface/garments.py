@@ -9,11 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array
+from wholebody.view.surface.borders import BONES_EACH, strongest
 from wholebody.view.surface.fields import Field
 from wholebody.view.surface.nets import Triangles, triangles
-
-BONES_EACH = 4
-"""Number of bones that move a vertex: as many as a page's shader takes."""
 
 SOFTNESS = 0.014
 """Metres over which the influence of a bone fades by e: a larger value bends joints over a longer stretch."""
@@ -93,10 +91,7 @@ def influences(points: Array, claims: Sequence[Claim], order: Sequence[str]) -> 
     for claim in claims:
         column = place[claim.bone]
         strength[:, column] = np.maximum(strength[:, column], -claim.field(points) / claim.softness)
-    strength = np.exp(strength - strength.max(axis=1, keepdims=True))
-    chosen = np.argsort(-strength, axis=1, kind="stable")[:, :BONES_EACH]
-    weights = np.take_along_axis(strength, chosen, axis=1)
-    return chosen.astype(np.uint8), np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    return strongest(np.exp(strength - strength.max(axis=1, keepdims=True)))
 
 
 def bounds(points: Sequence[Array], margin: float) -> tuple[Array, Array]:

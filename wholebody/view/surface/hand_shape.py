@@ -11,7 +11,7 @@ from wholebody.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
-from wholebody.figures.hand import FINGERS, hand_figure_of
+from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
 from wholebody.view.surface.fields import Field, ellipsoid, placed, round_cone, union
 from wholebody.view.surface.garments import Claim
 
@@ -23,8 +23,6 @@ RESTING = {"index": (0.0, 0.0, 0.0), "middle": (8.0, 12.0, 6.0), "ring": (12.0, 
 
 STUMP = 0.05
 """Metres of forearm that a hand's surface has above the wrist; a sleeve covers it."""
-
-_PART = {"pp": "proximal", "mp": "middle", "dp": "distal"}
 
 
 class HandShape(NamedTuple):
@@ -57,7 +55,7 @@ def hand_shape(person: Person, side: str) -> HandShape:
     for finger, parts in FINGERS.items():
         bones: list[Field] = []
         for part in parts:
-            segment = f"{side}_{finger}_{_PART[part]}"
+            segment = f"{side}_{finger}_{PARTS[part]}"
             shape = placed(_bone(size, finger, part), bind[segment])
             bones.append(shape)
             claims.append(Claim(segment, shape, 0.0035))
@@ -106,18 +104,14 @@ def _resting(side: str) -> dict[str, float]:
     return found
 
 
-def _radius(size: Dimensions, part: str) -> float:
-    return 0.5 * (keyed_hand(part, "width") + keyed_hand(part, "depth")) * size.hand_breadth
-
-
 def _bone(size: Dimensions, finger: str, part: str) -> Field:
     """One part of a finger, in its own frame; its last part ends where the finger ends."""
     key, order = f"{finger}_{part}", FINGERS[finger]
-    length, radius = keyed_hand(key, "length") * size.hand_length, _radius(size, key)
+    length, radius = keyed_hand(key, "length") * size.hand_length, part_radius(size, key)
     if part == order[-1]:
         tip = 0.84 * radius
         return round_cone((0.0, 0.0, 0.0), (0.0, 0.0, -(length - tip)), 1.03 * radius, tip)
-    following = _radius(size, f"{finger}_{order[order.index(part) + 1]}")
+    following = part_radius(size, f"{finger}_{order[order.index(part) + 1]}")
     return round_cone((0.0, 0.0, 0.0), (0.0, 0.0, -length), 1.03 * radius, 1.03 * following)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.figure import Figure
-from wholebody.figures.hand import FINGERS
+from wholebody.figures.hand import FINGERS, PARTS
 from wholebody.figures.human.spec import human_spec
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.view.surface.borders import Bound, divided
@@ -174,8 +174,7 @@ def _make_hand(person: Person, side: str) -> Surface:
 
 
 def _finger_segments(side: str) -> list[str]:
-    part = {"pp": "proximal", "mp": "middle", "dp": "distal"}
-    return [f"{side}_{finger}_{part[name]}" for finger, parts in FINGERS.items() for name in parts]
+    return [f"{side}_{finger}_{PARTS[name]}" for finger, parts in FINGERS.items() for name in parts]
 
 
 def halfway(first: Array, second: Array) -> Array:
