@@ -15,13 +15,14 @@ T = TypeVar("T")
 class Pool(Generic[T]):
     """A thread-safe free list; no two threads hold the same object at a time."""
 
-    def __init__(self, make: Callable[[], T]) -> None:
+    def __init__(self, make: Callable[[], T], at_most: int | None = None) -> None:
         """Make an empty pool.
 
         Args:
             make: makes an object if none is free.
+            at_most: as many free objects are kept; None keeps all.
         """
-        self._make = make
+        self._make, self._at_most = make, at_most
         self._free: list[T] = []
 
     @contextmanager
@@ -32,7 +33,8 @@ class Pool(Generic[T]):
         except IndexError:
             item = self._make()
         yield item
-        self._free.append(item)
+        if self._at_most is None or len(self._free) < self._at_most:
+            self._free.append(item)
 
 
 class OneAtATime:

@@ -218,3 +218,34 @@ def test_a_placement_is_that_of_the_frame_the_segment_or_the_joint() -> None:
         HUMAN.placement(standing, "left_plam")
     with pytest.raises(InputError):
         HUMAN.placement(standing[1:], "left_palm")
+
+
+def test_a_placement_is_right_where_another_thread_asks_for_one_in_the_middle_of_it(monkeypatch):
+    """What a figure computes in is used again; two calls never share it."""
+    rng = np.random.default_rng(7)
+    first, second, third = (random_posture(HUMAN, rng) for _ in range(3))
+    forward, between = pin.forwardKinematics, []
+
+    def interrupted(*given):
+        forward(*given)
+        if not between:
+            between.append(None)
+            between[0] = HUMAN.placement(second, "left_palm")
+
+    monkeypatch.setattr(pin, "forwardKinematics", interrupted)
+    found = [HUMAN.placement(first, "left_palm"), *between, HUMAN.placement(third, "left_palm")]
+    monkeypatch.undo()
+    for q, one in zip((first, second, third), found, strict=True):
+        np.testing.assert_allclose(one.homogeneous, place(HUMAN, q, "left_palm").homogeneous, atol=1e-12)
+
+
+def test_a_placement_is_kept_when_the_next_one_is_asked_for():
+    figure = load("human")
+    standing, sitting = (figure.posture(name) for name in ("standing", "sitting"))
+    first = figure.placement(standing, "left_knee_flexion")
+    before = first.homogeneous.copy()
+    later = figure.placement(sitting, "left_knee_flexion")
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, sitting)
+    assert np.array_equal(first.homogeneous, before)
+    assert np.array_equal(later.homogeneous, data.oMi[figure.joint_id("left_knee_flexion")].homogeneous)

@@ -1,6 +1,7 @@
 """People of their own proportions and of an age."""
 
 import math
+from functools import cache
 
 import numpy as np
 import pytest
@@ -10,6 +11,11 @@ from wholebody.figures import load
 from wholebody.figures.anthropometry import make_person, table
 from wholebody.figures.measuring import measure
 from wholebody.figures.proportions import dimension_names, residual_covariance
+
+
+@cache
+def usual_dimensions():
+    return measure(load("human"))
 
 
 def placements(figure):
@@ -27,7 +33,8 @@ def placements(figure):
     ],
 )
 def test_stated_dimensions_are_measured_on_the_figure(size, proportions):
-    usual, found = measure(load("human", **size)), measure(load("human", proportions=proportions, **size))
+    usual = measure(load("human", **size)) if size else usual_dimensions()
+    found = measure(load("human", proportions=proportions, **size))
     for name, value in proportions.items():
         assert found[name] == pytest.approx(value, abs=0.001), name
         assert abs(usual[name] - value) > 0.003, name
@@ -47,7 +54,7 @@ def test_hands_and_feet_have_the_stated_sizes():
 
 def test_the_others_follow_as_they_go_together_in_people():
     # A long trunk at the same stature means short legs and arms: all correlations of residuals are negative there.
-    usual, found = measure(load("human")), measure(load("human", proportions={"sitting_height": 0.96}))
+    usual, found = usual_dimensions(), measure(load("human", proportions={"sitting_height": 0.96}))
     assert found["eye_height_sitting"] - usual["eye_height_sitting"] == pytest.approx(0.037, abs=0.008)
     for name in ("buttock_knee_length", "popliteal_height", "knee_height_sitting", "span"):
         assert found[name] < usual[name] - 0.005, name
@@ -90,7 +97,7 @@ def test_without_proportions_the_body_is_the_same(options):
 
 
 def test_a_usual_dimension_changes_nothing():
-    usual = measure(load("human"))
+    usual = usual_dimensions()
     found = measure(load("human", proportions={"sitting_height": usual["sitting_height"]}))
     assert found == pytest.approx(usual, abs=2e-4)
 

@@ -387,7 +387,7 @@ def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch, builder):
         scene.add(shape, name=f"thing{k}", at=(0.3 * k - 0.5, 0.1 * k, -0.2))
     monkeypatch.setattr(scene.built, "rows", builder(scene.pair_table))
     levers = 0
-    for _ in range(40):
+    for _ in range(20):
         q = scene.figure.neutral
         for k in range(0, scene.model.nq, 7):
             q[k : k + 3] = rng.uniform(-0.5, 0.5, 3)
@@ -404,7 +404,7 @@ def test_rows_are_those_of_plain_loops(free_bodies, monkeypatch, builder):
                 away = np.abs(rows.gap[mine] - gap) + np.abs(place[mine] - point).max(axis=1)
                 assert away.min() < 1e-8
             levers += len(mine) - 1
-    assert levers > 100
+    assert levers > 50
 
 
 def test_near_ends_are_not_left_out_for_far_ones_that_stand_back(free_bodies):
@@ -440,7 +440,7 @@ def test_compiled_rows_are_those_of_array_code_entry_by_entry(free_bodies):
     scene.add(wb.Capsule(0.05, 0.8), name="rail", at=(0.3, 0.0, 0.05)).add(SHAPES["half-space"], name="floor")
     compiled, reference = ContactRowBuilder(scene.pair_table), ReferenceRowBuilder(scene.pair_table)
     rng, levers, snapped = np.random.default_rng(11), 0, 0
-    for _ in range(150):
+    for _ in range(60):
         q = scene.figure.neutral
         for k in range(0, scene.model.nq, 7):
             q[k : k + 3] = *rng.uniform(-0.4, 0.4, 2), rng.uniform(0.0, 0.2)
@@ -460,8 +460,8 @@ def test_compiled_rows_are_those_of_array_code_entry_by_entry(free_bodies):
         assert mine == pytest.approx(theirs, abs=1e-11)
         levers += len(rows.gap) - len(contacts.distance)
         snapped += int((contacts.normal != found).any(axis=1).sum())
-    assert levers > 1000
-    assert snapped > 10
+    assert levers > 400
+    assert snapped > 5
 
 
 def test_rows_are_between_the_joints_of_the_pieces(free_bodies):

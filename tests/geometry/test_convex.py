@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
@@ -37,13 +37,13 @@ def outside(points: Array, pieces: tuple[Piece, ...]) -> Array:
 
 @pytest.fixture(scope="module")
 def torus() -> tuple[trimesh.Trimesh, ConvexPieces]:
-    mesh = trimesh.creation.torus(0.3, 0.1, major_sections=24, minor_sections=16)
-    return mesh, convex_pieces(mesh.vertices, mesh.faces, max_vertices=24)
+    mesh = trimesh.creation.torus(0.3, 0.1, major_sections=12, minor_sections=6)
+    return mesh, convex_pieces(mesh.vertices, mesh.faces, max_vertices=24, threshold=0.1)
 
 
 def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh, ConvexPieces]) -> None:
     mesh, found = torus
-    points, _ = trimesh.sample.sample_surface(mesh, 3000, seed=0)
+    points, _ = trimesh.sample.sample_surface(mesh, 1000, seed=0)
     assert outside(points, found.pieces).max() < 2e-4
     assert outside(np.zeros((1, 3)), found.pieces)[0] > 0.12
     assert all(piece.geometry.num_points <= 24 for piece in found.pieces)
@@ -62,7 +62,7 @@ def test_a_torus_is_covered_and_its_hole_stays_open(torus: tuple[trimesh.Trimesh
             60.0,
             "CoACD cannot cut it into convex pieces; repair the mesh",
         ),
-        (lambda *_: all(True for _ in count()), 2.0, "CoACD found no convex pieces in 2 s of the processor; repair"),
+        (lambda *_: all(True for _ in count()), 0.3, "CoACD found no convex pieces in 0.3 s of the processor; repair"),
     ],
     ids=["crashes", "hangs"],
 )
@@ -159,6 +159,7 @@ def test_pieces_are_the_callers_own() -> None:
     assert np.abs(box.pieces()[0].placement.translation).max() < 1e-9
 
 
+@settings(max_examples=40)
 @given(st.integers(0, 2**32 - 1), st.integers(20, 200), st.integers(8, 40))
 def test_a_simpler_hull_holds_all_points(seed: int, count: int, most: int) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * (1.0, 0.5, 0.1)

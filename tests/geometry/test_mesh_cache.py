@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
+import multiprocessing
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -114,16 +113,16 @@ def test_a_decomposition_is_not_made_twice(folder: Path, monkeypatch: pytest.Mon
 
 
 def test_several_processes_write_one_entry_at_once(folder: Path) -> None:
-    code = (
-        "import trimesh, sys\n"
-        "from wholebody.geometry.convex import mesh_hull\n"
-        "from wholebody.geometry.mesh_cache import cached\n"
-        "ball = trimesh.creation.icosphere(subdivisions=1)\n"
-        "for k in range(40):\n"
-        "    found = cached((str(k % 4).encode(),), 's', 'm', lambda: mesh_hull(ball.vertices, ball.faces))\n"
-        "    assert len(found.pieces) == 1\n"
-    )
-    running = [subprocess.Popen([sys.executable, "-c", code]) for _ in range(2)]
-    assert [process.wait(120) for process in running] == [0, 0]
+    def work() -> None:
+        for k in range(40):
+            found = cached((str(k % 4).encode(),), "s", "m", made)
+            assert len(found.pieces) == 1
+
+    running = [multiprocessing.get_context("fork").Process(target=work) for _ in range(2)]
+    for process in running:
+        process.start()
+    for process in running:
+        process.join(120)
+    assert [process.exitcode for process in running] == [0, 0]
     assert cache_state().entries == 4
     assert not list(folder.glob("*.part"))

@@ -65,7 +65,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
     assert len(scene.geometry.collisionPairs) > 600
     seen = {"near": 0, "inside": 0}
     used = scene.workspace().proximity
-    for _ in range(3):
+    for _ in range(2):
         q = random_posture(scene.figure, rng)
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
@@ -312,7 +312,7 @@ def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step)
     scene = among_things("capsules", rng)
     workspace = scene.workspace()
     q, asked, found_any = scene.figure.posture("standing"), [], 0
-    for k in range(25):
+    for k in range(12):
         q = scene.figure.clamp(pin.integrate(scene.model, q, step * rng.normal(size=scene.model.nv)))
         if k % 5 == 4:
             scene.move(
@@ -331,7 +331,7 @@ def test_pairs_that_cannot_have_come_near_are_not_asked_and_none_is_missed(step)
             found.distance, [wanted[pair] for pair in map(tuple, found.pair.tolist())], atol=3e-6
         )
         found_any += len(found.distance)
-    assert found_any > 50
+    assert found_any > 20
     if step == 3e-4:
         assert np.mean(asked[1:4]) < 0.95 * asked[0]  # what is far away was not asked again
 
@@ -355,7 +355,7 @@ def test_a_query_that_is_interrupted_hides_no_pair(monkeypatch):
     rng = np.random.default_rng(5)
     scene = among_things("capsules", rng)
     workspace, found_any = scene.workspace(), 0
-    for _ in range(25):
+    for _ in range(8):
         q = random_posture(scene.figure, rng)
         with monkeypatch.context() as patch:
             patch.setattr(workspace.proximity, "_kernel", Interrupted(workspace.proximity._kernel))
@@ -366,4 +366,4 @@ def test_a_query_that_is_interrupted_hides_no_pair(monkeypatch):
         assert {pair for pair, row in wanted.items() if row[0] < 0.04 - 1e-5} <= {*pairs}
         np.testing.assert_allclose(found.distance, [wanted[pair][0] for pair in pairs], atol=3e-6)
         found_any += len(pairs)
-    assert found_any > 50
+    assert found_any > 20

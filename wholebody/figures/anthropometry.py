@@ -237,7 +237,7 @@ def table(name: str) -> tuple[Row, ...]:
 
     Args:
         name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones", "hand", "fit", "dimensions", "correlations" or "age_ranges".
+            "reach_cones", "coupled_ranges", "hand", "fit", "residuals", "dimensions", "correlations" or "age_ranges".
 
     Raises:
         UnknownNameError: there is no such table.

@@ -15,6 +15,7 @@ from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.reduction import reduced_parts
+from wholebody.pool import Pool
 from wholebody.records import as_dict
 
 LARGEST = 1e6
@@ -132,6 +133,9 @@ class Figure(checks.FixedAttributes):
         self.collision_groups = MappingProxyType(dict(description.collision_groups))
         self.excluded_pairs, self.notes = description.excluded, description.notes
         self.loaded_as: tuple[str, dict[str, Any]] | None = None
+        self._data = Pool(
+            model.createData, at_most=1
+        )  # 6.5 MB for 55 freedoms, 27 MB for 95: to make one takes milliseconds
         self._description = description
         self._made: dict[str, Array] = {}
         first = model.joints[1] if model.njoints > 1 else None
@@ -184,6 +188,7 @@ class Figure(checks.FixedAttributes):
 
         Raises:
             UnknownNameError: with the nearest names.
+            InputError: the name is no text.
         """
         checks.known(name, self.postures, "posture")
         if name not in self._made:
@@ -200,6 +205,7 @@ class Figure(checks.FixedAttributes):
 
         Raises:
             UnknownNameError: with the nearest names.
+            InputError: the name is no text.
         """
         return int(
             self._frame_ids[checks.known(name, self._frame_ids, "frame", offered={*self.frames, *self.segments})]
@@ -213,15 +219,16 @@ class Figure(checks.FixedAttributes):
             InputError: q has the wrong shape or is not finite.
         """
         frame, q = self.frame_id(name), self._checked(q)
-        data = self.model.createData()
-        pin.forwardKinematics(self.model, data, q)
-        return pin.updateFramePlacement(self.model, data, frame).copy()
+        with self._data.borrow() as data:
+            pin.forwardKinematics(self.model, data, q)
+            return pin.updateFramePlacement(self.model, data, frame).copy()
 
     def joint_id(self, name: str) -> int:
         """Return the index of a joint in the model; "root" is the free root.
 
         Raises:
             UnknownNameError: with the nearest names.
+            InputError: the name is no text.
         """
         if isinstance(name, str) and name == "root" and self.root == "free":
             return 1
@@ -253,6 +260,7 @@ class Figure(checks.FixedAttributes):
 
         Raises:
             UnknownNameError: neither a joint nor a group.
+            InputError: not a list of names.
         """
         places: set[int] = set()
         for name in self.joint_names(names):
@@ -261,7 +269,11 @@ class Figure(checks.FixedAttributes):
         return np.array(sorted(places), dtype=np.intp)
 
     def joint_values(self, q: Array) -> dict[str, float]:
-        """Return the value of each one-degree joint by name: radians, or metres for prismatic joints."""
+        """Return the value of each one-degree joint by name at q (nq,): radians, or metres for prismatic joints.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
+        """
         q = self._checked(q)
         values = {}
         for name in self.joints:
@@ -313,9 +325,12 @@ class Figure(checks.FixedAttributes):
         return q
 
     def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
-        """Return lower and upper bound, each (nv,), of the displacement of q within the limits.
+        """Return lower and upper bound, each (nv,), of the displacement of q (nq,) within the limits.
 
         Infinite without a limit. If q is beyond a limit, both bounds have the sign of the motion back.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
         """
         q = self._checked(q)
         lower, upper = np.full(self.model.nv, -np.inf), np.full(self.model.nv, np.inf)
@@ -324,13 +339,21 @@ class Figure(checks.FixedAttributes):
         return lower, upper
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
-        """Whether every limited joint is within its limits, to a tolerance for rounding."""
+        """Whether every limited joint is within its limits at q (nq,), to a tolerance for rounding, radians or metres.
+
+        Raises:
+            InputError: q has another shape, or the tolerance is negative or no number.
+        """
         tolerance = checks.number(tolerance, "tolerance", 0.0, LARGEST)
         value = self._checked(q)[self.limits.idx_q]
         return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())
 
     def clamp(self, q: Array) -> Array:
-        """Return a copy of q with every limited joint moved to its nearest allowed value."""
+        """Return a copy of q (nq,) with every limited joint moved to its nearest allowed value.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
+        """
         q = self._checked(q).copy()
         q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
         return q

@@ -91,7 +91,7 @@ def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
     for joint in list(model.joints)[1:]:
         if joint.nq == joint.nv == 1 and limits[0][joint.idx_q] > limits[1][joint.idx_q]:
             raise FileFormatError(
-                f"{path}: joint {shown(model.names[joint.id])} has a lower limit above the upper; mend it"
+                f"{path}: joint {shown(model.names[joint.id])} has a lower limit above the upper; correct it"
             )
     model.lowerPositionLimit, model.upperPositionLimit = limits[0] + 0.0, limits[1] + 0.0  # no negative zeros
     return model, meshes

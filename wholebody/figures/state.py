@@ -15,7 +15,7 @@ from wholebody.errors import InputError
 from wholebody.geometry.memory_views import placement_view
 
 DOUBLE = np.dtype(np.float64)
-UNIT_TOLERANCE = 1e-3  # how far a quaternion's length may be from 1 before it is taken for a mistake
+UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 
 
 class Wrench(NamedTuple):

@@ -173,6 +173,9 @@ class Torus(Shape):
     Attributes:
         radius: from the centre to the middle of the tube, metres.
         tube: radius of the tube, metres; less than `radius`.
+
+    Raises:
+        InputError: a length out of range, or the tube is not thinner than the ring.
     """
 
     radius: float
@@ -240,6 +243,9 @@ class HalfSpace(Shape):
     Attributes:
         normal: outward normal; converted to a unit vector.
         offset: distance of the plane from the origin along the normal, metres.
+
+    Raises:
+        InputError: the normal has no length, or a value is no number or out of range.
     """
 
     normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
@@ -269,6 +275,9 @@ class Hull(Shape):
 
     Attributes:
         points: (n, 3), metres; kept without duplicates, read-only.
+
+    Raises:
+        InputError: not such points, or none that span a solid.
     """
 
     points: Array
@@ -311,6 +320,11 @@ class Mesh(Shape):
             more pieces.
         vertices: (n, 3) scaled and rotated, read-only.
         faces: (m, 3), read-only.
+
+    Raises:
+        FileFormatError: the file is no mesh that can be read.
+        MissingPackageError: trimesh, or for a COLLADA file pycollada, is not installed.
+        InputError: a value of the wrong kind, shape or range.
     """
 
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles

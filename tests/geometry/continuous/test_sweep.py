@@ -54,7 +54,7 @@ def test_against_dense_sampling(flying: bool) -> None:
     sweep = Sweep(arena.model, arena.geometry)
     rng = np.random.default_rng(3)
     free = touched = 0
-    for _ in range(60):
+    for _ in range(35):
         q0 = pin.integrate(arena.model, pin.neutral(arena.model), rng.normal(size=arena.model.nv) * 0.8)
         q1 = pin.integrate(arena.model, q0, rng.normal(size=arena.model.nv) * rng.choice([0.05, 0.3, 1.0]))
         found = sweep.first_contact(q0, q1)

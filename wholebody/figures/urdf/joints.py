@@ -117,7 +117,7 @@ def _joint(element: Element, links: frozenset[str], place: str, notes: list[str]
         end = found.get("link") if found is not None else None
         if end not in links:
             raise FileFormatError(
-                f"{place} has the {tag} link {shown(end)}, which is not in the file; add it or mend the name"
+                f"{place} has the {tag} link {shown(end)}, which is not in the file; add it or correct the name"
             )
         ends.append(str(end))
     axis = np.array([1.0, 0.0, 0.0])

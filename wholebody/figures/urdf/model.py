@@ -122,7 +122,7 @@ def _build(urdf: UrdfFile, joints: tuple[UrdfJoint, ...], root: str, mimic: bool
         return pin.buildModelFromXML(_text(urdf, joints), *base, mimic=mimic)
     except Exception as error:  # the file passed our checks but fails in urdfdom
         reason = " ".join(str(error).split())
-        raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({reason}); mend the file") from error
+        raise FileFormatError(f"{urdf.path}: Pinocchio cannot read it ({reason}); correct the file") from error
 
 
 def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:

@@ -40,7 +40,7 @@ def read_xml(path: Path, kind: str) -> Element:
     except ElementTree.ParseError as error:
         if not _is_text(data):
             raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
-        raise FileFormatError(f"{path}: the XML is broken ({one_line(str(error))}); mend that place") from None
+        raise FileFormatError(f"{path}: the XML is broken ({one_line(str(error))}); correct that place") from None
     except (LookupError, ValueError) as error:
         raise FileFormatError(
             f"{path}: its encoding cannot be read ({one_line(str(error))}); save the file as UTF-8 and say so in its "
