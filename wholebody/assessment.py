@@ -83,13 +83,21 @@ class Assessment:
         return {**numbers, "optimality": self.optimality, "blockers": [asdict(blocker) for blocker in self.blockers]}
 
     def holds(self, tolerance: float) -> bool:
-        """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
+        """Whether limits, constraints and clearances hold to a tolerance, metres and radians.
+
+        Raises:
+            InputError: the tolerance is negative or no number.
+        """
         tolerance = number(tolerance, "tolerance", 0.0, inf)
         worst = max(self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
         return bool(worst <= tolerance)
 
     def met(self, tolerance: float) -> bool:
-        """Whether the goals are met to a tolerance, metres and radians."""
+        """Whether the goals are met to a tolerance, metres and radians.
+
+        Raises:
+            InputError: the tolerance is negative or no number.
+        """
         return bool(max(self.goal_error, self.goal_angle) <= number(tolerance, "tolerance", 0.0, inf))
 
     @property

@@ -54,12 +54,12 @@ class DerivativeCheck:
     def __str__(self) -> str:
         if self.agrees:
             return f"{self.term}: its derivative agrees with finite differences to {self.error:.1e}"
-        mend = (
+        correction = (
             "; the sign is wrong" if abs(self.given + self.measured) <= AGREEMENT * (1.0 + abs(self.measured)) else ""
         )
         return (
             f"{self.term}: row {self.row} of its derivative has {self.given:.6g} for {self.joint}, "
-            f"finite differences have {self.measured:.6g}{mend}"
+            f"finite differences have {self.measured:.6g}{correction}"
         )
 
 

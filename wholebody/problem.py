@@ -17,7 +17,7 @@ from wholebody import checks
 from wholebody.all_pairs import all_pairs
 from wholebody.arrays import Array
 from wholebody.errors import InputError
-from wholebody.figures.state import State
+from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
@@ -27,7 +27,6 @@ from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.term_plan import TermPlan, make_plan
 from wholebody.workspace import Workspace
 
-UNIT_TOLERANCE = 1e-3  # largest deviation of a start's quaternion from unit length; more is refused as a mistake
 LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 
 _KINDS: dict[str, tuple[type, ...]] = {
@@ -156,8 +155,8 @@ class Problem(checks.FixedAttributes):
         terms = _checked(value, _KINDS[name], name)
         for number, term in enumerate(terms):
             if is_dataclass(term) and not all(hasattr(term, field.name) for field in fields(term)):
-                mend = "give it to problem.retarget([...])" if name == "goals" else self._correction
-                raise InputError(f"{name}[{number}] is a {type(term).__name__} that is not resolved; {mend}")
+                correction = "give it to problem.retarget([...])" if name == "goals" else self._correction
+                raise InputError(f"{name}[{number}] is a {type(term).__name__} that is not resolved; {correction}")
         return tuple(terms)
 
     @property
@@ -262,9 +261,10 @@ class Problem(checks.FixedAttributes):
         return terms, make_plan(self.scene.figure.limits, self.goals, *terms, None, state)
 
     def check_fresh(self) -> None:
-        """Raise InputError if objects were added or removed after the problem was made, or if clearances are wrong.
+        """Refuse a problem that is out of date; things may be moved and clearances changed.
 
-        Things may be moved and clearances changed.
+        Raises:
+            InputError: objects were added or removed after the problem was made, or clearances are wrong.
         """
         if self.scene.revision != self._revision:
             raise InputError("objects came to or left the scene after the problem was stated; state the problem anew")
@@ -358,8 +358,8 @@ def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:
         if not isinstance(term, kinds):
             wanted = " or ".join(kind.__name__ for kind in kinds)
             home = next((name for name, taken in _ARGUMENTS.items() if isinstance(term, taken)), "")
-            mend = f"give it in {home}=[...]" if home else "see wholebody.tasks"
-            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {mend}")
+            correction = f"give it in {home}=[...]" if home else "see wholebody.tasks"
+            raise InputError(f"{what}[{number}] is {checks.a(type(term))}, not a {wanted}; {correction}")
     return listed
 
 

@@ -63,9 +63,12 @@ class Scene(SceneContents):
             return workspace.near(q, within).nearest_first()
 
     def penetration(self, q: Array) -> list[ObjectPenetration]:
-        """Depth of overlap of owners (segments, objects) at q: PD_g and the least separating translation.
+        """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the least separating translation.
 
         The deepest first; empty if nothing overlaps. See `wholebody.geometry.penetration`.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
         """
         from wholebody.geometry.penetration import object_penetrations
 

@@ -121,6 +121,7 @@ class SceneContents(checks.FixedAttributes):
 
         Raises:
             UnknownNameError: there is none of that name.
+            InputError: the name is no text.
         """
         return int(self.figure.frame_id(name))
 
@@ -238,6 +239,7 @@ class SceneContents(checks.FixedAttributes):
 
         Raises:
             UnknownNameError: there is no such object.
+            InputError: the name is no text.
         """
         with self._lock:
             self._object(name)
@@ -318,12 +320,12 @@ def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> Non
     extent = _extent(shape)
     if max(extent) > WIDEST_LIKELY and min(extent) > THICKEST_LIKELY:
         size = " x ".join(f"{length:.4g}" for length in extent)
-        mend = (
+        correction = (
             "wb.Mesh(..., scale=0.001) reads millimetres"
             if isinstance(shape, Mesh)
             else "divide millimetres by 1000, centimetres by 100"
         )
-        told = f"{name!r} measures {size} m; lengths are in metres: {mend}"
+        told = f"{name!r} measures {size} m; lengths are in metres: {correction}"
         checks.warn(told)
 
 

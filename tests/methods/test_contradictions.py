@@ -13,7 +13,13 @@ from wholebody.figures.state import State
 from wholebody.methods.contradictions import contradictions
 from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
 
-METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
+METHODS = {
+    "qp": lambda: wb.QP(restarts=0),
+    "ccd": wb.CCD,
+    "newton": lambda: wb.Newton(restarts=0),
+    "placo": wb.Placo,
+    "dls": wb.DampedLeastSquares,
+}
 
 
 def found(problem):
@@ -109,7 +115,7 @@ def test_every_method_names_both_sides(name):
 
 @pytest.mark.parametrize("name", [name for name in SETS if not SETS[name].moving])
 def test_problems_with_a_witness_contradict_nothing(name):
-    for number in range(10):
+    for number in range(4):
         case = SETS[name].make(number, 5)
         assert found(case.problem) == ()
 
@@ -209,7 +215,7 @@ def test_the_largest_value_of_a_range_is_that_of_the_best_posture(standing):
     scene = standing().scene
     term = next(term for term in standing().constraints if isinstance(term, wb.RangeOfMotion))
     row, state, rng = term.rows[term.row_names.index("neck")], State(scene.model), np.random.default_rng(1)
-    for _ in range(20):
+    for _ in range(10):
         ends = np.sort(rng.uniform(-1.5, 1.5, (2, scene.model.nq)), axis=0)
         ends[:, :7] = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0  # the root
         values = [row.value(state.update(rng.uniform(*ends))) for _ in range(2000)]

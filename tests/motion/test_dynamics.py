@@ -62,11 +62,15 @@ def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
         wb.Trajectory(dynamics=True)  # type: ignore[arg-type]
 
 
-def test_a_recording_that_picks_up_stays_within_strength(shared_data: Path) -> None:
+@pytest.fixture(scope="module")
+def recorded(shared_data: Path) -> wb.Clip:
+    """The first frames of a man who crouches for a jump."""
+    return wb.retarget(wb.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 50), wb.load("human"))[:45]
+
+
+def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> None:
     """Both feet of the recording overlap by 6 cm; freeing them changes what the hips bear and how the person leans."""
-    human = wb.load("human")
-    clip = wb.read_clip(shared_data / "mocap" / "cmu_02_04.bvh", human).resampled(1.0 / 30.0)[:45]
-    found = wb.avoid(clip, dynamics=True)
+    found = wb.avoid(recorded, dynamics=True)
     assert found.report.before.colliding
     assert found.report.solved, found.report.message
     loads = found.report.loads
@@ -78,17 +82,14 @@ def test_a_recording_that_picks_up_stays_within_strength(shared_data: Path) -> N
     assert (loads.after.outside <= loads.before.outside + 2e-3).all()
 
 
-def test_a_recording_is_slowed_and_stays_within_strength(shared_data: Path) -> None:
+def test_a_recording_is_slowed_and_stays_within_strength(recorded: wb.Clip) -> None:
     """It crouches for a jump: the feet leave the ground between two frames of the slowed clip."""
-    human = wb.load("human")
-    skeleton = wb.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh")
-    clip = wb.retarget(skeleton.part(0, 50), human)[:45]
-    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=1.5))
+    found = wb.avoid(recorded, dynamics=True, method=wb.Trajectory(stretch=1.5))
     report = found.report
     assert report.before.colliding
     assert report.solved, report.message
     assert 1.2 < report.stretch <= 1.5
-    assert len(found.clip) > len(clip)
+    assert len(found.clip) > len(recorded)
     assert isinstance(report.loads, LoadChange)
     assert report.loads.after.largest_share < 0.8 * report.loads.before.largest_share
 

@@ -14,7 +14,7 @@ from wholebody.figures.self_pairs import random_postures
 from wholebody.simplification.reach import Balls, Reach
 from wholebody.simplification.simplify import Parts, leave_out
 
-POSTURES = 10_000
+POSTURES = 4_000
 
 
 def tree(seed: int) -> pin.Model:

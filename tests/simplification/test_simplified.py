@@ -245,7 +245,7 @@ def solved(problem: wb.Problem) -> tuple[Simplified, wb.Solution]:
     return part, part.restored(wb.solve(part.problem))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_answers_of_random_problems_hold_in_the_whole_one(
     human: Figure, cluttered: Callable[..., wb.Scene], seed: int
 ) -> None:
@@ -264,7 +264,7 @@ def test_answers_of_random_problems_hold_in_the_whole_one(
     assert len(part.problem.scene.pair_table.pairs) < len(scene.pair_table.pairs)
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(1))
 def test_an_arm_among_hundreds_of_things_keeps_what_it_reaches(
     arm: Figure, cluttered: Callable[..., wb.Scene], seed: int
 ) -> None:

@@ -106,7 +106,7 @@ def test_a_plate_through_a_body_that_cannot_give_way_is_named() -> None:
     assert [{one.first, one.second} for one in frame.collisions] == [{"ball", "plate"}]
 
 
-@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("seed", range(2))
 def test_bodies_that_are_pushed_about_are_in_nothing_and_pass_through_nothing(seed: int) -> None:
     made = (
         wb.Assembly().add(wb.HalfSpace(), name="floor").add(wb.Box((0.3, 0.3, 0.3)), name="block", at=(0.5, 0.1, 0.15))

@@ -29,9 +29,9 @@ def _circle(angle: float) -> tuple[float, float, float]:
 def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
     problem = _problem(scene)
     drag = wb.Drag(problem, method)
-    for _ in range(20):
+    for _ in range(12):
         drag.to(_circle(0.0))
-    frames = [drag.to(_circle(0.05 * k)) for k in range(60)]
+    frames = [drag.to(_circle(0.05 * k)) for k in range(30)]
     assert max(frame.error for frame in frames) < 0.01
     last = drag.finish()
     assert last.solved
@@ -43,13 +43,13 @@ def test_a_drag_follows_and_ends_exactly(scene: wb.Scene, method: str) -> None:
 
 @pytest.mark.parametrize("method", ["newton", "qp", "ccd"])
 def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callable[..., wb.Problem]) -> None:
-    """The goal goes through a plate of 6 mm in steps of 20 mm, and the hand stays on its side."""
+    """The goal goes through a plate of 6 mm in steps of 40 mm, and the hand stays on its side."""
     problem = before_plate((0.8, 0.8), 0.55, 1.2)
     scene = problem.scene
     drag = wb.Drag(problem, method)
-    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(20)]
+    postures = [drag.to((0.4, -0.2, 1.2)).q for _ in range(12)]
     assert drag.to((0.4, -0.2, 1.2)).error < 2e-3
-    postures += [drag.to((0.4, y, 1.2)).q for y in np.arange(-0.2, 0.2, 0.02)]
+    postures += [drag.to((0.4, y, 1.2)).q for y in np.arange(-0.2, 0.2, 0.04)]
     postures.append(drag.finish().q)
     for before, after in itertools.pairwise(postures):
         assert wb.assess(problem, after).penetration < 3e-4
@@ -64,9 +64,9 @@ def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene)
     problem = _problem(scene)
     drag = wb.Drag(problem, "newton")
     drag.to(_circle(0.0))
-    frames = [drag.to(_circle(0.1 * k)) for k in range(63)]
+    frames = [drag.to(_circle(0.1 * k)) for k in range(32)]
     assert np.mean([frame.iterations for frame in frames]) < 3.0
-    for frame in frames[::12]:
+    for frame in frames[::6]:
         judged = wb.assess(problem, frame.q)
         assert judged.constraint_violation < 2e-4  # what a frame is solved to, not more from frame to frame
         assert scene.figure.within_limits(frame.q)
@@ -81,6 +81,9 @@ def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
         wb.Drag(problem, "jacobi")
     with pytest.raises(wb.InputError, match="finite"):
         wb.Drag(problem, "newton").to((np.nan, 0, 0))
+    drag = wb.Drag(problem, "newton")
+    with pytest.raises(wb.InputError, match=r"Drag: q has shape \(56,\), not \(2,\)"):
+        drag.q = np.zeros(2)
     other = wb.Problem(scene, "standing", goals=[wb.CenterOfMass((0, 0, 1))])
     with pytest.raises(wb.InputError, match="CenterOfMass"):
         wb.Drag(other)
@@ -105,8 +108,7 @@ def test_a_frame_by_quadratic_programs_is_as_near_as_it_is_asked_for(scene: wb.S
     assert max(measures) < 1.06 * min(measures)  # they settle over a second, in which the goal moves on
 
 
-@pytest.mark.parametrize("speed", [0.6, 1.5])
-@pytest.mark.parametrize("method", ["ccd", "newton", "qp"])
+@pytest.mark.parametrize(("method", "speed"), [("ccd", 1.5), ("newton", 1.5), ("qp", 1.5), ("qp", 0.6)])
 def test_an_arm_gives_way_to_what_comes_into_it_and_comes_back(planar_arm, method: str, speed: float) -> None:
     """A ball is pushed 25 cm into where the forearm is, and taken away again; the goal stays where the tip was."""
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.08), name="ball", at=(0.7, 0.6, 0.0))

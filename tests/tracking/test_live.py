@@ -52,7 +52,7 @@ def test_holds_are_those_of_the_problem_and_can_be_released(drag: LiveDrag) -> N
 
 def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) -> None:
     q = drag.q.copy()
-    along(drag, "table", (-0.5, 0.0, 0.0), 60)
+    along(drag, "table", (-0.5, 0.0, 0.0), 40)
     assert drag.scene.objects["table"].placement.translation[0] == pytest.approx(0.1, abs=1e-9)
     assert drag.report().overlap < 2e-3
     assert not np.allclose(drag.q, q)

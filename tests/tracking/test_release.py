@@ -56,7 +56,7 @@ def test_two_arms_come_back_from_a_wall(avatar: wb.Figure, overlap: str, release
 
     loop = FrameLoop(scene, ahead(avatar, -0.25), overlap=overlap)
     assert not loop.frame(ahead(avatar, -0.25)).note
-    for x in [*np.linspace(-0.25, 0.2, 30), *[0.2] * 10]:
+    for x in [*np.linspace(-0.25, 0.2, 20), *[0.2] * 5]:
         loop.frame(ahead(avatar, x))
         assert least_distance(scene, loop.shown) > -1e-3
     assert least_distance(scene, ahead(avatar, 0.2)) < -0.1

@@ -15,7 +15,7 @@ from wholebody.tasks import ReachCones
 from wholebody.tracking import SCENES, Recording, Track, build_scene, follow, gallery, judge
 from wholebody.tracking.scenes import InteractionScene
 
-BEFORE, AFTER = 8, 32
+BEFORE, AFTER = 7, 19
 
 
 @cache

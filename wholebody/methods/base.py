@@ -89,6 +89,9 @@ class Method(Protocol):
         """None if the method can take the problem; otherwise a sentence with the unsupported terms and the correction.
 
         `solve` and `tracker` raise an `UnsupportedTermError` with this sentence before anything is computed.
+
+        Raises:
+            InputError: it is no problem.
         """
 
     def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:

@@ -28,13 +28,13 @@ from wholebody.figures.state import State
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.differential import REST
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks.base import Constraint, Goal
 
 SHARE = 0.5  # of the tolerance, to which goals and equalities are met: the assessment rounds differently
-REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
 RANK = 1e-8  # squared singular values below this share of the largest count as zero
 
 

@@ -73,6 +73,10 @@ class Avoider(Protocol):
             scene: its figure with equipment, and the things around.
             constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
             progress: called with the share done; where it returns True, the method ends with what it has.
+
+        Raises:
+            InputError: clip and scene are none or of different figures, or a constraint is none.
+            UnknownNameError: a constraint names what the figure does not have.
         """
 
 

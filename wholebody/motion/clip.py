@@ -14,8 +14,9 @@ from wholebody.arrays import Array
 from wholebody.checks import array, instance, number, shown, text, time_step
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.motion.mirroring import mirrored
-from wholebody.tracking.tracks import MOST_FRAMES, UNIT_TOLERANCE, Track, check_figure, check_frames
+from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
 
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
@@ -263,8 +264,8 @@ class Clip:
             The path.
 
         Raises:
-            InputError: an ending that is not known, a figure that the format cannot hold, or a file that cannot be
-                written.
+            FileFormatError: an ending that is not known.
+            InputError: a figure that the format cannot hold, or a file that cannot be written.
         """
         from wholebody.motion.files import write_motion
 

@@ -1,4 +1,9 @@
-"""Feet that stand: when, and where the floor is."""
+"""Feet of a recorded skeleton that stand: when, and where the floor is.
+
+They are slow and low by the measures of `StanceFeet`, as the feet of a clip are. But the joints of a skeleton are above
+its soles, and a recording drifts: both feet have one floor, a low percentile of what they do while they are slow, and a
+foot that stands at several places made steps between them.
+"""
 
 from __future__ import annotations
 
@@ -9,17 +14,11 @@ import numpy as np
 from wholebody.arrays import Array, Mask
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
-from wholebody.motion.stance import speeds
+from wholebody.motion.stance import StanceFeet, speeds
 from wholebody.motion.windows import Window, long_runs, runs
 
-SLOW = 0.15
-"""Metres a second: a foot that is slower may stand."""
-
-LOW = 0.05
-"""Metres above its height when it stands: a foot that is lower may stand."""
-
-SHORTEST = 0.1
-"""Seconds: a foot that is slow and low for less time is not held."""
+FLOOR = 10.0
+"""Percentile of the heights of slow feet that counts as the height at which they stand: some are lower by error."""
 
 BLEND = 0.15
 """Seconds before and after a foot stands, over which it goes from its own way to where it stands."""
@@ -45,7 +44,7 @@ class Footfalls(NamedTuple):
 
 def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
     """When the ankles and toes of a skeleton stand."""
-    stands, heights = {}, {}
+    stands, heights, limits = {}, {}, StanceFeet()
     for part in ("ankle", "toe"):
         pair = {
             f"{side}_{part}": motion.names.index(roles.joints[f"{side}_{part}"])
@@ -54,15 +53,15 @@ def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
         }
         places = {role: motion.positions[:, joint] for role, joint in pair.items()}
         speed = {role: speeds(at, motion.dt) for role, at in places.items()}
-        slow = [at[speed[role] < SLOW, 2] for role, at in places.items()]
+        slow = [at[speed[role] <= limits.speed, 2] for role, at in places.items()]
         low = np.concatenate(slow) if slow else np.zeros(0)
         if not len(low):
             continue
-        height = float(np.percentile(low, 10))
+        height = float(np.percentile(low, FLOOR))
         for role, at in places.items():
             heights[role] = height
-            still = _apart(at, (speed[role] < SLOW) & (at[:, 2] < height + LOW))
-            stands[role] = long_runs(still, round(SHORTEST / motion.dt))
+            still = _apart(at, (speed[role] <= limits.speed) & (at[:, 2] <= height + limits.height))
+            stands[role] = long_runs(still, round(limits.least / motion.dt))
     for side in ("left", "right"):  # a heel stands only while the toes do, so that both keep the length of the foot
         if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
             stands[f"{side}_ankle"] &= stands[f"{side}_toe"]

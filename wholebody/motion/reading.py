@@ -31,6 +31,7 @@ def read_skeleton(path: str | os.PathLike[str], *, unit: str | None = None, up: 
     Raises:
         FileFormatError: the file cannot be read, is cut off, has wrong counts, two roots, or values that are no finite
             numbers; the line is named.
+        InputError: the path is none, or unit or up is another word.
         MissingPackageError: pybvh is not installed.
     """
     path = checked_path(path, "path")
@@ -57,6 +58,8 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
         FileFormatError: the file cannot be read, is cut off, has wrong counts or values that are no finite numbers, or
             does not fit the figure; the file and, in text files, the line are named.
         UnknownNameError: it has a joint that the figure does not have.
+        InputError: the path is none, or the figure is none.
+        MissingPackageError: pybvh is not installed.
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")

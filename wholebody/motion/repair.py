@@ -23,7 +23,7 @@ from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.one_side import one_sided
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
-from wholebody.motion.trajectory.nodes import Looking, Node, Rows, Terms
+from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator, Rows, Terms
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import WindowProgram
@@ -41,7 +41,6 @@ ROOM = 3e-4  # m: clearance that a motion that dips is first asked for beyond th
 MOST_ROOM = 5e-3  # m
 THROUGH = 0.06  # m, as thick as a forearm: no rows free a deeper dip, of a limb that goes right through
 SPREAD = 0.06  # s: how far a push at one frame spreads to its neighbours
-NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 
 
 class _Left(NamedTuple):
@@ -56,7 +55,7 @@ class _Left(NamedTuple):
     dipping: dict[int, list[float]]
 
 
-class _Looking(Looking):
+class _NodeEvaluator(NodeEvaluator):
     """Looks at what is near, and asks for more room in and beside motions that dip.
 
     Attributes:
@@ -146,9 +145,9 @@ class Repairer:
         seams = window.first > 0, window.end < len(q)
         objective = Objective(len(window), np.ones(workspace.model.nv), SPREAD, terms.dt, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
-        looking = _Looking(workspace, chart, held, self._clearance)
+        evaluator = _NodeEvaluator(workspace, chart, held, self._clearance)
         program = WindowProgram(
-            looking, objective, self._limits(window, chart, seams), banded_solver(None)[1], PROGRAMS
+            evaluator, objective, self._limits(window, chart, seams), banded_solver(None)[1], PROGRAMS
         )
         x = np.zeros((len(window), workspace.model.nv))
         found = chart.original.copy()
@@ -157,7 +156,7 @@ class Repairer:
             places = [(gap, at) for gap, shares in left.dipping.items() for at in shares]
             program.add([Node(gap, float(np.clip(at, NEAREST, 1.0 - NEAREST))) for gap, at in places])
             for gap in left.dipping:
-                looking.ask(gap)
+                evaluator.ask(gap)
             answer = program.run(x, lambda count, worst: False, RADIUS)
             self._programs += answer.programs
             x, postures, moved = answer.x, chart.original.copy(), (answer.x != 0.0).any(axis=1)

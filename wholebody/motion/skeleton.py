@@ -155,7 +155,7 @@ class SkeletonMotion:
             raise InputError(f"{name}: root has shape {root.shape}; give ({len(local)}, 3)")
         for given in (local, offsets, root):
             if not (np.abs(given) <= LARGEST).all():
-                raise InputError(f"{name}: a value is not finite or beyond {LARGEST:g}; mend it")
+                raise InputError(f"{name}: a value is not finite or beyond {LARGEST:g}; correct it")
         rotations, positions = np.empty_like(local), np.empty(local.shape[:3])
         for joint, parent in enumerate(above):
             if parent < 0:

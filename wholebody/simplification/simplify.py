@@ -23,7 +23,7 @@ from wholebody.scene import Scene
 from wholebody.scene_geometry import SceneGeometry, SceneObject
 from wholebody.simplification.active_joints import ActiveJoints, active_joints
 from wholebody.simplification.embedding import Embedding, restated_term
-from wholebody.simplification.pairs import reachable_pairs
+from wholebody.simplification.pairs import PROBE, reachable_pairs
 from wholebody.simplification.simplified import LeftOut, Simplified
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze
@@ -258,7 +258,6 @@ def _left_out(
 
 FEW = 64  # corners: simplifying pieces with at most as many saves no measurable time
 CORNERS = (8, 16, 32, 48)  # tried in turn
-PROBE = 1e-4  # m: radius of the ball that represents a point in coal
 
 
 def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:

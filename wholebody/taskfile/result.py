@@ -110,6 +110,7 @@ def read_result(path: str | os.PathLike[str]) -> Result:
 
     Raises:
         FileFormatError: it is not a result, or does not fit the present task.
+        InputError: the path is none.
         WholebodyError: its task cannot be read.
     """
     file = checked_path(path, "read_result: path")

@@ -63,7 +63,11 @@ class Discomfort(Measure):
     limited: LimitedJoints = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the value."""
+        """Check the value.
+
+        Raises:
+            InputError: the weight is not positive, or out of range.
+        """
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Discomfort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:

@@ -109,7 +109,11 @@ class Effort(DistanceMeasure):
     distance: SquaredDistance = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the value."""
+        """Check the value.
+
+        Raises:
+            InputError: the weight is not positive, or out of range.
+        """
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Effort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
@@ -133,7 +137,11 @@ class Displacement(DistanceMeasure):
     distance: SquaredDistance = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the value."""
+        """Check the value.
+
+        Raises:
+            InputError: the weight is not positive, or out of range.
+        """
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Displacement: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:

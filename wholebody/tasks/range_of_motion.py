@@ -148,6 +148,9 @@ class RangeOfMotion(Constraint):
         names: names of the figure's ranges; None for all of them.
         rows: each range with its frames and joints, once resolved.
         row_names: its name, once resolved.
+
+    Raises:
+        InputError: names is no list.
     """
 
     names: Sequence[str] | None = None

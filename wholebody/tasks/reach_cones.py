@@ -44,6 +44,9 @@ class ReachCones(Constraint):
     Attributes:
         names: names of the figure's cones; None for all of them.
         limbs: each cone with its frames and joints, once resolved.
+
+    Raises:
+        InputError: names is no list.
     """
 
     names: Sequence[str] | None = None

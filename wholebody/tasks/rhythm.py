@@ -106,7 +106,11 @@ class Rhythm(Measure):
     lumbar: Lumbar | None = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the value."""
+        """Check the value.
+
+        Raises:
+            InputError: the weight is not positive, or out of range.
+        """
         object.__setattr__(self, "weight", inputs.weight(self.weight, "Rhythm: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:

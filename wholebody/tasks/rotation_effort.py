@@ -78,7 +78,11 @@ class RotationEffort(Measure):
     others: SquaredDistance = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Check the value."""
+        """Check the value.
+
+        Raises:
+            InputError: the weight is not positive, or out of range.
+        """
         object.__setattr__(self, "weight", inputs.weight(self.weight, "RotationEffort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:

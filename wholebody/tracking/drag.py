@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import shown, time_step
+from wholebody.checks import posture, shown, time_step
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Tracker, goal_error, judged
@@ -213,14 +213,18 @@ class Drag(NotCopyable, Generic[Answer]):
 
     @property
     def q(self) -> Array:
-        """(nq,) the present posture; of an assembly that of its `scene`."""
+        """(nq,) the present posture; of an assembly that of its `scene`.
+
+        Raises:
+            InputError: it is set to another shape, to a value that is not finite, or for an assembly.
+        """
         return self._run.q
 
     @q.setter
     def q(self, q: Array) -> None:
         if isinstance(self._run, AssemblyDrag):
             raise InputError("Drag: the posture of an assembly is set by assembly.place(variables)")
-        self._run.q = q
+        self._run.q = np.array(posture(q, self._run.problem.scene.model.nq, "Drag: q"))
 
     @property
     def problem(self) -> Problem | Assembly:

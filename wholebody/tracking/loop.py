@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike
 from wholebody.arrays import Array
 from wholebody.checks import array, flag, function, instance, known, listed, time_step
 from wholebody.errors import InputError
+from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.inputs import SEED
@@ -32,7 +33,7 @@ from wholebody.tracking.attraction import Attraction
 from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
 from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
 from wholebody.tracking.recording import Recording
-from wholebody.tracking.tracks import UNIT_TOLERANCE, Track
+from wholebody.tracking.tracks import Track
 from wholebody.workspace import NotCopyable
 
 OVERLAPS = ("qp", "ccd")

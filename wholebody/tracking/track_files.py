@@ -100,7 +100,7 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         row, column = (int(k) for k in broken[0])
         raise FileFormatError(
             f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
-            f"finite or beyond {LARGEST_VALUE:g}; mend or cut those frames"
+            f"finite or beyond {LARGEST_VALUE:g}; correct or cut those frames"
         )
     track = Track.of(figure, table[:, order[1:]], dt, path.name)
     track.check(figure)

@@ -15,9 +15,9 @@ from wholebody.checks import array, instance, known, listed, shown, text, time_s
 from wholebody.checks import posture as checked_posture
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import placement
 
-UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 ROOT_SIZE = 7
 LARGEST = 1e6  # of a value, radians or metres
 MOST_FRAMES = 1_000_000  # of a track: ten hours at 30 frames a second; more would be gigabytes
@@ -39,7 +39,7 @@ def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
         frame, column = (int(k) for k in bad[0])
         raise InputError(
             f"{what}: frame {frame}, {place(column)} is {q[frame, column]:g}; {len(bad)} values are not finite or "
-            f"beyond {LARGEST:g}; mend or cut those frames"
+            f"beyond {LARGEST:g}; correct or cut those frames"
         )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from itertools import pairwise
 from typing import Any
 
@@ -39,22 +40,21 @@ def random_joints() -> Callable[..., Any]:
     return _random_joints
 
 
-def _deepest(scene: wb.Scene, q: Any) -> float:
-    """Deepest overlap of all pairs, from Pinocchio's own loop."""
-    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
-    pin.computeDistances(scene.model, data, scene.geometry, placed, q)
-    return max(0.0, -min((result.min_distance for result in placed.distanceResults), default=0.0))
-
-
 @pytest.fixture(scope="session")
-def deepest() -> Callable[..., float]:
+def deepest(least_distance: Callable[..., float]) -> Callable[..., float]:
     """Return a function: scene, posture -> deepest overlap, metres."""
-    return _deepest
+    return lambda scene, q: max(0.0, -least_distance(scene, q))
+
+
+@cache
+def _data(figure: wb.Figure) -> Any:
+    """Pinocchio's data of a figure: to make them takes longer than to use them."""
+    return figure.model.createData()
 
 
 def _outside(figure: wb.Figure, q: Any) -> float:
     """How far the limb that is farthest out of its reach cone is out, radians."""
-    data = figure.model.createData()
+    data = _data(figure)
     pin.framesForwardKinematics(figure.model, data, q)
     worst = 0.0
     for cone in figure.cones.values():

@@ -53,7 +53,7 @@ def test_what_is_left_free_minimises_the_measures(planar_arm):
     problem = wb.Problem(scene, start=start, goals=[wb.Point("tip", (*target, 0.0))])
     solution = wb.QP(tolerance=1e-8).solve(problem)
     best = np.inf
-    for last in np.linspace(-3.0, 3.0, 40001):  # direction of the last link in the plane
+    for last in np.linspace(-3.0, 3.0, 8001):  # direction of the last link in the plane
         wrist = target - 0.3 * np.array([np.cos(last), np.sin(last)])
         reach = (wrist @ wrist - 0.4**2 - 0.3**2) / (2 * 0.4 * 0.3)
         if abs(reach) > 1.0:
@@ -306,12 +306,11 @@ def test_a_start_whose_contacts_cancel_ends_outside(honest):
     assert solution.assessment.goal_error < 0.1201  # pulled back by 12 cm, and no more
 
 
-@pytest.mark.parametrize("height", [0.44, 0.47])
-def test_a_person_who_stands_in_the_middle_of_a_chair_gets_out_of_it(height, honest):
+def test_a_person_who_stands_in_the_middle_of_a_chair_gets_out_of_it(honest):
     """The seat is too high for soles that stand flat; no step from the standing legs leads out of the seat."""
     scene = wb.Scene(wb.load("human"))
     scene.add(wb.HalfSpace(), name="floor")
-    scene.add(wb.Box((0.42, 0.5, 0.04)), name="seat", at=(-0.1, 0.0, height - 0.02))
+    scene.add(wb.Box((0.42, 0.5, 0.04)), name="seat", at=(-0.1, 0.0, 0.45))
     scene.add(wb.Box((0.04, 0.5, 0.6)), name="back", at=(-0.33, 0.0, 0.8))
     stands = wb.Stand(on="floor", balance=False)
     problem = wb.Problem(scene, goals=[wb.Sit("seat", back="back")], constraints=[stands])

@@ -65,24 +65,15 @@ def jumping(request, free_bodies, planar_arm):
 
 @pytest.mark.parametrize("solver", ["osqp", "daqp"])
 @pytest.mark.parametrize("dt", STEPS)
-def test_nothing_is_jumped_over_at_any_length_of_a_step(jumping, dt, solver):
+def test_nothing_is_jumped_over_or_entered_at_any_length_of_a_step(jumping, dt, solver, least_distance):
     case = jumping()
 
     def check(q, step):
         assert case.tip_at(step.q)[0] < 0.6
         assert case.figure.within_limits(step.q)
-
-    follow(case.problem, wb.QP(solver), dt, case.targets(STEPS[dt]), check)
-
-
-@pytest.mark.parametrize("dt", STEPS)
-def test_nothing_is_entered_at_any_length_of_a_step(jumping, dt, least_distance):
-    case = jumping()
-
-    def check(q, step):
         assert least_distance(case.scene, step.q) >= 0.0
 
-    follow(case.problem, wb.QP("daqp"), dt, case.targets(STEPS[dt]), check)
+    follow(case.problem, wb.QP(solver), dt, case.targets(STEPS[dt]), check)
 
 
 @pytest.mark.parametrize("solver", ["osqp", "daqp"])
@@ -110,9 +101,9 @@ def test_a_person_whose_goals_jump_enters_nothing(least_distance):
     for dt, bounds in ((0.1, [wb.StepLimit(2.0, root_velocity=0.5, root_turn=1.0)]), (0.01, []), (1.0, [])):
         problem = wb.Problem(scene, constraints=[*holds, *bounds], clearance=CLEARANCE)
         assert least_distance(scene, problem.start) > 0.0
-        places = [rng.uniform([-0.2, -0.6, 0.2], [1.0, 0.6, 1.8], (2, 3)) for _ in range(8)]
+        places = [rng.uniform([-0.2, -0.6, 0.2], [1.0, 0.6, 1.8], (2, 3)) for _ in range(5)]
         q, tracker = problem.start, wb.QP("daqp").tracker(problem, dt)
-        for k in range(160):
+        for k in range(100):
             right, left = places[k // 20]
             problem.retarget([wb.Point("right_index_tip", right), wb.Point("left_index_tip", left)])
             q = tracker.step(q).q

@@ -8,18 +8,9 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from wholebody.motion.bisection.groups import collision_groups, runs
+from wholebody.motion.bisection.groups import collision_groups
 
 MARKS = st.lists(st.booleans(), min_size=2, max_size=60)
-
-
-@given(MARKS)
-def test_runs_are_maximal_and_have_every_mark(marks: list[bool]) -> None:
-    bad = np.array(marks)
-    found = runs(bad, 0, len(bad) - 1)
-    frames = [frame for first, last in found for frame in range(first, last + 1)]
-    assert frames == np.flatnonzero(bad).tolist()
-    assert all(b[0] - a[1] > 1 for a, b in pairwise(found))
 
 
 @given(MARKS, st.integers(0, 59), st.integers(0, 59), st.floats(0.0, 3.0), st.integers(1, 12))

@@ -7,10 +7,12 @@ import signal
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pinocchio as pin
 import pytest
+from scipy.optimize import minimize
 
 import wholebody as wb
 from wholebody.arrays import Array
@@ -19,18 +21,20 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress
 from wholebody.methods.qp.method import QP
-from wholebody.motion.avoider import AvoidProgress, MethodResult
+from wholebody.motion.avoider import AvoidProgress, MethodResult, Watch
 from wholebody.motion.bisection import method as method_module
-from wholebody.motion.bisection.groups import runs
 from wholebody.motion.bisection.method import Bisection
 from wholebody.motion.bisection.prediction import Predictor, path_planes
-from wholebody.motion.bisection.recursion import SHORT
+from wholebody.motion.bisection.recursion import SHORT, hold_between
 from wholebody.motion.clip import Clip
+from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.measures import deviation
 from wholebody.motion.ready_equipment import equipment
+from wholebody.motion.windows import runs
 
 DEEP = 1e-4  # m
+LENGTHS = (0.5, 0.4, 0.3)  # m: an arm in the plane
 SPREAD = 0.15  # rad: with less, hanging hands are in the thighs
 
 
@@ -73,12 +77,12 @@ def depths(scene: wb.Scene, q: Array) -> Array:
     found = []
     for posture in q:
         pin.updateGeometryPlacements(model, data, geometry, results, posture)
-        pin.computeDistances(geometry, results)
-        found.append(max(0.0, -min(result.min_distance for result in results.distanceResults)))
+        nearest = pin.computeDistances(geometry, results)
+        found.append(max(0.0, -results.distanceResults[nearest].min_distance))
     return np.array(found)
 
 
-def between(scene: wb.Scene, q: Array, parts: int = 12) -> float:
+def between(scene: wb.Scene, q: Array, parts: int = 6) -> float:
     """Deepest overlap at postures between those of a clip."""
     steps = [pin.interpolate(scene.model, a, b, k / parts) for a, b in pairwise(q) for k in range(parts)]
     return float(depths(scene, np.array(steps)).max())
@@ -101,9 +105,9 @@ def test_every_frame_is_free_and_frames_outside_of_the_groups_stay(swing: Clip, 
     assert between(scene, result.q) <= DEEP
     assert result.posture_solves < before.sum()
     allowed = set()
-    for first, last in runs(before, 0, len(swing) - 1):
-        room = round((last - first + 1) * buffer / 100)
-        allowed |= set(range(first - room, last + room + 1))
+    for first, end in runs(before):
+        room = round((end - first) * buffer / 100)
+        allowed |= set(range(first - room, end + room))
     assert set(changed(swing, result).tolist()) <= allowed
     assert all(swing.figure.within_limits(q) for q in result.q)
     assert np.array_equal(result.q[:, :7], swing.q[:, :7])  # the root stays
@@ -270,6 +274,33 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Fi
             left, right = (state.frame(person.frame_id(f"{side}_palm")).copy() for side in ("left", "right"))
             places.append((right.inverse() * left).translation)
         assert np.linalg.norm(places[0] - places[1]) < 1e-3
+
+
+def test_interpolated_frames_move_to_the_nearest_posture_of_what_is_held(planar_arm: Callable[..., Figure]) -> None:
+    """An arm whose tip is held, at postures between which the tip leaves its place."""
+    figure = planar_arm(LENGTHS, radius=0.02)
+    scene = wb.Scene(figure)
+    clip = Clip(figure, np.repeat([[0.3, 0.8, -0.5]], 5, axis=0), 1 / 30)
+    place = scene.state(clip.q[0]).frame(figure.frame_id("tip")).translation.copy()
+    terms = frame_terms(scene, clip.q, clip.dt, [wb.Hold("tip", orientation=False)])
+    moved = clip.q + np.outer([0.0, 0.05, 0.1, 0.05, 0.0], [1.0, 0.6, 1.0])
+    with scene.borrow() as workspace:
+        predictor = Predictor(scene, clip.q, terms, (), QP(restarts=0), 0.01, 1e-4, workspace)
+        present = SimpleNamespace(q=moved.copy(), predictions=0, programs=0)
+        assert hold_between(present, predictor, Follower(terms, 0.0), [1, 2, 3], Watch(None)) == []  # type: ignore[arg-type]
+    assert np.array_equal(present.q[[0, 4]], moved[[0, 4]])
+
+    def off(q: Array) -> Array:
+        """How far the tip is from its place, by trigonometry."""
+        angles = np.cumsum(q)
+        return np.array([np.array(LENGTHS) @ np.cos(angles), np.array(LENGTHS) @ np.sin(angles)]) - place[:2]
+
+    for before, after in zip(moved[1:4], present.q[1:4], strict=True):
+        assert np.linalg.norm(off(before)) > 0.02
+        assert np.linalg.norm(off(after)) < 2e-4
+        held = {"type": "eq", "fun": off}
+        nearest = minimize(lambda q, near=before: float((q - near) @ (q - near)), clip.q[0], constraints=held)
+        np.testing.assert_allclose(after, nearest.x, atol=2e-3)
 
 
 def test_the_ends_of_the_clip_are_freed(swing: Clip) -> None:

@@ -17,7 +17,7 @@ from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
-from wholebody.motion.trajectory.sqp import EARLY, MET, STEPS, Found, WindowProgram
+from wholebody.motion.trajectory.sqp import EARLY, MET, STEPS, SQPResult, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 
@@ -56,7 +56,7 @@ class Asked:
         return Rows(node, gap, (np.ones((1, 1)),), np.zeros(1, dtype=np.intp), np.zeros(0), np.zeros((0, 1)))
 
 
-def asked(least: float, early_exit: float | None, share: float = 1.0, rough: bool = False) -> Found:
+def asked(least: float, early_exit: float | None, share: float = 1.0, rough: bool = False) -> SQPResult:
     """What a run of three frames ends with that begins with no deviation."""
     wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
     limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
@@ -117,7 +117,7 @@ def test_attempts_that_end_early_are_gone_on_with(
     scene.add(wb.Sphere(0.002), name="needle", at=(0.985, 0.05, 0.0))  # passed between two frames
     run, runs = WindowProgram.run, []
 
-    def once(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
+    def once(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
         found = run(self, x, *given)
         runs.append((x, self.between, given[3], found.x))
         return found if given[3] is None else found._replace(early=True)
@@ -134,17 +134,17 @@ def test_attempts_that_end_early_are_begun_again(
     planar_arm: Callable[..., Figure], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     figure = planar_arm((0.5, 0.5))
-    clip = wb.Clip(figure, np.stack([np.linspace(-0.8, 0.8, 30), np.full(30, 0.5)], axis=1), 1 / 30)
+    clip = wb.Clip(figure, np.stack([np.linspace(-0.8, 0.8, 14), np.full(14, 0.5)], axis=1), 1 / 30)
     scene = wb.Scene(figure)
     scene.add(wb.Sphere(0.06), name="ball", at=(0.9, 0.1, 0.0))
     assert not wb.check(clip, scene).free
     run, ended = WindowProgram.run, []
 
-    def hurried(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
+    def hurried(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
         if given[3] is None:
             return run(self, x, *given)
         ended.append(x)
-        return Found(x, 0.0, 1.0, met=False, programs=0, cancelled=False, early=True)
+        return SQPResult(x, 0.0, 1.0, met=False, programs=0, cancelled=False, early=True)
 
     monkeypatch.setattr(WindowProgram, "run", hurried)
     freed = wb.avoid(clip, scene, method="trajectory")
@@ -190,7 +190,7 @@ def runs_of_a_window(
     scene.add(wb.Sphere(0.1), name="ball", at=(0.8, 0.1, 0.0))
     run, runs, said = WindowProgram.run, [], [passed]
 
-    def told(self: WindowProgram, x: np.ndarray, *given: Any) -> Found:
+    def told(self: WindowProgram, x: np.ndarray, *given: Any) -> SQPResult:
         found = run(self, x, *given)
         early, rough = (given[3] is not None, given[4]) if len(given) > 4 else (False, False)
         runs.append((x, early, rough, found.x))

@@ -107,7 +107,7 @@ def test_the_bound_on_slowing_holds_where_it_is_not_enough(planar_arm: Callable[
 
 
 def test_what_is_freed_and_slowed_is_free_and_slow(planar_arm: Callable[..., Figure]) -> None:
-    clip = swung(planar_arm)
+    clip = swung(planar_arm, 30)
     scene = wb.Scene(clip.figure)
     scene.add(wb.Sphere(0.1), name="ball", at=(0.45, 0.95, 0.0))
     free = wb.avoid(clip, scene)

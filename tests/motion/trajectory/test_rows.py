@@ -13,7 +13,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
-from wholebody.motion.trajectory.nodes import Looking, Node, Rows
+from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
 from wholebody.tasks import Hold, Plane
 from wholebody.tasks.base import Constraint, Goal
 
@@ -71,9 +71,9 @@ def test_the_posture_between_two_moves_as_its_derivatives_say(human: Figure, sha
             np.testing.assert_allclose(matrix[:, dof], change, atol=1e-6)
 
 
-def looking(figure: Figure, scene: wb.Scene, q: np.ndarray, terms: tuple[Constraint | Goal, ...] = ()) -> Looking:
+def looking(figure: Figure, scene: wb.Scene, q: np.ndarray, terms: tuple[Constraint | Goal, ...] = ()) -> NodeEvaluator:
     resolved = [tuple(term.resolve(scene, posture) for term in terms) for posture in q]
-    return Looking(scene.workspace(), Chart(figure.model, q), resolved, 0.01)
+    return NodeEvaluator(scene.workspace(), Chart(figure.model, q), resolved, 0.01)
 
 
 def differences(of: Callable[[np.ndarray], np.ndarray], x: np.ndarray) -> np.ndarray:
@@ -145,7 +145,9 @@ def test_loads_change_as_their_rows_say(human: Figure, node: Node) -> None:
     stands = {"left_foot": np.ones(frames, dtype=bool), "right_foot": np.ones(frames, dtype=bool)}
     clip = wb.Clip(human, q, 0.1)
     loads = ClipLoads.original(clip, stands, wb.Strength(5.0, "female"), frame_terms(wb.Scene(human), q, 0.1, ()))
-    look = Looking(wb.Scene(human).workspace(), Chart(human.model, q[2:5]), [()] * 3, 0.0, WindowLoads(loads, 2, 3))
+    look = NodeEvaluator(
+        wb.Scene(human).workspace(), Chart(human.model, q[2:5]), [()] * 3, 0.0, WindowLoads(loads, 2, 3)
+    )
     x = SMALL * random.normal(size=(3, human.model.nv))
     rows = look.at(node, x, 0.0)
     assert len(rows.gap) >= 3

@@ -23,7 +23,7 @@ from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.contacts import LEAVE
 from wholebody.methods.newton.equations import EquationSet, unit_lengths
-from wholebody.methods.newton.feasibility import satisfy
+from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
 FRAME_TOLERANCE = 1e-4  # m, rad: of the goals in the frames of a drag
 HARD_TOLERANCE = 1e-6  # m, rad: of joints and contacts there
-FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 
 
 @dataclass
@@ -133,7 +132,12 @@ class Assembly(AssemblyJoints):
     # ---- goals
 
     def point_goal(self, body: str, target: ArrayLike, *, place: ArrayLike = (0.0, 0.0, 0.0)) -> Self:
-        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible."""
+        """Move a point of a body, (3,) in its frame, to a position in the world (3,), if possible; metres.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: target or place are no positions.
+        """
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         offset = local * pin.SE3(np.eye(3), point(place, f"{what}: place"))
@@ -141,7 +145,12 @@ class Assembly(AssemblyJoints):
         return self
 
     def frame_goal(self, body: str, target: PlacementLike) -> Self:
-        """Move a body to a placement in the world, if possible."""
+        """Move a body to a placement in the world, if possible.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the target is no placement.
+        """
         what = f"the goal of {shown(body)}"
         index, local = self._moved(body, what)
         self._goals.append(AssemblyGoal(what, index, local, to_target(target, True, what), whole=True))
@@ -177,13 +186,21 @@ class Assembly(AssemblyJoints):
         return whole(goal, "the number of the goal", 0, len(self._goals) - 1)
 
     def goal_error(self, goal: int) -> float:
-        """Error of a goal at the present placements: the larger of metres and radians."""
+        """Error of a goal at the present placements: the larger of metres and radians.
+
+        Raises:
+            InputError: there is no such goal.
+        """
         one = self._goals[self.goal_index(goal)]
         error = one.error(self._placed(one.index))
         return max(float(np.linalg.norm(error[:3])), float(np.linalg.norm(error[3:])))
 
     def interpolate_goal(self, goal: int, share: float, target: Any) -> Self:
-        """Move a goal to a share of the way from where its body is now to a target."""
+        """Move a goal to a share (0 to 1) of the way from where its body is now to a target.
+
+        Raises:
+            InputError: there is no such goal, the target does not fit it, or the share is not within 0 and 1.
+        """
         one = self._goals[self.goal_index(goal)].moved(target)
         self._goals[goal] = one.between(self._placed(one.index), number(share, "share", 0.0, 1.0))
         return self

@@ -13,6 +13,7 @@ from wholebody.checks import color as checked_color
 from wholebody.checks import instance, known, number, numbers, shown, text
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
@@ -43,7 +44,6 @@ if TYPE_CHECKING:
 
 WORLD = "world"
 SIZE = 0.3  # m: of a body without shapes
-UNIT_TOLERANCE = 1e-3  # largest deviation of a quaternion from unit length; more is refused as a mistake
 
 
 class AssemblyBodies:
@@ -176,7 +176,12 @@ class AssemblyBodies:
         return {name: part.problem.scene.figure for name, part in self._figures.items()}
 
     def placement(self, name: str) -> Any:
-        """Placement (pin.SE3) of a body, or of a frame of a figure."""
+        """Placement (pin.SE3) of a body, or of a frame of a figure.
+
+        Raises:
+            UnknownNameError: there is neither.
+            InputError: the name is no text.
+        """
         index, local = self._frame(name, "placement")
         return self._placed(index) * local
 
@@ -185,6 +190,7 @@ class AssemblyBodies:
 
         Raises:
             UnknownNameError: there is no such figure.
+            InputError: the name is no text.
         """
         return self._figures[known(name, self._figures, "figure", "posture")].posture(self.variables())
 
@@ -287,6 +293,7 @@ class AssemblyBodies:
 
         Raises:
             UnknownNameError: no body, segment, figure or thing has this name.
+            InputError: a name is no text.
         """
         owners = {owner.name: owner for owner in self._owners()}
         for name in (first, second):

@@ -39,7 +39,11 @@ class AssemblyConstraint(ABC):
         """(m, b, 7) its derivative by the bodies."""
 
     def curvature(self, x: Array, force: Array) -> Array:
-        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it."""
+        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it.
+
+        Raises:
+            InputError: the class does not write it.
+        """
         raise InputError(f"{type(self).__name__} has no second derivatives; write curvature, or leave nearest out")
 
 

@@ -51,8 +51,8 @@ def solids(shape: ShapeLike | None, where: str) -> tuple[Solid, ...]:
     found: list[Solid] = []
     for entry in listed:
         given, at = entry if isinstance(entry, tuple) and len(entry) == 2 else (entry, (0.0, 0.0, 0.0))
-        mend = "give wb.Box, wb.Sphere or another, or (shape, placement)"
-        one: Shape = checks.instance(given, Shape, f"{where}: shape", mend)
+        correction = "give wb.Box, wb.Sphere or another, or (shape, placement)"
+        one: Shape = checks.instance(given, Shape, f"{where}: shape", correction)
         found.append((one, placement(at, f"{where}: shape")))
         if _reach(found[-1:]) == float("inf"):
             raise InputError(f"{where}: a body cannot be a half-space; add it as a thing, or give a wb.Box")

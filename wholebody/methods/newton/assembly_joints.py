@@ -67,7 +67,12 @@ class AssemblyJoints(AssemblyBodies):
         self._holding = EquationSet()
 
     def spherical(self, first: str, second: str, **where: Any) -> Self:
-        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
+        """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the bodies are one, or a position is none.
+        """
         a, b = self._pair(first, second, "spherical joint")
         ends = self._ends(a, b, "spherical joint", first, second, **where)
         self._holding.coincide(a[0], b[0], f"the spherical joint of {first!r} and {second!r}", *ends)
@@ -92,6 +97,10 @@ class AssemblyJoints(AssemblyBodies):
             limits: least and greatest angle from the present one, radians.
             axis_second: (3,) the direction in the second body's frame.
             where: `at`, or `at_first` and `at_second`.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the bodies are one, or a position, an axis or the limits are none.
         """
         what = f"the revolute joint of {shown(first)} and {shown(second)}"
         (a, in_a), (b, in_b) = self._pair(first, second, "revolute joint")
@@ -116,7 +125,12 @@ class AssemblyJoints(AssemblyBodies):
         return self._connected(a, b)
 
     def prismatic(self, first: str, second: str, *, axis: ArrayLike) -> Self:
-        """Two bodies translate along one direction (3,) in the world, without rotation."""
+        """Two bodies translate along one direction (3,) in the world, without rotation.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the bodies are one, or the axis is no direction.
+        """
         what = f"the prismatic joint of {shown(first)} and {shown(second)}"
         (a, _), (b, _) = self._pair(first, second, "prismatic joint")
         along = direction(axis, f"{what}: axis")
@@ -131,7 +145,12 @@ class AssemblyJoints(AssemblyBodies):
         return self._connected(a, b)
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Self:
-        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame."""
+        """Two bodies keep their relative placement: the present one, or the second's given one in the first's frame.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the bodies are one, or the placement is none.
+        """
         what = f"the fixed joint of {shown(first)} and {shown(second)}"
         (a, in_a), (b, in_b) = self._pair(first, second, "fixed joint")
         if placement_second is None:
@@ -156,6 +175,10 @@ class AssemblyJoints(AssemblyBodies):
             through: (3,) a point of the plane, in the frame of `of`.
             of: name of the body to which the plane is fixed.
             side: "on", or "above" if the point may move along the normal.
+
+        Raises:
+            UnknownNameError: there is no such body.
+            InputError: the bodies are one, or a point, the normal or the side are none.
         """
         what = f"the plane of {shown(body)} and {shown(of)}"
         choice(side, ("on", "above"), f"{what}: side")
@@ -178,7 +201,8 @@ class AssemblyJoints(AssemblyBodies):
                 afterwards: the point stays where the surface was.
 
         Raises:
-            InputError: the shape is another, or there are several.
+            UnknownNameError: there is no such body or thing.
+            InputError: the shape is another, or there are several, or the point is none.
         """
         what = f"the surface of {shown(of)} under {shown(body)}"
         b, in_b = self._moved(body, what)

@@ -9,6 +9,7 @@ from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
+FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
 GOAL_DAMPING = 1e-2  # of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
 

@@ -43,7 +43,7 @@ class Settings(NamedTuple):
         return assessed_tolerance(self.tolerance)
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The result from one start.
 
     Attributes:
@@ -69,11 +69,11 @@ class Search:
         self.residuals: list[float] = []
         self.contradictions: tuple[Contradiction, ...] = ()
 
-    def from_here(self, q: Array) -> Found:
+    def from_here(self, q: Array) -> SearchResult:
         """The result from a posture (nq,) alone."""
         return self._go(q, "", self.settings.iterations)
 
-    def everywhere(self, q: Array) -> Found:
+    def everywhere(self, q: Array) -> SearchResult:
         """The best result of all starts; if it solves the problem, its measures are minimised."""
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
@@ -107,7 +107,7 @@ class Search:
             best = self._refined(best)
         return best
 
-    def solution(self, found: Found, began: float) -> Solution:
+    def solution(self, found: SearchResult, began: float) -> Solution:
         """The solution of a result; the search began at `began` by `time.perf_counter`."""
         reported = ", ".join(self.active_system.objective.reported)
         ending = Ending(
@@ -138,7 +138,7 @@ class Search:
         for start in restarts(problem, self.active_system.workspace.state, q, rng, self.settings.restarts):
             yield start, " from another start"
 
-    def _go(self, q: Array, how: str, iterations: int, system: FigureSystem | None = None) -> Found:
+    def _go(self, q: Array, how: str, iterations: int, system: FigureSystem | None = None) -> SearchResult:
         """The result from a posture (nq,), by the search's own equations or by others of the same problem."""
         active_system, settings = self.active_system if system is None else system, self.settings
         reached = satisfy(
@@ -152,7 +152,7 @@ class Search:
         self.residuals += reached.residuals
         return self._judged(reached, how, active_system)
 
-    def _refined(self, found: Found) -> Found:
+    def _refined(self, found: SearchResult) -> SearchResult:
         """The same with lower measures, if possible."""
         active_system, tolerance = self.active_system, self.settings.tolerance
         x, spent = refine(active_system, found.reached.x, active_system.objective.value, tolerance=tolerance)
@@ -160,7 +160,7 @@ class Search:
         lower = self._judged(with_values(found.reached, x=x), found.how, active_system)
         return lower if self._solves(lower) and self._better(lower, found) else found
 
-    def _least_violation(self, best: Found, q: Array) -> Found:
+    def _least_violation(self, best: SearchResult, q: Array) -> SearchResult:
         """The posture with the least violation of the constraints, if it violates them less than the best so far."""
         whole = self.active_system
         elastic = FigureSystem(whole.problem, whole.workspace, whole.algebra_name, yielding=True)
@@ -170,14 +170,14 @@ class Search:
         found = with_values(found, reached=with_values(found.reached, stationary=stationary))
         return found if self._better(found, best) else best
 
-    def _judged(self, reached: FeasibilityResult, how: str, system: FigureSystem) -> Found:
+    def _judged(self, reached: FeasibilityResult, how: str, system: FigureSystem) -> SearchResult:
         q = system.posture(reached.x)
-        return Found(q, assess(system.problem, q), reached, how)
+        return SearchResult(q, assess(system.problem, q), reached, how)
 
-    def _solves(self, found: Found) -> bool:
+    def _solves(self, found: SearchResult) -> bool:
         return meets(found.judgement, self.settings.tolerance)
 
-    def _better(self, one: Found, other: Found) -> bool:
+    def _better(self, one: SearchResult, other: SearchResult) -> bool:
         """Whether one result is better: in the violation, then in the goal errors, then in the measures."""
         enough = self.settings.assessed_tolerance
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
@@ -187,10 +187,10 @@ class Search:
         return one.judgement.measure < other.judgement.measure
 
 
-def _broken(found: Found) -> float:
+def _broken(found: SearchResult) -> float:
     judged = found.judgement
     return max(judged.limit_violation, judged.constraint_violation, judged.clearance_violation, judged.penetration)
 
 
-def _missed(found: Found) -> float:
+def _missed(found: SearchResult) -> float:
     return float(np.linalg.norm(found.judgement.goal_errors))

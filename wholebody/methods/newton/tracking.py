@@ -13,7 +13,7 @@ from wholebody.checks import number, posture, time_step
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.feasibility import satisfy
+from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.multistart import SHARPER, Search, Settings
@@ -26,7 +26,6 @@ from wholebody.tasks import StepLimit
 from wholebody.workspace import NotCopyable
 
 FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
-FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 
 
 class NewtonStep(NamedTuple):

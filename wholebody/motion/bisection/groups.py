@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from wholebody.arrays import Mask
+from wholebody.motion.windows import runs
 
 
 class Group(NamedTuple):
@@ -38,7 +37,8 @@ def collision_groups(bad: Mask, low: int, high: int, share: float = 0.0, least: 
     """
     first, last = low + 1, high - 1
     found: list[tuple[int, int, list[tuple[int, int]]]] = []
-    for begin, end in runs(bad, first, last):
+    for run in runs(bad[first : last + 1]):
+        begin, end = first + run.first, first + run.end - 1
         wide = _widened(begin, end, round((end - begin + 1) * share), least, first, last)
         covered = [(begin, end)]
         while found and wide[0] <= found[-1][1] + 1:
@@ -47,15 +47,6 @@ def collision_groups(bad: Mask, low: int, high: int, share: float = 0.0, least: 
             covered = before[2] + covered
         found.append((*wide, covered))
     return [Group(begin, end, _middle(covered)) for begin, end, covered in found]
-
-
-def runs(bad: Mask, first: int, last: int) -> list[tuple[int, int]]:
-    """Maximal runs of marked frames from `first` to `last`, both included: (first, last) of each."""
-    if first > last:
-        return []
-    edges = np.diff(np.concatenate([[False], bad[first : last + 1], [False]]).astype(np.int8))
-    begins, ends = np.flatnonzero(edges == 1) + first, np.flatnonzero(edges == -1) + first - 1
-    return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
 def _widened(begin: int, end: int, buffer: int, least: int, first: int, last: int) -> tuple[int, int]:

@@ -38,7 +38,7 @@ STEEPEST = 1e25  # of a multiplier by its slack; where it is more, rounding is a
 STUCK = 1e-8  # a step that is a smaller share of Newton's leads nowhere
 
 
-class Answered(NamedTuple):
+class InteriorPointResult(NamedTuple):
     """What the iterations ended with.
 
     Attributes:
@@ -55,7 +55,7 @@ class Answered(NamedTuple):
 def minimise(
     P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
     accuracy: float, gap: float,
-) -> Answered:  # fmt: skip
+) -> InteriorPointResult:  # fmt: skip
     """Solve a program; see the module.
 
     Args:
@@ -86,10 +86,10 @@ def minimise(
             and np.abs(derivative).max(initial=0.0) <= 10.0 * accuracy * largest
             and mu * count <= gap * max(1.0, abs(float(z @ (0.5 * Pz + c))))
         ):
-            return Answered(z, True, iteration)
+            return InteriorPointResult(z, True, iteration)
         factor = matrices.factor(*bounds.diagonals(y / s)) if (y < STEEPEST * s).all() else None
         if factor is None:
-            return Answered(z, False, iteration)
+            return InteriorPointResult(z, False, iteration)
         newton = _Newton(matrices, bounds, factor, derivative, missed, s, y)
         _, _, ds, dy = newton.direction(s * y)
         along, across = _share(s, ds), _share(y, dy)
@@ -98,16 +98,16 @@ def minimise(
         dz, change, ds, dy = newton.direction(s * y + ds * dy - centred)
         along, across = min(1.0, KEPT * _share(s, ds)), min(1.0, KEPT * _share(y, dy))
         if max(along, across) < STUCK:
-            return Answered(z, False, iteration)
+            return InteriorPointResult(z, False, iteration)
         z, Az = z + along * dz, Az + along * change
         s, y, Pz = s + along * ds, y + across * dy, matrices.P @ z
-    return Answered(z, False, ITERATIONS)
+    return InteriorPointResult(z, False, ITERATIONS)
 
 
 def _without(
     fixed: Mask, P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
     accuracy: float, gap: float,
-) -> Answered:  # fmt: skip
+) -> InteriorPointResult:  # fmt: skip
     """Solve for the unknowns that are not fixed (n,) alone; rows that have no others hold or not."""
     P, G, free = sp.csc_array(P), sp.csc_array(G), np.flatnonzero(~fixed)
     z = np.zeros(len(fixed))
@@ -118,14 +118,14 @@ def _without(
     missed = np.maximum(lower - value, value - upper)[~asked].max(initial=0.0)
     holds = bool(missed <= accuracy and (least[fixed] - most[fixed]).max() <= accuracy)
     if not len(free):
-        return Answered(z, holds, 0)
+        return InteriorPointResult(z, holds, 0)
     there = value[rows]
     found = minimise(
         P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
         least[free], most[free], None if start is None else start[free], accuracy, gap,
     )  # fmt: skip
     z[free] = found.z
-    return Answered(z, holds and found.solved, found.iterations)
+    return InteriorPointResult(z, holds and found.solved, found.iterations)
 
 
 class _Bounds:

@@ -21,7 +21,7 @@ from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun, Freed, WindowSettings
+from wholebody.motion.trajectory.window_run import ClipRun, WindowResult, WindowSettings
 from wholebody.motion.windows import Window, windows
 from wholebody.scene import Scene
 from wholebody.workspace import Workspace
@@ -149,9 +149,9 @@ class Trajectory:
         return q, list(missed.values())
 
     def _kept_back(
-        self, run: ClipRun, window: Window, freed: Freed, q: Array, depths: Array, gaps: list[int],
+        self, run: ClipRun, window: Window, freed: WindowResult, q: Array, depths: Array, gaps: list[int],
         cancelled: Callable[[float], bool],
-    ) -> tuple[Window, Freed]:  # fmt: skip
+    ) -> tuple[Window, WindowResult]:  # fmt: skip
         """A window that was not freed once more, on one side of what it passes for good.
 
         A limb that passes through a thin thing and comes back much later, or never, has to stay where it is until then.

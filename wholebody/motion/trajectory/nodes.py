@@ -13,12 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices
-from wholebody.figures.state import State, Wrench
+from wholebody.figures.state import State
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.tasks.base import Constraint, Goal
 from wholebody.workspace import Workspace
 
+NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 ROOM = 1e-4  # m: asked of pairs between frames; what is beside a place then dips by less than is told, once for all
 
 Terms = Sequence[Constraint | Goal]
@@ -80,8 +81,8 @@ class Rows(NamedTuple):
         return short
 
 
-class Looking:
-    """Looks at nodes of one window, in the room of one run.
+class NodeEvaluator:
+    """Evaluates the rows at nodes of one window, with the workspace of one run.
 
     Attributes:
         chart: the window's frames.
@@ -165,8 +166,7 @@ def _split(term: Constraint | Goal, state: State) -> tuple[Array, Array, Array, 
         value, low_value, high_value = np.atleast_1d(term.error(state)), np.zeros(()), np.zeros(())
     else:
         value, low_value, high_value = np.atleast_1d(term.value(state)), term.lower, term.upper
-    derivative = term.jacobian(state)
-    rows = state.wrench_jacobian(derivative) if isinstance(derivative, Wrench) else np.atleast_2d(derivative)
+    rows = state.dense_jacobian(term.jacobian(state))
     lower, upper = np.broadcast_to(low_value, value.shape), np.broadcast_to(high_value, value.shape)
     equal = lower == upper
     low, high = ~equal & np.isfinite(lower), ~equal & np.isfinite(upper)

@@ -19,7 +19,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
-from wholebody.motion.trajectory.nodes import Looking, Node, Rows
+from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import (
     ONE_STEP,
@@ -43,7 +43,7 @@ GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
 PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
 RAISE = 10.0
 HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
-IDLE = 2  # steps one after the other that bring little and leave as much missed, until the trust region shrinks
+SMALL_STEPS = 2  # steps one after the other that bring little and leave as much missed, until the trust region shrinks
 STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 EARLY = 10  # steps until an early exit; more = longer where normals mislead, fewer = more other starts
 STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
@@ -56,7 +56,7 @@ Cancel = Callable[[int, float], bool]
 """Told the number of steps and the worst shortfall; true ends the iterations."""
 
 
-class Found(NamedTuple):
+class SQPResult(NamedTuple):
     """Deviations that the iterations ended with.
 
     Attributes:
@@ -99,7 +99,7 @@ class WindowProgram:
 
     def __init__(
         self,
-        looking: Looking,
+        evaluator: NodeEvaluator,
         objective: Objective,
         limits: Limits,
         solve: Callable[[BandedQP], Answer],
@@ -108,15 +108,15 @@ class WindowProgram:
         """Take what is needed.
 
         Args:
-            looking: looks at nodes.
+            evaluator: of the rows at nodes.
             objective: of the window.
             limits: of its deviations.
             solve: solves one program.
             iterations: most steps of one run; a step takes one to three programs.
         """
-        self._looking, self._objective, self._limits = looking, objective, limits
+        self._evaluator, self._objective, self._limits = evaluator, objective, limits
         self._solve, self._iterations = solve, iterations
-        self.nodes = looking.nodes()
+        self.nodes = evaluator.nodes()
         self._free = (limits.lower < limits.upper).any(axis=0)
 
     @property
@@ -136,7 +136,7 @@ class WindowProgram:
         largest: float = LARGEST,
         early_exit: float | None = None,
         rough: bool = False,
-    ) -> Found:
+    ) -> SQPResult:
         """Iterate from deviations x (n, nv).
 
         Args:
@@ -153,7 +153,7 @@ class WindowProgram:
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
         entries: list[tuple[float, float]] = []
         counts = self._counts(here)
-        programs, smallest, missed, idle = 0, SHRUNK * radius, list[float](), 0
+        programs, smallest, missed, small_steps = 0, SHRUNK * radius, list[float](), 0
         for number in range(self._iterations):
             missed.append(here.worst)
             if (
@@ -161,13 +161,13 @@ class WindowProgram:
                 and here.worst > FAR
                 and (number >= EARLY or radius < smallest or here.objective > early_exit or _stalled(missed))
             ):
-                return Found(here.x, here.objective, here.worst, False, programs, False, True)
+                return SQPResult(here.x, here.objective, here.worst, False, programs, False, True)
             if cancel(number, here.worst):
-                return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
+                return SQPResult(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
             if not counts.any():
                 break
             if rough and number and here.worst <= FAR:
-                return Found(here.x, here.objective, here.worst, False, programs, False, roughly=True)
+                return SQPResult(here.x, here.objective, here.worst, False, programs, False, roughly=True)
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
             there_x, solved = self._step(here, dofs, radius, penalty, multipliers)
             programs += solved
@@ -181,14 +181,13 @@ class WindowProgram:
                 entries.append(((1.0 - MARGIN) * here.total, here.objective))
                 multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
                 left = there.worst > MET and there.total > HALVED * here.total
-                idle = idle + 1 if left and small else 0
+                small_steps = small_steps + 1 if left and small else 0
                 if left and longest < 0.9 * radius:
                     penalty = min(RAISE * penalty, HIGHEST)
-                if (
-                    idle >= IDLE
-                ):  # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
+                # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
+                if small_steps >= SMALL_STEPS:
                     radius = 0.5 * min(radius, longest)
-                elif longest > 0.9 * radius and not idle:
+                elif longest > 0.9 * radius and not small_steps:
                     radius = min(2.0 * radius, largest)
                 here = there
                 counts = counts | more | self._counts(here)
@@ -203,7 +202,7 @@ class WindowProgram:
                         break
                     penalty, radius = min(RAISE * penalty, HIGHEST), 0.1 * RADIUS
                     entries.clear()
-        return Found(here.x, here.objective, here.worst, here.worst <= MET, programs, False)
+        return SQPResult(here.x, here.objective, here.worst, here.worst <= MET, programs, False)
 
     def _step(
         self, here: _At, dofs: Indices, radius: float, penalty: float, multipliers: Sequence[Array]
@@ -232,7 +231,7 @@ class WindowProgram:
             kept = [keep | mask for keep, mask in zip(kept, more, strict=True)]
 
     def _at(self, x: Array) -> _At:
-        rows = [self._looking.at(node, x, WITHIN) for node in self.nodes]
+        rows = [self._evaluator.at(node, x, WITHIN) for node in self.nodes]
         shortfalls = [np.concatenate([one.shortfalls, np.abs(one.equal)]) for one in rows if not one.node.soft]
         beyond = SOFT * float(sum(one.shortfalls.sum() for one in rows if one.node.soft))
         past = self._limits.passed(x)

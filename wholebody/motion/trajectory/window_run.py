@@ -18,16 +18,15 @@ from wholebody.motion.one_side import PASSED
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
-from wholebody.motion.trajectory.nodes import Looking, Node
+from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import ONE_STEP, Limits
-from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, Found, WindowProgram
+from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, SQPResult, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
 from wholebody.workspace import Workspace
 
 ROUNDS = 12  # of sweeping and adding places between frames
-NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it
 NEARLY = 0.03  # rad, m: first trust region of the rounds after the first; few rows are near enough to count then
 SHORTER = 0.3  # of the largest step: after the second round, each round takes shorter ones
@@ -57,7 +56,7 @@ class WindowSettings(NamedTuple):
     iterations: int
 
 
-class Freed(NamedTuple):
+class WindowResult(NamedTuple):
     """Postures of a window.
 
     Attributes:
@@ -163,7 +162,7 @@ class ClipRun:
     def window(
         self, window: Window, depths: Array, gaps: Iterable[int], cancel: Callable[[float], bool],
         begun: Array | None = None,
-    ) -> Freed:  # fmt: skip
+    ) -> WindowResult:  # fmt: skip
         """Free one window.
 
         Args:
@@ -181,7 +180,7 @@ class ClipRun:
         limits = self._limits(window, chart, seams)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
-        looking = Looking(self._workspace, chart, held, self._settings.clearance, loads)
+        evaluator = NodeEvaluator(self._workspace, chart, held, self._settings.clearance, loads)
         always = {gap - window.first for gap in gaps}
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
@@ -190,9 +189,9 @@ class ClipRun:
         else:
             starts = ((_begun(x), _Way.CAREFUL) for x in [_deviations(chart, begun, limits)])
         for start, way in chain(starts, ((start, _Way.USUAL) for start in ended_early)):
-            attempt = self._attempt(start, chart, looking, objective, limits, always, cancel, way)
+            attempt = self._attempt(start, chart, evaluator, objective, limits, always, cancel, way)
             if attempt is None:
-                return Freed(chart.original, "")
+                return WindowResult(chart.original, "")
             if attempt.early:
                 ended_early.append(attempt)
                 continue
@@ -205,14 +204,14 @@ class ClipRun:
             dipping = f", and {best.dipping} motions between frames dip" if best.dipping else ""
             missed = f"{1e3 * best.worst:.3g} mm or mrad are missed{dipping}"
         elif self._settings.time is None and self._loads is None:  # torques come of accelerations: these stay least
-            best = self._again(best, window, chart, looking, limits, always, cancel)
+            best = self._again(best, window, chart, evaluator, limits, always, cancel)
         changed = np.abs(best.x).max(axis=1) > NOTHING
         q = chart.original.copy()
         q[changed] = chart.postures(best.x)[changed]
-        return Freed(q, missed)
+        return WindowResult(q, missed)
 
     def _again(
-        self, found: _Attempt, window: Window, chart: Chart, looking: Looking, limits: Limits, always: set[int],
+        self, found: _Attempt, window: Window, chart: Chart, evaluator: NodeEvaluator, limits: Limits, always: set[int],
         cancel: Callable[[float], bool],
     ) -> _Attempt:  # fmt: skip
         """An answer once more, as smooth as its jerk asks for.
@@ -230,21 +229,21 @@ class ClipRun:
         objective = Objective(len(window), self._weights, time, self.dt, seams)
         begun = found
         if not rough:
-            first = self._step(found, looking, objective, limits)
+            first = self._step(found, evaluator, objective, limits)
             little = first.objective > (1.0 - WORTH) * objective.value(found.x)
             if little or self._jerk(window, chart, first.x) > JERK:
                 return found
             begun = _begun(first.x, found.between)
-        other = self._attempt(begun, chart, looking, objective, limits, always, cancel, _Way.SECOND)
+        other = self._attempt(begun, chart, evaluator, objective, limits, always, cancel, _Way.SECOND)
         if other is None or other.worst > MET or other.dipping:
             return found
         now = self._jerk(window, chart, other.x)
         better = now <= JERK and (rough or (other.x**2).sum() < 2.0 * square)
         return other if better else found
 
-    def _step(self, begun: _Attempt, looking: Looking, objective: Objective, limits: Limits) -> Found:
+    def _step(self, begun: _Attempt, evaluator: NodeEvaluator, objective: Objective, limits: Limits) -> SQPResult:
         """One step from an answer."""
-        program = WindowProgram(looking, objective, limits, self._solve, 1)
+        program = WindowProgram(evaluator, objective, limits, self._solve, 1)
         program.add(begun.between)
         found = program.run(begun.x, lambda number, worst: False, NEARLY, NEARLY)
         self._programs += found.programs
@@ -278,10 +277,10 @@ class ClipRun:
             yield _deviations(chart, q, limits)
 
     def _attempt(
-        self, begun: _Attempt, chart: Chart, looking: Looking, objective: Objective, limits: Limits, always: set[int],
-        cancel: Callable[[float], bool], way: _Way,
+        self, begun: _Attempt, chart: Chart, evaluator: NodeEvaluator, objective: Objective, limits: Limits,
+        always: set[int], cancel: Callable[[float], bool], way: _Way,
     ) -> _Attempt | None:  # fmt: skip
-        program = WindowProgram(looking, objective, limits, self._solve, self._settings.iterations)
+        program = WindowProgram(evaluator, objective, limits, self._solve, self._settings.iterations)
         program.add(begun.between)
         x = begun.x
         found, radius = None, NEARLY if way in (_Way.CAREFUL, _Way.SECOND) else RADIUS

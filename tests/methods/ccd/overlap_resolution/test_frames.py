@@ -61,7 +61,7 @@ def test_no_frame_overlaps_and_the_last_is_what_is_tracked(
     outside: Callable[..., float],
 ) -> None:
     scene, postures = SCENES[name](avatar)
-    frames = track(avatar, *postures, frames=25)
+    frames = track(avatar, *postures, frames=15)
     rng, q, pushed = np.random.default_rng(0), frames[0], 0
     for wanted in frames + [frames[-1]] * 20:
         before = q

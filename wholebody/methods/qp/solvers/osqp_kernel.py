@@ -36,7 +36,7 @@ def fill(
     slots: int,
     scale: float,
     heaviest: float,
-    idle: float,
+    inactive: float,
     infinite: float,
     hessian: Array,
     gradient: Array,
@@ -48,9 +48,9 @@ def fill(
 
     The first ten are the program's. `places` has the rows of the pattern of the soft rows, column by column, `starts`
     (n + 1,) where each column begins in it; there are `slots` elastic rows, at least the program's. x is multiplied by
-    `scale`, a row by the root of its weight up to the root of `heaviest`. `idle` is the least value of slots without a
-    row, `infinite` OSQP's infinity. The last five are filled: the diagonal of P, q, the entries of A column by column,
-    and the bounds of its rows.
+    `scale`, a row by the root of its weight up to the root of `heaviest`. `inactive` is the least value of slots
+    without a row, `infinite` OSQP's infinity. The last five are filled: the diagonal of P, q, the entries of A column
+    by column, and the bounds of its rows.
     """
     n, m, k = len(diagonal), len(target), len(least)
     root, elastic_root = np.empty(m), np.empty(k)
@@ -61,7 +61,7 @@ def fill(
     for j in range(slots):
         if j < k:
             elastic_root[j] = np.sqrt(min(elastic_weight[j], heaviest))
-        low[n + m + j] = elastic_root[j] * least[j] if j < k else idle
+        low[n + m + j] = elastic_root[j] * least[j] if j < k else inactive
         high[n + m + j] = infinite
         hessian[n + m + j], gradient[n + m + j] = 1.0, 0.0
     at = 0

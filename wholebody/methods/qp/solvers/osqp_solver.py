@@ -20,7 +20,7 @@ from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
-from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE, read_active, slots_for
+from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE, read_active, slots_for
 from wholebody.records import with_values
 
 RHO = 0.1  # OSQP's step length at the beginning; it adapts
@@ -112,7 +112,7 @@ class Workspace:
         objective, matrix, self._starts, self._places = _structure(n, m, self.slots, self.pattern.tobytes())
         self._pattern = matrix
         self.hessian, self.gradient = np.ones(size), np.zeros(size)
-        self._values, self.low, self.high = np.ones(matrix.nnz), np.full(size, IDLE), np.full(size, FAR)
+        self._values, self.low, self.high = np.ones(matrix.nnz), np.full(size, INACTIVE), np.full(size, FAR)
         self.low[n : n + m] = self.high[n : n + m] = 0.0  # OSQP factorises anew where other rows become equalities
         self._kernel = compiled_kernel()
         osqp = extension()
@@ -142,7 +142,7 @@ class Workspace:
             program.least, program.elastic_weight, program.lower, program.upper,
         )  # fmt: skip
         self._kernel.fill(
-            *map(np.ascontiguousarray, parts), self._starts, self._places, self.slots, SCALE, HEAVIEST, IDLE, FAR,
+            *map(np.ascontiguousarray, parts), self._starts, self._places, self.slots, SCALE, HEAVIEST, INACTIVE, FAR,
             self.hessian, self.gradient, self._values, self.low, self.high,
         )  # fmt: skip
         self._solver.update_data_vec(q=self.gradient, l=self.low, u=self.high)

@@ -14,7 +14,7 @@ import piqp
 from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
-from wholebody.methods.qp.solvers.split_form import HEAVIEST, IDLE, SCALE
+from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE
 
 TOLERANCE = 1e-5  # of the optimality conditions; the active set is then corrected
 LIMIT = 100  # iterations
@@ -65,7 +65,7 @@ def _condensed(program: QuadraticProgram, slots: int) -> dict[str, Any]:
     hessian[:n, :n] = (program.rows.T * (program.weight / SCALE**2)) @ program.rows
     hessian.flat[: n * (size + 1) : size + 1] += program.diagonal / SCALE**2
     linear[:n] = (program.linear - (program.weight * program.target) @ program.rows) / SCALE
-    rows, least, places = np.eye(slots, size, n, order="F"), np.full(slots, IDLE), np.arange(k)
+    rows, least, places = np.eye(slots, size, n, order="F"), np.full(slots, INACTIVE), np.arange(k)
     rows[:k, :n] = program.elastic * (root / SCALE)[:, None]
     rows[places, n + places], least[:k] = root / np.sqrt(program.elastic_weight), root * program.least
     lower, upper = np.full(size, -np.inf), np.full(size, np.inf)

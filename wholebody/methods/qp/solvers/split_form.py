@@ -24,7 +24,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 SCALE = 100.0  # x is in hundredths of a radian inside solvers, so that its entries are as large as the residuals
 HEAVIEST = 1e5  # of a row's scale, squared: larger = heavy rows closer, light ones later
 SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
-IDLE = -1e3  # least value of slots without a row: never active, and no other kind of row than those in use
+INACTIVE = -1e3  # least value of slots without a row: never active, and no other kind of row than those in use
 PUSHING = 1e-9  # multiplier above which a bound or a row counts as active
 
 
@@ -82,7 +82,7 @@ def scaled_split(program: QuadraticProgram, form: SplitForm) -> SplitForm:
         program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
-    compiled_kernel().fill(*map(np.ascontiguousarray, parts), SCALE, HEAVIEST, IDLE, *form)
+    compiled_kernel().fill(*map(np.ascontiguousarray, parts), SCALE, HEAVIEST, INACTIVE, *form)
     return form
 
 
@@ -91,7 +91,7 @@ def empty_form(n: int, m: int, slots: int) -> SplitForm:
     size = n + m + slots
     box = np.full(size, np.inf)
     return SplitForm(
-        np.ones(size), np.zeros(size), np.zeros((m + slots, size)), np.full(m + slots, IDLE),
+        np.ones(size), np.zeros(size), np.zeros((m + slots, size)), np.full(m + slots, INACTIVE),
         np.full(m + slots, np.inf), -box, box,
     )  # fmt: skip
 
@@ -117,5 +117,7 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp.solvers import split_kernel
 
     none, one, row = np.zeros(0), np.ones(1), np.zeros((0, 1))
-    split_kernel.fill(one, one, row, none, none, row, none, none, one, one, SCALE, HEAVIEST, IDLE, *empty_form(1, 0, 1))
+    split_kernel.fill(
+        one, one, row, none, none, row, none, none, one, one, SCALE, HEAVIEST, INACTIVE, *empty_form(1, 0, 1)
+    )
     return split_kernel

@@ -22,7 +22,7 @@ def fill(
     upper: Array,
     scale: float,
     heaviest: float,
-    idle: float,
+    inactive: float,
     form_diagonal: Array,
     form_linear: Array,
     matrix: Array,
@@ -34,7 +34,7 @@ def fill(
     """Write a program's numbers into a scaled split form of its size, in which all else is as `empty_form` left it.
 
     The first ten are the program's, the last seven the form's. x is multiplied by `scale`, a row by the root of its
-    weight up to the root of `heaviest`; `idle` is the least value of slots without a row.
+    weight up to the root of `heaviest`; `inactive` is the least value of slots without a row.
     """
     n, m, k = len(diagonal), len(target), len(least)
     for i in range(n):
@@ -52,4 +52,4 @@ def fill(
         for i in range(n):
             matrix[row, i] = elastic[j, i] * (root / scale) if j < k else 0.0
         matrix[row, n + row] = root / np.sqrt(elastic_weight[j]) if j < k else 1.0
-        low[row] = root * least[j] if j < k else idle
+        low[row] = root * least[j] if j < k else inactive
