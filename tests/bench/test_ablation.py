@@ -38,7 +38,8 @@ def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
     assert all(each.module not in compiled for each in found)
 
 
-def test_only_problems_that_the_method_takes_are_asked() -> None:
+def test_only_problems_that_the_method_takes_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ablation, "SETS", {name: SETS[name] for name in ("balance", "robot_arm", "drag")})
     solver = wb.CCD()
     asked = ablation.problems(1, "ccd")
     assert len(ablation.problems(1, "qp")) > len(asked) > 0
@@ -74,6 +75,24 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
     text = report("qp", len(given), whole, [*rows, Row("x.Y", "ten times", 0, 0, 0, 0.0)], ["a.kernel"])
     assert "`x.Y`" in text
     assert "a.kernel" in text
+
+
+@pytest.mark.parametrize(("words", "asked"), [((), 1), (("--count", "3"), 3)])
+def test_a_quick_run_has_one_problem_of_every_set_where_no_count_is_given(
+    words: tuple[str, ...], asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class AskedError(Exception):
+        pass
+
+    def problems(count: int, method: str) -> None:
+        raise AskedError(f"{count} of {method}")
+
+    monkeypatch.setattr(ablation, "problems", problems)
+    parser = argparse.ArgumentParser()
+    command.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["ablation", "--quick", *words])
+    with pytest.raises(AskedError, match=f"^{asked} of qp$"):
+        arguments.run(arguments)
 
 
 @pytest.mark.parametrize(

@@ -89,7 +89,23 @@ def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: py
     assert (out / "reaches.md").is_file()
 
 
-def test_solve(tmp_path: Path, docs: Path) -> None:
+SHELF = """title = "Shelf"
+figure.name = "urdf"
+figure.path = "{}"
+
+[[goal]]
+type = "point"
+frame = "tool"
+target = [0.3, 0.1, 0.5]
+"""
+
+
+def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The shelf is here a task of an arm, and there is no Chromium for its picture."""
+    task = tmp_path / "shelf.toml"
+    task.write_text(SHELF.format(root / "tests/data/arm/arm.urdf"))
+    monkeypatch.setattr("wholebody.cli.demo.packaged_tasks", lambda: {"shelf": task})
+    monkeypatch.setenv("WHOLEBODY_CHROMIUM", str(tmp_path / "none"))
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
     assert bench("solve", *words) == 0
     _, rows = read_rows(tmp_path / "out" / "solve.csv", SolveRow)

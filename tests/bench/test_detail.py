@@ -43,7 +43,7 @@ def test_levels_are_judged_in_the_finest_model() -> None:
     for row in found:
         assert row.status == "solved"
         assert row.penetration_mm < 1e-3
-        assert row.lack_mm < 0.1
+        assert row.clearance_violation_mm < 0.1
         assert row.freedoms == 5
     assert found[2].pairs == found[3].pairs < found[0].pairs == found[1].pairs
 

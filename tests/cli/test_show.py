@@ -17,7 +17,8 @@ import pytest
 import trimesh
 
 from wholebody.cli import main
-from wholebody.view.browser import Browser, find_chromium
+from wholebody.view import screenshot
+from wholebody.view.browser import find_chromium
 
 
 def free_port() -> int:
@@ -66,7 +67,7 @@ def test_it_waits_for_the_first_tab_however_late_and_ends_with_the_last(tmp_path
         assert url == f"http://127.0.0.1:{port}/"
         time.sleep(5.0)  # longer than a tab may be away while it loads again
         assert process.poll() is None
-        with Browser((320, 240)) as browser:
+        with screenshot.Browser() as browser:
             browser.open(url)
             assert browser.evaluate("document.title") == "hand"
             assert process.poll() is None

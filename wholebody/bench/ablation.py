@@ -234,9 +234,11 @@ def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compile
     """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
     changed = [row for row in rows if row.change != "off"]
     matter = {row.what for row in changed if row.differ}
-    idle = dict.fromkeys(row.what for row in changed if row.what not in matter)
+    unnoticed = dict.fromkeys(row.what for row in changed if row.what not in matter)
     tables = {
         "switched off": [row for row in rows if row.change == "off"],
         "constant": [row for row in changed if row.differ],
     }
-    return render("ablation.md", method=method, given=given, whole=whole, tables=tables, idle=idle, compiled=compiled)
+    return render(
+        "ablation.md", method=method, given=given, whole=whole, tables=tables, unnoticed=unnoticed, compiled=compiled
+    )

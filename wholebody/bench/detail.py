@@ -24,7 +24,7 @@ DETAILS = ("spheres", "capsules", "hulls")
 FINEST = "hulls"
 LEVELS: dict[str, Parts] = {
     "all": Parts(joints=False, pairs=False, growth=0.0),
-    "joints that take part": Parts(joints=True, pairs=False, growth=0.0),
+    "active joints": Parts(joints=True, pairs=False, growth=0.0),
     "pairs in reach": Parts(joints=False, pairs=True, growth=0.0),
     "simplified": Parts(joints=True, pairs=True, growth=GROWTH),
 }
@@ -46,7 +46,7 @@ class DetailRow:
         status: of the answer, as its own model says.
         solve_ms, judge_ms: processor's time of the solve without its judgement, and of that; the faster of two.
         prepare_ms: to leave out what is left out.
-        lack_mm: by how much the worst pair misses its clearance.
+        clearance_violation_mm: by how much the worst pair misses its clearance.
         goal_error_mm: what is left to the goals.
         above: effort above the finest model's own answer, as a share of it; nan where that one was not solved.
     """
@@ -62,7 +62,7 @@ class DetailRow:
     judge_ms: float
     prepare_ms: float
     penetration_mm: float
-    lack_mm: float
+    clearance_violation_mm: float
     goal_error_mm: float
     effort: float
     above: float
@@ -131,7 +131,7 @@ def _levels(name: str, number: int, models: dict[str, Problem], finest: str) -> 
                 judge_ms=1e3 * judged,
                 prepare_ms=prepare_ms,
                 penetration_mm=1e3 * truth.penetration,
-                lack_mm=1e3 * truth.clearance_violation,
+                clearance_violation_mm=1e3 * truth.clearance_violation,
                 goal_error_mm=1e3 * truth.goal_error,
                 effort=truth.measure,
                 above=truth.measure / best - 1.0 if answer.solved and np.isfinite(best) else float("nan"),
@@ -171,7 +171,7 @@ class Summary(NamedTuple):
     prepare_ms: float
     inside: int
     worst_penetration_mm: float
-    worst_lack_mm: float
+    worst_clearance_violation_mm: float
     worst_goal_error_mm: float
     above: float
     worst_above: float
@@ -188,7 +188,7 @@ def summaries(rows: Sequence[DetailRow]) -> list[Summary]:
         times: dict[str, Any] = {each: _median(mine, each) for each in ("solve_ms", "judge_ms", "prepare_ms")}
         worst: dict[str, Any] = {
             f"worst_{each}": max((getattr(row, each) for row in solved), default=0.0)
-            for each in ("penetration_mm", "lack_mm", "goal_error_mm")
+            for each in ("penetration_mm", "clearance_violation_mm", "goal_error_mm")
         }
         inside = sum(row.penetration_mm > 1e3 * INSIDE for row in solved)
         found.append(

@@ -97,9 +97,14 @@ def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any
 
 
 def save(chart: Any, path: Path) -> tuple[Path, Path]:
-    """Write a chart as SVG and PNG beside each other; return both paths (the suffix of `path` is replaced)."""
+    """Write a chart as SVG and PNG beside each other; return both paths (the suffix of `path` is replaced).
+
+    The chart is laid out once and not for each of its files, which takes as long as to draw it.
+    """
     from matplotlib import pyplot
 
+    chart.get_layout_engine().execute(chart)
+    chart.set_layout_engine("none")
     path.parent.mkdir(parents=True, exist_ok=True)
     svg, png = path.with_suffix(".svg"), path.with_suffix(".png")
     chart.savefig(svg, metadata={"Date": None})
@@ -116,12 +121,10 @@ def band(panel: Any, y: float, found: Interval, style: Style) -> Any:
 
 
 def legend_below(chart: Any, drawn: Mapping[str, Any]) -> None:
-    """Put a legend of lines by name below a chart, and lay the chart out, once and not for each of its files."""
+    """Put a legend of lines by name below a chart."""
     if drawn:
         names, lines = list(drawn), list(drawn.values())
         chart.legend(lines, names, loc="outside lower center", ncols=min(len(names), 6), frameon=False, fontsize=9)
-    chart.draw_without_rendering()
-    chart.set_layout_engine("none")
 
 
 def shares_and_times(

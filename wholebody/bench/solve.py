@@ -129,7 +129,9 @@ def memory(task: Path) -> MemoryRow:
         seconds = time.perf_counter() - began
     peaks = [line.split()[1:] for line in done.stderr.splitlines() if line.startswith("PEAKS ")]
     if done.returncode not in (0, 1) or not peaks:
-        raise WholebodyError(f"`wholebody pose {task}` failed: {done.stderr.strip().splitlines()[-1:]}; mend it first")
+        raise WholebodyError(
+            f"`wholebody pose {task}` failed: {done.stderr.strip().splitlines()[-1:]}; correct it first"
+        )
     unit = 1.0 if sys.platform == "darwin" else 1024.0  # bytes there, kibibytes on Linux
     own, children = (float(peak) * unit / 1e6 for peak in peaks[0])
     return MemoryRow(f"wholebody pose {task.name}", own, children, seconds)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,7 +12,7 @@ from wholebody.bench.adapters.loop import margins, size
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import catalogue
 from wholebody.bench.stability.asking import ask
-from wholebody.bench.stability.case import Posed
+from wholebody.bench.stability.case import Posed, Stream
 from wholebody.bench.stability.judging import judge
 from wholebody.bench.stability.verdict import decide
 
@@ -29,11 +31,24 @@ def test_no_answer_is_wrong(name: str, case: str) -> None:
         assert verdict.kind == "solved"
 
 
-@pytest.mark.parametrize(("name", "case"), [("mink", "fast-obstacle"), ("pink", "moving-obstacle")])
-def test_a_thing_that_comes_is_left_room(name: str, case: str) -> None:
-    """What comes nearer than its room is not given all of it back in one step, for which joints are too slow."""
+@pytest.mark.parametrize(
+    ("name", "case", "near"), [("mink", "fast-obstacle", (10, 40)), ("pink", "moving-obstacle", (50, 64))]
+)
+def test_a_thing_that_comes_is_left_room(name: str, case: str, near: tuple[int, int]) -> None:
+    """What comes nearer than its room is not given all of it back in one step, for which joints are too slow.
+
+    Of the frames those are asked in which the thing is near.
+    """
     pytest.importorskip(name)
     (adapter,), (hard,) = adapters([name]), catalogue.cases([case])
+    asked = hard.question
+
+    def shorter() -> Stream:
+        whole = asked()
+        assert isinstance(whole, Stream)
+        return replace(whole, frames=whole.frames[slice(*near)])
+
+    hard = replace(hard, question=shorter)
     answer = ask(hard, adapter)
     assert decide(hard, answer, judge(hard, answer)).kind == "solved"
 

@@ -33,10 +33,10 @@ FACTS = {"wholebody": "0"}
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_depends_on_its_seed_and_number_alone(kind: str) -> None:
-    first = [write(Case(3, number, kind)) for number in (0, 1, 2)]
-    again = [write(Case(3, number, kind)) for number in (2, 1, 0)][::-1]
+    first = [write(Case(3, number, kind)) for number in (0, 1)]
+    again = [write(Case(3, number, kind)) for number in (1, 0)][::-1]
     assert first == again
-    assert len({each.script + repr(each.files) for each in first}) == 3
+    assert len({each.script + repr(each.files) for each in first}) == 2
     assert write(Case(4, 0, kind)) != first[0]
 
 
@@ -68,9 +68,8 @@ def cases() -> Iterator[Case]:
 
 
 @pytest.mark.usefixtures("scripted")
-@pytest.mark.parametrize("jobs", [1, 2])
-def test_the_attack_goes_on_after_hangs_crashes_and_errors(jobs: int) -> None:
-    found = {ended.case.number: ended for ended in attack(cases(), jobs, lambda: True, deadline=0.4)}
+def test_the_attack_goes_on_after_hangs_crashes_and_errors() -> None:
+    found = {ended.case.number: ended for ended in attack(cases(), 2, lambda: True, deadline=0.4)}
     outcomes = {number: ended.verdict.outcome for number, ended in found.items()}
     assert outcomes == {0: "right", 1: "wrong", 2: "wrong", 3: "wrong", 4: "refused", 5: "right", 6: "right"}
     assert "hangs" in found[1].verdict.words

@@ -164,8 +164,9 @@ def test_scenes_are_drawn_again_from_their_seeds(fakes: ModuleType) -> None:
     assert all(OPENING + CLOSING in scene.shell for scene in scenes)
     assert len({scene.picture for scene in scenes}) == 3
     assert in_brief(scenes[:2]) == scenes[1:2]  # the failed one
-    other = [example("solves", 1, 0.4), example("lies", 1, 1e-5), example("hangs", 1, 1e-5)]
-    assert draw(other, families, adapters, 0, 0.5) == []  # not what was recorded, or nothing
+    other = [example("solves", 1, 0.4), example("lies", 1, 1e-5)]
+    assert draw(other, families, adapters, 0, 20.0) == []  # not what was recorded
+    assert draw([example("hangs", 1, 1e-5)], families, adapters, 0, 0.05) == []  # nothing
 
 
 def test_the_hardest_solved_and_the_easiest_failed_problem_are_chosen() -> None:

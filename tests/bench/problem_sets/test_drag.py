@@ -11,10 +11,9 @@ from wholebody.bench.problem_sets.bodies import human
 from wholebody.bench.problem_sets.case import generator
 
 
-@pytest.mark.parametrize("number", [0, 1])
-def test_a_known_posture_meets_each_frame(number: int) -> None:
-    case, problem = drag.SET.make(number, 0), drag.SET.make(number, 0).problem
-    postures = drag.way(human(), generator(drag.SET.name, number, 0))
+def test_a_known_posture_meets_each_frame() -> None:
+    case = drag.SET.make(0, 0)
+    problem, postures = case.problem, drag.way(human(), generator(drag.SET.name, 0, 0))
     assert 100 <= len(case.frames) == len(postures) - 1 <= 200
     for q, goals in zip(postures[1:], case.frames, strict=True):
         problem.retarget(goals)
@@ -23,7 +22,7 @@ def test_a_known_posture_meets_each_frame(number: int) -> None:
         assert judged.holds(1e-6)
 
 
-@pytest.mark.parametrize("number", range(6))
+@pytest.mark.parametrize("number", range(3))
 def test_the_goals_move_far_smoothly_and_at_a_speed_of_people(number: int) -> None:
     case = drag.SET.make(number, 0)
     goals = [goals[0] for goals in (case.problem.goals, *case.frames)]

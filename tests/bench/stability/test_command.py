@@ -15,8 +15,9 @@ import pytest
 from wholebody.bench.adapters import registry
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import page
-from wholebody.bench.stability.asking import run
+from wholebody.bench.stability.asking import Cell, ask
 from wholebody.bench.stability.catalogue import cases
+from wholebody.bench.stability.judging import judge
 from wholebody.bench.stability.verdict import Result, StabilityRow, result
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.cli.bench import stability
@@ -167,8 +168,11 @@ def test_a_page_is_whole_or_not_begun(tmp_path: Path) -> None:
 
 @pytest.fixture(scope="module")
 def found() -> Result:
-    chosen, asked = cases(CASES[:2]), adapters(METHODS)
-    return result(chosen, METHODS, run(product(chosen, asked)))
+    chosen, cells = cases(CASES[:2]), list[Cell]()
+    for case, adapter in product(chosen, adapters(METHODS)):
+        answer = ask(case, adapter)
+        cells.append(Cell(case, adapter.name, answer, judge(case, answer)))
+    return result(chosen, METHODS, cells)
 
 
 def test_the_page_tells_every_case_with_its_picture_and_verdicts(found: Result) -> None:

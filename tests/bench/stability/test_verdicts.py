@@ -1,4 +1,4 @@
-"""Every rule, on methods made up to break it; each in a process of its own, as in earnest."""
+"""Every rule, on methods made up to break it; those that hang or crash in processes of their own, as in earnest."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ import numpy as np
 import pytest
 
 from wholebody.bench.adapters.base import Adapter
-from wholebody.bench.stability.asking import run
+from wholebody.bench.stability import asking
+from wholebody.bench.stability.asking import ask, run
 from wholebody.bench.stability.case import NOTHING, Answer, Stream
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.judging import Judged, judge
@@ -23,7 +24,21 @@ from wholebody.problem import Problem
 Fakes = Callable[..., Adapter]
 
 
-def verdict(name: str, adapter: Adapter, cap: float = 20.0) -> Verdict:
+@pytest.fixture(autouse=True)
+def cold(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let no process compile what methods of the package need: no test of this file asks one."""
+    monkeypatch.setattr(asking, "_warm", lambda: None)
+
+
+def verdict(name: str, adapter: Adapter) -> Verdict:
+    """The verdict on a method that answers, refuses or raises."""
+    (case,) = cases([name])
+    answer = ask(case, adapter)
+    return decide(case, answer, judge(case, answer))
+
+
+def verdict_of_process(name: str, adapter: Adapter, cap: float = 20.0) -> Verdict:
+    """The verdict on a method that has a process of its own, which it may end."""
     chosen = cases([name])
     return result(chosen, [adapter.name], run([(chosen[0], adapter)], cap=cap)).verdicts[name, adapter.name]
 
@@ -122,7 +137,7 @@ def crashes(problem: Problem) -> np.ndarray:
 
 
 def test_an_exception(fake: Fakes) -> None:
-    found = verdict("conflict", fake(raises))
+    found = verdict_of_process("conflict", fake(raises))
     assert (found.kind, found.figure) == ("wrong", "ZeroDivisionError: nothing to divide by")
 
 
@@ -132,18 +147,18 @@ def test_a_refusal(fake: Fakes) -> None:
 
 
 def test_hanging(fake: Fakes) -> None:
-    found = verdict("conflict", fake(computes), cap=0.3)
+    found = verdict_of_process("conflict", fake(computes), cap=0.3)
     assert (found.kind, found.brief) == ("wrong", "hangs")
-    assert verdict("conflict", fake(sleeps), cap=0.3).brief == "hangs"
+    assert verdict_of_process("conflict", fake(sleeps), cap=0.1).brief == "hangs"
 
 
 def test_waiting_is_no_hanging(fake: Fakes) -> None:
     """Others' work on the machine, which makes a method wait, ends no answer: its limit is of the processor."""
-    assert verdict("conflict", fake(waits), cap=0.5).kind == "honest"
+    assert verdict_of_process("conflict", fake(waits), cap=0.5).kind == "honest"
 
 
 def test_crashing(fake: Fakes) -> None:
-    assert verdict("conflict", fake(crashes)).figure == "crashes: SIGKILL"
+    assert verdict_of_process("conflict", fake(crashes)).figure == "crashes: SIGKILL"
 
 
 def test_nonsense_has_to_be_refused(fake: Fakes) -> None:

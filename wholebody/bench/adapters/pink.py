@@ -44,7 +44,7 @@ def pink_adapter() -> Adapter:
             "pink's barrier has one least distance for all pairs: those that begin nearer are left out, but for those "
             "with a half-space, which is lowered",
             "pairs that hard tasks keep in place are left out, since their rows leave pink no solution",
-            "inside of something pink's barrier posture_costs deeper, so a margin is kept",
+            "inside of something pink's barrier pulls deeper, so a margin is kept",
             "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
             "pink minimises Effort and Displacement only",
         ),

@@ -100,4 +100,4 @@ def _check_built(store: Store) -> None:
     for family in dict.fromkeys(chunk.set for chunk in store.chunks):
         mine = [chunk for chunk in store.chunks if chunk.set == family]
         if all(chunk.fault for chunk in mine):
-            raise WholebodyError(f"no case of the set {family} could be built ({mine[0].fault}); mend the set first")
+            raise WholebodyError(f"no case of the set {family} could be built ({mine[0].fault}); correct the set first")

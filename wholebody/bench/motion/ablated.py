@@ -213,5 +213,5 @@ def _together(found: Sequence[Freed]) -> Freed:
 def report(rows: Sequence[Row]) -> str:
     """The changes as Markdown, and the constants that changed nothing."""
     matter = {row.what for row in rows if row.matters}
-    idle = dict.fromkeys(row.what for row in rows if row.what not in matter)
-    return render("ablation_motion.md", rows=[row for row in rows if row.what in matter], idle=list(idle))
+    unnoticed = dict.fromkeys(row.what for row in rows if row.what not in matter)
+    return render("ablation_motion.md", rows=[row for row in rows if row.what in matter], unnoticed=list(unnoticed))

@@ -17,7 +17,7 @@ from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.chart import Chart
-from wholebody.motion.trajectory.nodes import Looking
+from wholebody.motion.trajectory.nodes import NodeEvaluator
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import MET, WindowProgram
@@ -42,7 +42,7 @@ def nearest(clip: Clip, scene: Scene, constraints: Iterable[Given], answers: Ite
         terms = frame_terms(scene, clip.q, clip.dt, constraints)
         chart = Chart(workspace.model, np.array(clip.q))
         held = [terms.held(frame) for frame in range(len(clip))]
-        looking = Looking(workspace, chart, held, 0.0)
+        evaluator = NodeEvaluator(workspace, chart, held, 0.0)
         weights = np.ones(workspace.model.nv)
         weights[: 6 if clip.figure.root == "free" else 0] = ROOT
         objective = Objective(len(clip), weights, 0.0, clip.dt, (False, False))
@@ -50,7 +50,7 @@ def nearest(clip: Clip, scene: Scene, constraints: Iterable[Given], answers: Ite
         fast: Array = np.full((len(clip) - 1, workspace.model.nv), np.inf)  # speeds have no limits
         limits = Limits(*bounds, -fast, fast)
         for answer in answers:
-            program = WindowProgram(looking, objective, limits, banded_solver(None)[1], STEPS)
+            program = WindowProgram(evaluator, objective, limits, banded_solver(None)[1], STEPS)
             x = np.array([chart.deviation(frame, q) for frame, q in enumerate(answer.q)])
             x = np.clip(x, *bounds)
             ended = program.run(x, lambda number, worst: False, RADIUS, LARGEST)

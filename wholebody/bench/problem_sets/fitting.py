@@ -75,7 +75,7 @@ def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices)
         error = np.concatenate([goal.error(state) for goal in goals])
         if np.abs(error).max() < EXACT:
             return q
-        rows = np.vstack([_dense(goal.jacobian(state), state) for goal in goals])
+        rows = np.vstack([state.dense_jacobian(goal.jacobian(state)) for goal in goals])
         step = _shortest(rows, -error, dofs, *figure.tangent_bounds(q))
         step *= min(1.0, LONGEST / max(float(np.abs(step).max()), 1e-300))
         q = figure.clamp(pin.integrate(model, q, step))
@@ -104,7 +104,3 @@ def _shortest(rows: Array, wanted: Array, dofs: Indices, lower: Array, upper: Ar
         step[stopped] = np.clip(step[stopped], lower[stopped], upper[stopped])
         left = left[~beyond]
     return step
-
-
-def _dense(part: Wrench | Array, state: State) -> Array:
-    return state.wrench_jacobian(part) if isinstance(part, Wrench) else part

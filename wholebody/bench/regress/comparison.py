@@ -99,13 +99,13 @@ def read(path: Path = LOCKED) -> Locked:
     Raises:
         FileFormatError: the file is not one of locked counts.
     """
-    mend = "write it anew with --update"
+    correction = "write it anew with --update"
     try:
         data = json.loads(read_text(path, "locked counts"))
     except (ValueError, RecursionError) as error:
-        raise FileFormatError(f"{path}: is no JSON ({one_line(str(error))}); {mend}") from None
+        raise FileFormatError(f"{path}: is no JSON ({one_line(str(error))}); {correction}") from None
     if not isinstance(data, dict) or not all(_is_counts(counts) for counts in data.values()):
-        raise FileFormatError(f"{path}: does not hold counts by name; {mend}")
+        raise FileFormatError(f"{path}: does not hold counts by name; {correction}")
     return data
 
 

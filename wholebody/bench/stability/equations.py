@@ -9,9 +9,10 @@ import pinocchio as pin
 
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.bodies import Builder, planar_arm, spatial_arm
-from wholebody.bench.stability.case import Group, Nonsense, Posed
+from wholebody.bench.stability.case import FRAME, Group, Nonsense, Posed
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box
+from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 from wholebody.tasks import Hold, Point
@@ -163,7 +164,7 @@ def tiny_weight() -> Posed:
     "NaN and infinity",
     why="NaN passes every comparison: a check like `error > tolerance` lets it through, and it comes out of the method "
     "as a posture of NaN or an endless loop.",
-    acceptable="A clear refusal of each: an InputError that says where and how to mend it.",
+    acceptable="A clear refusal of each: an InputError that says where and how to correct it.",
     expected="refusal",
     best=None,
 )
@@ -176,7 +177,7 @@ def not_numbers() -> Nonsense:
             "infinity in a goal": lambda adapter: _solve(adapter, goal=INFINITE),
             "NaN in a thing's place": lambda adapter: _solve(adapter, box=NAN),
             "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((NAN, 0.0, 0.5)),
-            "NaN in where a drag is": _drag_from_nowhere,
+            "NaN in where a drag is": _step_from_nowhere,
             "NaN as tolerance": lambda adapter: adapter.make(NAN, None).solve(_reach()),
         },
         _reach(),
@@ -225,10 +226,8 @@ def _solve(adapter: Adapter, **changed: float) -> object:
     return adapter.make(1e-5, None).solve(_reach(**changed))
 
 
-def _drag_from_nowhere(adapter: Adapter) -> object:
-    drag = Drag(_reach(), adapter.make(1e-5, None))
-    drag.q = np.array([-0.6, NAN, 0.5])
-    return drag.to((0.7, 0.0, 0.4))
+def _step_from_nowhere(adapter: Adapter) -> object:
+    return as_method(adapter.make(1e-5, None)).tracker(_reach(), FRAME).step(np.array([-0.6, NAN, 0.5]))
 
 
 def _across() -> Problem:

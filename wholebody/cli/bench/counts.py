@@ -23,7 +23,7 @@ PROBLEMS = 6  # of every set, where --count is left out
         metavar="MODULE",
         help="with --method motion: modules of wholebody.motion (default: all that are looked at)",
     ),
-    count("--count", None, f"problems of every set, for the other methods (default: {PROBLEMS})"),
+    count("--count", None, f"problems of every set, for the other methods (default: {PROBLEMS}, 1 with --quick)"),
 )
 def ablation(arguments: argparse.Namespace) -> None:
     """Measure and report.
@@ -41,7 +41,8 @@ def ablation(arguments: argparse.Namespace) -> None:
         raise InputError(f"--only chooses modules of --method motion, not of {arguments.method}; leave it out")
     from wholebody.bench import ablation
 
-    given = ablation.problems(1 if arguments.quick else arguments.count or PROBLEMS, arguments.method)
+    each = arguments.count or (1 if arguments.quick else PROBLEMS)
+    given = ablation.problems(each, arguments.method)
     named = ablation.mechanisms(arguments.method)
     whole, rows = ablation.ablation(arguments.method, given, named, print)
     compiled = ablation.constants(arguments.method)[1]
