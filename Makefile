@@ -28,7 +28,7 @@ demo: $(VENV)/.run ## pose a person reaching into a shelf, and say where the pic
 	$(BIN)/wholebody demo --out $(OUT)
 
 test: $(VENV)/.test ## run the tests on two cores (ARGS="-k name" passes arguments to pytest)
-	$(BIN)/python -m pytest -n 3 --dist loadfile --no-loadscope-reorder $(ARGS) # three on two cores: tests wait for browsers and other processes
+	$(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder $(ARGS) # a third on two cores makes all slower: 296 s, not 261
 
 lint: $(VENV)/.test ## check style and formatting
 	$(BIN)/ruff check .

@@ -14,6 +14,7 @@ from collections.abc import Callable, Iterator, Mapping
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, ClassVar
+from weakref import WeakKeyDictionary
 
 from wholebody import runner
 from wholebody.runner import ONE_THREAD
@@ -54,17 +55,17 @@ sys.dont_write_bytecode = False
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 LONG = (
-    *("examples/test_examples.py", "view/test_live_page.py", "motion/test_avoidance.py", "cli/test_show.py"),
-    *("tracking/test_moving_things.py", "test_odd_arguments.py", "view/test_page.py", "docs/test_pages.py"),
-    *("test_compiled.py", "view/test_files.py", "dynamics/test_scenes.py", "bench/compare/test_jobs.py"),
-    *("methods/newton/test_method.py", "figures/human/test_human_fingers.py", "bench/compare/test_report.py"),
-    *("doctor/test_checks.py", "bench/problem_sets/test_cases.py", "cli/test_commands.py", "view/test_human.py"),
-    *("tracking/test_scenes.py", "test_threads.py", "geometry/test_convex.py", "bench/test_commands.py"),
-    *("bench/stability/test_catalogue.py", "bench/compare/test_run.py", "test_batches.py", "motion/test_batch.py"),
-    *("tracking/test_dragging.py", "motion/bisection/test_method.py", "bench/attack/test_running.py"),
-    *("view/test_legend.py", "methods/test_contradictions.py"),
+    *("view/test_page.py", "examples/test_examples.py", "docs/test_pages.py", "motion/test_avoidance.py"),
+    *("test_compiled.py", "test_odd_arguments.py", "cli/test_show.py", "motion/bisection/test_method.py"),
+    *("view/test_live_page.py", "motion/test_batch.py", "cli/test_commands.py", "view/test_files.py"),
+    *("bench/compare/test_run.py", "methods/test_contradictions.py", "test_batches.py", "doctor/test_checks.py"),
+    *("view/test_server.py", "tracking/test_moving_things.py", "tasks/test_rhythm.py", "view/test_legend.py"),
+    *("tracking/test_scenes.py", "bench/test_daily.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
+    *("tracking/test_dragging.py", "bench/test_challenge.py", "test_runner.py", "methods/newton/test_method.py"),
+    *("view/surface/test_surface.py", "bench/stability/test_command.py", "bench/test_motion.py", "test_threads.py"),
+    *("test_copies.py", "bench/test_commands.py"),
 )
-"""Files that take over six seconds of the processor, and longer by the clock: they begin first.
+"""Files that take longest by the clock, over six seconds each beside others: they begin first.
 
 So all workers end together. pytest-xdist keeps this order with `--no-loadscope-reorder`; by itself it would begin with
 the files of the most tests."""
@@ -183,11 +184,20 @@ def planar_arm() -> Callable[..., Figure]:
     return _planar_arm
 
 
+_LAID: WeakKeyDictionary[Scene, tuple[Any, Any, Any]] = WeakKeyDictionary()
+"""Of scenes: the geometry as it was built, and Pinocchio's data of both; to make them takes longer than to use them."""
+
+
 def _least_distance(scene: Scene, q: Any) -> float:
     """Least signed distance of all pairs, from Pinocchio's own loop over coal, without a guess."""
-    data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
-    pin.computeDistances(scene.model, data, scene.geometry, placed, np.asarray(q))
-    return min((result.min_distance for result in placed.distanceResults), default=np.inf)
+    built, data, placed = _LAID.get(scene, (None, None, None))
+    if built is not scene.built:
+        data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)
+        for request in placed.distanceRequests:
+            request.enable_cached_gjk_guess = False  # else an answer begins where the one before ended
+        _LAID[scene] = scene.built, data, placed
+    nearest = pin.computeDistances(scene.model, data, scene.geometry, placed, np.asarray(q))
+    return float(placed.distanceResults[nearest].min_distance) if len(placed.distanceResults) else np.inf
 
 
 @pytest.fixture(scope="session")
@@ -208,6 +218,15 @@ def warm_processes(request: pytest.FixtureRequest) -> Iterator[None]:
         yield
 
 
+@pytest.fixture(autouse=True, scope="module")
+def emptied_caches(request: pytest.FixtureRequest) -> Iterator[None]:
+    """Forget what a module's own cached functions made: hundreds of scenes make each fork of a process slower."""
+    yield
+    for value in vars(request.module).values():
+        if getattr(value, "__module__", None) == request.module.__name__ and hasattr(value, "cache_clear"):
+            value.cache_clear()
+
+
 def _start_warm(environment: Mapping[str, str]) -> runner.Started:
     """Start a process as `runner.start_process` does, as a fork of this one."""
     ours, theirs = socket.socketpair()
@@ -220,6 +239,7 @@ def _start_warm(environment: Mapping[str, str]) -> runner.Started:
 
 
 def _serve_warm(connection: socket.socket, output: int, environment: Mapping[str, str], parent: int) -> None:
+    gc.freeze()  # a collection would look through all that the tests hold, and copy its pages
     faulthandler.disable()  # jobs that crash on purpose would write of it into the output of the tests
     os.environ.clear()
     os.environ.update(environment)

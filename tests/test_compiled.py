@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gc
+import importlib
 import json
 import os
 import subprocess
@@ -76,13 +78,6 @@ def test_the_first_compilation_is_told_once_and_kept_until_the_loop_changes(run,
     assert run(**kept)[0][:3] == ["45.0", "60.0", "True"]
 
 
-def test_the_users_cache_is_taken_where_the_package_cannot_be_written_to(run, tmp_path: Path) -> None:
-    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
-    kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
-    assert [len(run(**kept)[1]) for _ in range(2)] == [1, 0]
-    assert list((tmp_path / "cache").rglob("*.nbi"))
-
-
 def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     nowhere = str(tmp_path / "file" / "folder")
@@ -106,6 +101,8 @@ def quarter(x):
 
 
 def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
+    """In the user's cache, which is taken where the package cannot be written to."""
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
     (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(INNER)
     (tmp_path / "wholebody" / "loop_of_a_test.py").write_text(
         LOOP.replace("return 2.0 * x", "return 4.0 * half(x)") + "from wholebody.loop_of_another_test import half\n"
@@ -118,22 +115,27 @@ try:
 except TypeError as error:
     print(str(error).replace(" ", "_"))
 """
-    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
     refused = "half_is_compiled_for_calls_from_compiled_functions_only"
     first, _ = run(asks, **kept)
     assert [first[0], *first[4:]] == ["3.0", "1.5", refused]
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+    again, told = run(asks, **kept)
+    assert again[2] == "False"  # read back, not compiled
+    assert told == []
     path = tmp_path / "wholebody" / "loop_of_a_test.py"
     path.write_text(path.read_text() + "\n")  # compiled anew with what was kept of the other
     assert run(asks, **kept)[0] == first
 
 
 IN_PROCESSES = """
-import sys
 from wholebody import compiled
 
 if __name__ == "__main__":
     names = ("wholebody.loop_of_a_test", "wholebody.loop_of_another_test")
-    compiled.compile_in_processes(int(sys.argv[1]), [(name,) for name in names])
+    compiled.compile_in_processes(2, [(name,) for name in names])
+    print(compiled.compile_seconds() > 0.0)
+    compiled.compile_in_processes(1, [(name,) for name in names])
     print(compiled.compile_seconds() > 0.0)
 """
 
@@ -143,12 +145,10 @@ def test_processes_compile_beside_each_other_and_constants_are_numbers(run: obje
     (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(LOOP)
     path = tmp_path / "asks.py"
     path.write_text(IN_PROCESSES)
-    for processes in (2, 1):
-        environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-        command = [sys.executable, str(path), str(processes)]
-        done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
-        assert done.stdout.split() == ["False"]
-        assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+    assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
 
 
 def test_all_loops_are_compiled_by_one_call() -> None:
@@ -176,6 +176,7 @@ def steps(problem, count):
     return near
 
 compiled.compile_all()
+print(compiled.compile_seconds(), "scipy.linalg" in sys.modules)
 before = signatures()
 shelf = wb.read_task("examples/tasks/shelf.toml").problem
 for method in (wb.QP(), wb.Newton(iterations=5, restarts=0)):
@@ -209,49 +210,51 @@ ONE_JOINT = """<robot name="one">
 
 
 def test_solves_and_steps_compile_nothing_beyond_what_one_call_compiles(root: Path, tmp_path: Path) -> None:
-    """Whatever the number of joints, pairs and contacts is: numba takes some arrays of one row for another type."""
+    """Whatever the number of joints, pairs and contacts is: numba takes some arrays of one row for another type.
+
+    And what is kept is read back without scipy: numba's array functions (numba.np.arraymath) load scipy.linalg, a tenth
+    of the time that `wholebody pose` needs.
+    """
+    compiled.compile_all()
     path = tmp_path / "one.urdf"
     path.write_text(ONE_JOINT)
     command = [sys.executable, "-c", WORK, str(path)]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
-    first, *rest = done.stdout.splitlines()
+    read, first, *rest = done.stdout.splitlines()
     assert {0, 1, 2} <= set(json.loads(first))  # contacts of a step
     assert rest == []
+    seconds, loaded = read.split()
+    if float(seconds) == 0.0:  # where no folder can be written to, nothing is kept
+        assert loaded == "False"
 
 
-COLLECTOR = """
-import gc
-from wholebody.compiled import compiled
-from numba.core import event
+def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from numba.core import event
 
-class Look(event.Listener):
-    def on_start(self, event):
-        print(gc.isenabled(), end=" ")
+    class Look(event.Listener):
+        def on_start(self, event: object) -> None:
+            seen.append(gc.isenabled())
 
-    on_end = on_start
+        on_end = on_start
 
-def made(x):
-    return x + 1.0
-
-for collects in (True, False):
-    loop = compiled()(made)
-    (gc.enable if collects else gc.disable)()
-    event.register("numba:run_pass", look := Look())
-    loop(1.0)
-    event.unregister("numba:run_pass", look)
-    print()
-    print(gc.isenabled())
-"""
-
-
-def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(root: Path, tmp_path: Path) -> None:
-    path = tmp_path / "asks.py"
-    path.write_text(COLLECTOR)
-    environment = {**os.environ, "PYTHONPATH": str(root), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
-    first, after_first, second, after_second = done.stdout.splitlines()
-    assert set(first.split()) == {"False"}
-    assert (after_first, set(second.split()), after_second) == ("True", set(), "False")
+    (tmp_path / "loop_of_its_own.py").write_text("def made(x):\n    return x + 1.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    made = importlib.import_module("loop_of_its_own").made
+    for collects in (True, False):
+        loop, seen = compiled.compiled()(made), list[bool]()
+        (gc.enable if collects else gc.disable)()
+        event.register("numba:run_pass", look := Look())
+        try:
+            loop(1.0)
+            afterwards = gc.isenabled()
+        finally:
+            event.unregister("numba:run_pass", look)
+            gc.enable()
+        assert afterwards == collects
+        assert set(seen) == ({False} if collects else set())  # the second time it is read back
+    sys.modules.pop("loop_of_its_own")
 
 
 def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Path) -> None:
@@ -261,18 +264,6 @@ def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Pa
     path = tmp_path / "asks.py"
     path.write_text(IN_PROCESSES)
     environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
-    done = subprocess.run([sys.executable, str(path), "2"], env=environment, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["True"]
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
     assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
-
-
-def test_kept_loops_are_read_back_without_scipy(root: Path) -> None:
-    # numba's array functions (numba.np.arraymath) load scipy.linalg, a tenth of the time that `wholebody pose` needs.
-    compiled.compile_all()
-    code = (
-        "import sys, wholebody.compiled as c; c.compile_all();print(c.compile_seconds(), 'scipy.linalg' in sys.modules)"
-    )
-    done = subprocess.run([sys.executable, "-c", code], cwd=root, capture_output=True, text=True, check=True)
-    seconds, loaded = done.stdout.split()
-    if float(seconds) == 0.0:  # where no folder can be written to, nothing is kept
-        assert loaded == "False"

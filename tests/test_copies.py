@@ -7,6 +7,7 @@ import multiprocessing
 import pickle
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,11 @@ FIGURES: dict[str, Callable[[], wb.Figure]] = {
 }
 
 
+@cache
+def loaded(name: str) -> wb.Figure:
+    return FIGURES[name]()
+
+
 def same(one: Any, other: Any) -> bool:
     return all(np.array_equal(a, b) for a, b in zip(one, other, strict=True))
 
@@ -39,7 +45,7 @@ def same(one: Any, other: Any) -> bool:
 @WAYS
 @pytest.mark.parametrize("name", FIGURES)
 def test_a_figure(name: str, way: Callable[[wb.Figure], wb.Figure]) -> None:
-    figure = FIGURES[name]()
+    figure = loaded(name)
     made = way(figure)
     assert repr(made) == repr(figure)
     for field in ("joints", "groups", "chains", "frames", "segments", "collision_groups", "excluded_pairs", "notes"):
@@ -55,7 +61,7 @@ def scene(tmp_path: Path) -> wb.Scene:
     """Return a human among one thing of each kind, with one in the hand."""
     import trimesh
 
-    made = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    made = wb.Scene(loaded("human")).add(wb.HalfSpace(), name="floor")
     for k, shape in enumerate(
         (wb.Box((0.1, 0.2, 0.3)), wb.Sphere(0.1), wb.Capsule(0.05, 0.2), wb.Ellipsoid((0.1, 0.1, 0.2)))
     ):
@@ -198,7 +204,7 @@ def test_an_assembly_and_its_copy_do_not_share_bodies(way: Callable[[wb.Assembly
 @pytest.mark.parametrize("way", [pickled, copy.deepcopy, copy.copy], ids=["pickle", "deepcopy", "copy"])
 @pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), None], ids=["qp", "newton", "world"])
 def test_what_belongs_to_a_run_is_neither_pickled_nor_copied(way: Callable[[Any], Any], method: Any) -> None:
-    scene = wb.Scene(wb.load("hand"))
+    scene = wb.Scene(loaded("hand"))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.0, 0.0, 0.1))])
     if method is None:
         held = [wb.World(scene, dt=0.01), FrameLoop(scene, scene.figure.neutral)]

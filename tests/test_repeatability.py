@@ -65,7 +65,7 @@ def test_so_it_is_for_the_other_methods(scene: wb.Scene, name: str) -> None:
 
     methods = {
         "ccd": wb.CCD(restarts=1, iterations=40, time_limit=None),
-        "newton": wb.Newton(restarts=0, iterations=10, time_limit=None),
+        "newton": wb.Newton(restarts=0, iterations=4, time_limit=None),
         "placo": wb.Placo(iterations=10, time_limit=None),
     }
     method, problems = methods[name], [asked(place) for place in PLACES]
