@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from presenting import OAK, STEEL, command_line, play
 
 import wholebody as wb
+from wholebody.arrays import Array
 
 DEPTH, WIDTH, HEIGHT, THICK = 0.30, 0.80, 1.00, 0.02  # m: of the shelf, outside, and of its boards
 BOARD = (DEPTH, WIDTH - 2.0 * THICK, THICK)
@@ -77,7 +77,7 @@ def attach_right_side(assembly: wb.Assembly) -> None:
     assembly.on_plane("right side", (-x, y, -z), normal=X, through=-0.5 * DEPTH * X, of="lowest board")
 
 
-def drag(assembly: wb.Assembly, name: str) -> list[NDArray[np.float64]]:
+def drag(assembly: wb.Assembly, name: str) -> list[Array]:
     """Drag a part to its place; the states of all parts, frame by frame."""
     states, there = [assembly.q], in_place(name)
     dragged = wb.Drag(assembly.drop_goals().frame_goal(name, there))
@@ -91,7 +91,7 @@ def drag(assembly: wb.Assembly, name: str) -> list[NDArray[np.float64]]:
     return states
 
 
-def assemble(assembly: wb.Assembly) -> tuple[list[dict[str, pin.SE3]], list[NDArray[np.float64]]]:
+def assemble(assembly: wb.Assembly) -> tuple[list[dict[str, pin.SE3]], list[Array]]:
     """Drag and attach part by part.
 
     Returns:
@@ -125,15 +125,13 @@ def assemble(assembly: wb.Assembly) -> tuple[list[dict[str, pin.SE3]], list[NDAr
     return stages, motion
 
 
-def passes_through(scene: wb.Scene, motion: list[NDArray[np.float64]]) -> int:
+def passes_through(scene: wb.Scene, motion: list[Array]) -> int:
     """Number of ways from one state to the next on which parts are deeper in each other than 0.5 mm, swept."""
     ways = [(a, b) for a, b in pairwise(motion) if not np.array_equal(a, b)]
     return sum(scene.sweep(a, b, tolerance=5e-4) is not None for a, b in ways)
 
 
-def main(
-    out: Path = Path("pictures"), pictures: bool = True
-) -> tuple[list[dict[str, pin.SE3]], list[NDArray[np.float64]]]:
+def main(out: Path = Path("pictures"), pictures: bool = True) -> tuple[list[dict[str, pin.SE3]], list[Array]]:
     """Assemble, report and draw."""
     print("A shelf of six parts:")
     stages, motion = assemble(build())
@@ -144,7 +142,7 @@ def main(
     return stages, motion
 
 
-def draw(motion: list[NDArray[np.float64]], out: Path) -> None:
+def draw(motion: list[Array], out: Path) -> None:
     """Write assemble_shelf.html, which plays the motion, and assemble_shelf.png: three stages."""
     chosen = [motion[0], motion[5 * len(motion) // 12], motion[-1]]
     play(

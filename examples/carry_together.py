@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from presenting import CARDBOARD, DARK, command_line, play
 
 import wholebody as wb
+from wholebody.arrays import Array
 
 APART = 1.20  # m: between the two people, who face each other
 BOX = (0.46, 0.30, 0.22)  # m
@@ -21,8 +21,6 @@ AWAY = 0.022  # m: of the palms from the box's sides; forearms are 20 mm thicker
 FRAMES = 12  # of a drag from one corner of the path to the next
 PEOPLE = {"ann": ("female", 1.68, 0.0), "ben": ("male", 1.78, np.pi)}  # sex, stature [m], turned about z
 COLORS = {"ann": (0.80, 0.62, 0.52, 1.0), "ben": (0.52, 0.66, 0.80, 1.0)}
-
-Array = NDArray[np.float64]
 
 
 def build() -> wb.Assembly:

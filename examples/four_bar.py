@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from presenting import DARK, LIGHT, OAK, STEEL, command_line
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.bench import plot_style as style
 from wholebody.view.parts import Part, Parts
 
@@ -17,8 +17,6 @@ GROUND, CRANK, COUPLER, ROCKER = 0.40, 0.12, 0.36, 0.28  # m: a crank-rocker, fo
 TRACER = np.array((0.18, 0.0, 0.16))  # m: the point of the coupler whose curve is drawn
 STEPS = 90  # of a turn
 Y = (0.0, 1.0, 0.0)  # all axes are along y; the linkage moves in the plane of x and z
-
-Array = NDArray[np.float64]
 
 
 def closed_form(angle: float) -> tuple[float, float]:

@@ -6,10 +6,11 @@ from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from four_bar import COUPLER, CRANK, GROUND, ROCKER, Array, Y, angle_of, bar, closed_form
+from four_bar import COUPLER, CRANK, GROUND, ROCKER, Y, angle_of, bar, closed_form
 from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
+from wholebody.arrays import Array
 
 RADIUS = 0.012  # m: of the bars
 SLIDER = (0.08, 0.03, 0.06)  # m

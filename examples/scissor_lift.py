@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
+from wholebody.arrays import Array
 from wholebody.methods.newton import quaternions as quat
 
 BAR, STAGES = 0.80, 2  # m: length of a bar; crossed pairs one above the other
@@ -22,8 +22,6 @@ GRAVITY = 9.81
 Y = (0.0, 1.0, 0.0)
 SIDE = 0.04  # m: the crossed bars are this far in front of and behind the middle
 FLAT = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # a capsule's z along a bar's x
-
-Array = NDArray[np.float64]
 
 
 class CylinderLimit(wb.AssemblyConstraint):

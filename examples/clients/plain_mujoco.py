@@ -96,10 +96,10 @@ def rows(model, data, problem, least):
             J, e = [*J, move[3:]], [*e, error]
     for contact in data.contact[: data.ncon]:
         a, b = (model.geom(g).name for g in contact.geom)
-        lack = contact.dist - least.get(frozenset((a, b)), problem["clearance"]["every_pair"])
-        if lack < 0:
+        violation = contact.dist - least.get(frozenset((a, b)), problem["clearance"]["every_pair"])
+        if violation < 0:
             first, second = (jacobian(model.geom_bodyid[g], contact.pos)[:3] for g in contact.geom)
-            J, e = [*J, (contact.frame[:3] @ (second - first))[None]], [*e, [lack - 1e-4]]
+            J, e = [*J, (contact.frame[:3] @ (second - first))[None]], [*e, [violation - 1e-4]]
     return np.vstack(J), np.concatenate(e)
 
 

@@ -81,8 +81,8 @@ def rows(model, data, geometry, results, least, problem, q):
             J, e = [*J, move[3:]], [*e, pin.log3(place.rotation @ target.rotation.T)]
     for balance in problem["balance"]:
         normals, centre = np.array(balance["normals"]), pin.centerOfMass(model, data, q)[:2]
-        lack = normals @ centre - balance["offsets"] - balance["margin"]
-        J, e = [*J, (normals @ pin.jacobianCenterOfMass(model, data, q)[:2])[lack < 0]], [*e, lack[lack < 0]]
+        inside = normals @ centre - balance["offsets"] - balance["margin"]  # m, from each edge
+        J, e = [*J, (normals @ pin.jacobianCenterOfMass(model, data, q)[:2])[inside < 0]], [*e, inside[inside < 0]]
     pin.updateGeometryPlacements(model, data, geometry, results)
     pin.computeDistances(geometry, results)
     for k, found in enumerate(results.distanceResults):
