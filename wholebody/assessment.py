@@ -17,10 +17,11 @@ import numpy as np
 from wholebody.all_pairs import AllPairs, all_pairs
 from wholebody.arrays import Array
 from wholebody.checks import a, number, posture
-from wholebody.errors import InputError
+from wholebody.errors import InputError, TermError
 from wholebody.figures.state import State
 from wholebody.first_order import MET, Blocker, FirstOrder
 from wholebody.problem import Problem
+from wholebody.tasks.answers import limit, one, values
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
 NAMED = 4  # most blockers that a message names
@@ -89,8 +90,8 @@ class Assessment:
             InputError: the tolerance is negative or no number.
         """
         tolerance = number(tolerance, "tolerance", 0.0, inf)
-        worst = max(self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
-        return bool(worst <= tolerance)
+        all_of_it = (self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
+        return all(violation <= tolerance for violation in all_of_it)  # NaN holds nothing
 
     def met(self, tolerance: float) -> bool:
         """Whether the goals are met to a tolerance, metres and radians.
@@ -98,7 +99,8 @@ class Assessment:
         Raises:
             InputError: the tolerance is negative or no number.
         """
-        return bool(max(self.goal_error, self.goal_angle) <= number(tolerance, "tolerance", 0.0, inf))
+        tolerance = number(tolerance, "tolerance", 0.0, inf)
+        return all(error <= tolerance for error in (self.goal_error, self.goal_angle, *self.goal_errors))
 
     @property
     def in_the_way(self) -> str:
@@ -120,6 +122,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
 
     Raises:
         InputError: q has the wrong shape or a value that is not finite.
+        TermError: a term of one's own answers what is not finite there, or no numbers of its shape; it is named.
     """
     began = time.perf_counter()
     if not isinstance(problem, Problem):
@@ -128,7 +131,10 @@ def assess(problem: Problem, q: Array) -> Assessment:
     built = problem.scene.built
     problem.check_fresh()
     with all_pairs(built).borrow() as pairs:
-        return _judged(problem, pairs, q, began)
+        try:
+            return _judged(problem, pairs, q, began)
+        except TermError as error:
+            raise problem.placed(error) from None
 
 
 def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assessment:
@@ -137,7 +143,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     distance, angle, each = goal_errors(problem, state)
     violation = float((problem.clearances - pairs.distance).max(initial=0.0))
     missed = largest_violation(problem, state)
-    fits = max(distance, angle, violation, missed) <= MET
+    fits = all(left <= MET for left in (distance, angle, violation, missed))
     return Assessment(
         goal_error=distance,
         goal_angle=angle,
@@ -146,7 +152,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
         clearance_violation=violation,
         limit_violation=_limit_violation(problem, q),
         constraint_violation=missed,
-        measure=sum(term.weight * term.value(state) for term in problem.measures),
+        measure=_weighed(problem, state),
         goal_errors=each,
         first_order=FirstOrder(problem, pairs, fits),
         seconds=time.perf_counter() - began,
@@ -157,7 +163,7 @@ def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[flo
     """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
     distances, angles, each = [0.0], [0.0], []
     for goal in problem.goals:
-        error = np.atleast_1d(goal.error(state))
+        error = values(goal, "error", goal.error(state))
         angular = np.broadcast_to(goal.angular, error.shape)
         distances.append(float(np.linalg.norm(error[~angular])))
         angles.append(float(np.linalg.norm(error[angular])))
@@ -175,6 +181,12 @@ def largest_violation(problem: Problem, state: State) -> float:
     """The largest violation of a constraint, metres or radians."""
     worst = 0.0
     for constraint in problem.constraints:
-        value = np.atleast_1d(constraint.value(state))
-        worst = max(worst, float(np.maximum(constraint.lower - value, value - constraint.upper).max(initial=0.0)))
+        value = values(constraint, "value", constraint.value(state))
+        least, most = (limit(constraint, side, getattr(constraint, side)) for side in ("lower", "upper"))
+        worst = max(worst, float(np.maximum(least - value, value - most).max(initial=0.0)))
     return worst
+
+
+def _weighed(problem: Problem, state: State) -> float:
+    """The weighted sum of the measures."""
+    return sum((one(term, "value", term.weight * term.value(state)) for term in problem.measures), 0.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable
 from difflib import SequenceMatcher
+from typing import Any
 
 SHOWN = 80
 """Largest number of characters of a name in a message."""
@@ -55,6 +56,29 @@ class WholebodyError(Exception):
 
 class InputError(WholebodyError, ValueError):
     """A value that cannot be used: wrong type, shape, sign or range, NaN, or an impossible combination."""
+
+
+class TermError(InputError):
+    """A goal, constraint, bound or measure of one's own answers what cannot be used.
+
+    Attributes:
+        term: the term; None in another process.
+        name: of the term, in words.
+        told: what is wrong with its answer, and how to correct it.
+    """
+
+    def __init__(self, term: object, name: str, told: str) -> None:
+        """Build the sentence of a term's name and what is told of it."""
+        self.term, self.name, self.told = term, name, told
+        super().__init__(f"{name}: {told}")
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Return the words: a term need not go into another process."""
+        return type(self), (None, self.name, self.told)
+
+
+class UndefinedTermError(TermError):
+    """A term of one's own has a value or derivative that is not finite at a posture; it may be at others."""
 
 
 class UnknownNameError(WholebodyError, KeyError):

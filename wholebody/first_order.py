@@ -22,6 +22,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.checks import values_and_rows
 
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
@@ -81,6 +82,8 @@ class _Asked(NamedTuple):
 class FirstOrder:
     """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
 
+    Both raise a `TermError` where a term of one's own has no finite derivative at the posture.
+
     Attributes:
         fits: whether goals are met and everything holds, so that nothing is in the way.
     """
@@ -124,9 +127,7 @@ class FirstOrder:
 def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     """What is left of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
-    goals = [
-        (np.atleast_1d(goal.error(state)), state.dense_jacobian(goal.jacobian(state)), goal) for goal in asked.goals
-    ]
+    goals = [(*values_and_rows(goal, goal.error, state), goal) for goal in asked.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
     signed, one_sided = active.signed, active.one_sided
     if met:
@@ -156,18 +157,19 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
     for row in np.flatnonzero(violation > MET).tolist():
         violated[near.label(row)] = float(violation[row])
     for number, constraint in enumerate(asked.constraints):
-        value = np.atleast_1d(constraint.value(state))
+        value, jacobian = values_and_rows(constraint, constraint.value, state)
         missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
         if np.abs(missed).max(initial=0.0) > MET:
             violated["constraint", (asked.names[number],)] = float(np.abs(missed).max())
-            gradient += missed @ state.dense_jacobian(constraint.jacobian(state))
+            gradient += missed @ jacobian
     if violated:
         for row, number in zip(rows, numbers, strict=True):
             gradient -= violated.get(near.label(number), 0.0) * row
         signed, one_sided = _without(signed, violated), _without(one_sided, violated)
     else:
         for goal in asked.goals:
-            gradient += goal.weight * np.atleast_1d(goal.error(state)) @ state.dense_jacobian(goal.jacobian(state))
+            error, jacobian = values_and_rows(goal, goal.error, state)
+            gradient += goal.weight * error @ jacobian
     multipliers, _ = _balanced(gradient, signed, one_sided)
     found: dict[Label, float] = {}
     for label, size in zip([*signed.labels, *one_sided.labels], multipliers.tolist(), strict=True):
@@ -213,8 +215,7 @@ def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
     gaps, contacts = near.gradients(state)
     one_sided.add(gaps, [near.label(number) for number in contacts])
     for number, constraint in enumerate(asked.constraints):
-        value = np.atleast_1d(constraint.value(state))
-        jacobian = state.dense_jacobian(constraint.jacobian(state))
+        value, jacobian = values_and_rows(constraint, constraint.value, state)
         low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
         label: Label = ("constraint", (asked.names[number],))
         signed.add(jacobian[low & high], [label] * int((low & high).sum()))

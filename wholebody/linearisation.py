@@ -16,14 +16,14 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import StepLimit
-from wholebody.term_plan import OtherTerm, TermPlan, checked_rows, make_plan
+from wholebody.term_plan import OtherTerm, TermPlan, checked_count, checked_rows, make_plan
 from wholebody.workspace import Workspace
 
 MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
@@ -273,6 +273,28 @@ class Lineariser:
         if plan.other_measures:
             self._measure(plan.other_measures, measure)
 
+    def undefined(self, q: Array) -> UndefinedTermError | None:
+        """Why a posture (nq,) cannot be used: a term of one's own is not finite there; None where all are.
+
+        Without terms of one's own nothing is computed.
+        """
+        plan = self._plan
+        if not (plan.others or plan.other_bounds or plan.other_measures):
+            return None
+        state = self.state.update(q)
+        try:
+            for term, evaluate, _, _ in plan.others:
+                evaluate(state)
+                term.jacobian(state)
+            for bound in plan.other_bounds:
+                bound.bounds(state, self.dt)
+            for measure in plan.other_measures:
+                for ask in (measure.value, measure.gradient, measure.curvature, measure.squares):
+                    ask(state)
+        except UndefinedTermError as error:
+            return error
+        return None
+
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
         return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
 
@@ -366,8 +388,10 @@ class ConstraintValues:
             _NO_WRENCHES, _NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
             self._no_squares,
         )  # fmt: skip
-        for _, evaluate, row, rows in plan.others:
-            value[row : row + rows] = evaluate(state)
+        for term, evaluate, row, rows in plan.others:
+            part = np.atleast_1d(evaluate(state))
+            checked_count(term, len(part), rows)
+            value[row : row + rows] = part
         return value
 
 

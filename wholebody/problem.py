@@ -16,12 +16,13 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.all_pairs import all_pairs
 from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.errors import InputError, TermError
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.answers import in_words
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.term_plan import TermPlan, make_plan
@@ -139,9 +140,9 @@ class Problem(checks.FixedAttributes):
         return (
             f"Problem of {self.scene.figure.name!r} among {len(self.scene.objects)} things, "
             f"{len(self.clearances)} pairs, clearance {1e3 * self.clearance:g} mm\n"
-            f"  goals: {checks.some(map(_in_words, asked[: len(self.goals)])) or 'none'}\n"
-            f"  constraints: {checks.some(map(_in_words, asked[len(self.goals) :])) or 'none'}; "
-            f"measures: {checks.some(map(_in_words, self.measures)) or 'none'}"
+            f"  goals: {checks.some(map(in_words, asked[: len(self.goals)])) or 'none'}\n"
+            f"  constraints: {checks.some(map(in_words, asked[len(self.goals) :])) or 'none'}; "
+            f"measures: {checks.some(map(in_words, self.measures)) or 'none'}"
         )
 
     def _checked_value(self, name: str, value: Any) -> Any:
@@ -181,6 +182,14 @@ class Problem(checks.FixedAttributes):
             name = type(term).__name__ + (f"({frame!r})" if frame else "")
             found.append(f"{name} (by default)" if id(term) in defaults else f"constraints[{next(places)}], {name}")
         return tuple(found)
+
+    def placed(self, error: TermError) -> TermError:
+        """What is told of a term, with its place in this problem in front: "goals[1] (Mine)"."""
+        groups = (("goals", self.goals), ("bounds", self.bounds), ("measures", self.measures))
+        names = [*zip(self.constraint_names, self.constraints, strict=True)]
+        names += [(f"{what}[{n}] ({in_words(term)})", term) for what, terms in groups for n, term in enumerate(terms)]
+        found = next((name for name, term in names if term is error.term), error.name)
+        return type(error)(error.term, found, error.told)
 
     def retarget(self, goals: Iterable[Goal]) -> None:
         """Replace the goals, for a goal that moves from frame to frame; everything else stays.
@@ -294,7 +303,7 @@ class Problem(checks.FixedAttributes):
     def _check_terms(self, state: State) -> None:
         """Evaluate every term once at the start, so that a wrong term is named before anything is computed."""
         for number, constraint in enumerate(self.constraints):
-            check_rows(f"constraints[{number}]", constraint, constraint.value(state), constraint.jacobian(state), state)
+            check_rows(f"constraints[{number}]", constraint, constraint.value, state)
         for number, measure in enumerate(self.measures):
             check_measure(f"measures[{number}]", measure, state)
 
@@ -316,7 +325,7 @@ class Problem(checks.FixedAttributes):
 def _check_goals(goals: Mapping[int, Goal] | Sequence[Goal], state: State) -> None:
     """Evaluate goals, by number, at the start."""
     for number, goal in goals.items() if isinstance(goals, Mapping) else enumerate(goals):
-        check_rows(f"goals[{number}]", goal, goal.error(state), goal.jacobian(state), state)
+        check_rows(f"goals[{number}]", goal, goal.error, state)
 
 
 @cache
@@ -340,12 +349,6 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
     return np.array(normal)
-
-
-def _in_words(term: Any) -> str:
-    """Class of a term, and its frame if it has one."""
-    frame = getattr(term, "frame", None)
-    return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
 def _clearance(value: float) -> float:

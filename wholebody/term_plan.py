@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.errors import TermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench, extended_columns
 from wholebody.records import with_values
@@ -321,9 +321,17 @@ def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array
     """Raise InputError where a term of one's own has not as many rows as values, or not as many as at the start."""
     rows = len(jacobian.rows) if isinstance(jacobian, Wrench) else len(jacobian)
     if rows != len(value):
-        raise InputError(f"{type(term).__name__} has {len(value)} values and {rows} rows at a posture; give as many")
+        raise TermError(
+            term, type(term).__name__, f"it has {len(value)} values and {rows} rows at a posture; give as many"
+        )
+    checked_count(term, rows, expected)
+
+
+def checked_count(term: Goal | Constraint, rows: int, expected: int) -> None:
+    """Raise InputError where a term of one's own has another number of rows than at the start."""
     if rows != expected:
-        raise InputError(
-            f"{type(term).__name__} has {rows} rows here, and had {expected} at the start; give each term one number "
-            "of rows at all postures"
+        raise TermError(
+            term,
+            type(term).__name__,
+            f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows at all postures",
         )

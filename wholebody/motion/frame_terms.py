@@ -241,8 +241,7 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
     state = State(scene.model).update(q)
     resolved = term.resolve(scene, q)
-    value = resolved.error(state) if isinstance(resolved, Goal) else resolved.value(state)
-    check_rows(where, resolved, value, resolved.jacobian(state), state)
+    check_rows(where, resolved, resolved.error if isinstance(resolved, Goal) else resolved.value, state)
 
 
 def _miss(term: HeldTerm, state: State) -> float:

@@ -18,6 +18,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
+from wholebody.tasks import answers
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
@@ -79,6 +80,18 @@ class Term:
 class Goal(Term, ABC):
     """An equality that is met if possible: ``error(state) = 0``."""
 
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Have the answers of a class of one's own checked at every call."""
+        super().__init_subclass__(**given)
+        answers.check_answers(
+            cls,
+            {
+                "error": ("error", answers.values),
+                "jacobian": ("jacobian", answers.rows),
+                "weight": ("weight", answers.weight),
+            },
+        )
+
     @property
     def weight(self) -> float:
         """Positive factor on the squared error [1/m^2 or 1/rad^2]; it decides which of two goals gives way."""
@@ -100,6 +113,19 @@ class Goal(Term, ABC):
 
 class Constraint(Term, ABC):
     """An equality or inequality that always holds: ``lower <= value(state) <= upper``."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Have the answers of a class of one's own checked at every call."""
+        super().__init_subclass__(**given)
+        answers.check_answers(
+            cls,
+            {
+                "value": ("value", answers.values),
+                "jacobian": ("jacobian", answers.rows),
+                "lower": ("lower", answers.limit),
+                "upper": ("upper", answers.limit),
+            },
+        )
 
     @property
     def lower(self) -> Array:
@@ -128,6 +154,11 @@ class Constraint(Term, ABC):
 class Bound(Term, ABC):
     """Least and greatest displacement of every degree of freedom."""
 
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Have the answers of a class of one's own checked at every call."""
+        super().__init_subclass__(**given)
+        answers.check_answers(cls, {"bounds": ("bounds", answers.sides)})
+
     @abstractmethod
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
         """Bounds on the tangent displacement from this state.
@@ -143,6 +174,20 @@ class Bound(Term, ABC):
 
 class Measure(Term, ABC):
     """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it."""
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Have the answers of a class of one's own checked at every call."""
+        super().__init_subclass__(**given)
+        answers.check_answers(
+            cls,
+            {
+                "value": ("value", answers.one),
+                "gradient": ("gradient", answers.freedoms),
+                "curvature": ("curvature", answers.diagonal),
+                "squares": ("squares", answers.squares),
+                "weight": ("weight", answers.weight),
+            },
+        )
 
     @property
     def weight(self) -> float:

@@ -2,55 +2,89 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
-from wholebody.errors import InputError
+from wholebody.arrays import Array
+from wholebody.errors import TermError
 from wholebody.figures.state import State, Wrench
-from wholebody.tasks.base import Measure
+from wholebody.tasks import answers
+from wholebody.tasks.base import Constraint, Goal, Measure
 
 
-def check_rows(where: str, term: object, values: Any, jacobian: Any, state: State) -> None:
-    """Check the values and Jacobian of a goal or constraint.
+@contextmanager
+def named(where: str, term: object) -> Iterator[None]:
+    """Inside it, what is told of a term's answers begins with the term's place, such as "goals[1] (Mine)"."""
+    try:
+        yield
+    except TermError as error:
+        raise type(error)(term, f"{where} ({type(term).__name__})", error.told) from None
+
+
+def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state: State) -> None:
+    """Check the values and Jacobian of a goal or constraint, its weight or bounds, and which rows are angles.
 
     Args:
         where: its place, such as "goals[1]".
         term: the term.
-        values: the return value of its `error` or `value`.
-        jacobian: the return value of its `jacobian`.
-        state: the state at which it was evaluated.
+        evaluate: its `error` or `value`.
+        state: the state at which it is evaluated.
 
     Raises:
-        InputError: shapes that do not fit, or a value that is not finite.
+        TermError: numbers of the wrong kind, or shapes that do not fit.
+        UndefinedTermError: a value that is not finite.
     """
-    name = f"{where} ({type(term).__name__})"
-    values = np.atleast_1d(np.asarray(values, dtype=float))
-    if values.ndim != 1:
-        raise InputError(f"{name} has values of shape {values.shape}; return one row of numbers, shape (m,)")
-    rows = np.asarray(jacobian.rows if isinstance(jacobian, Wrench) else jacobian, dtype=float)
-    wanted = (len(values), 6 if isinstance(jacobian, Wrench) else state.model.nv)
-    if rows.shape != wanted:
-        kind = "wrench rows" if isinstance(jacobian, Wrench) else "a Jacobian"
-        raise InputError(f"{name} has {len(values)} values and {kind} of shape {rows.shape}; give shape {wanted}")
-    if not (np.isfinite(values).all() and np.isfinite(rows).all()):
-        raise InputError(f"{name} is not finite at the start; its formula must give finite numbers at every posture")
+    with named(where, term):
+        values, _ = values_and_rows(term, evaluate, state)
+        if isinstance(term, Goal):
+            answers.weight(term, "weight", term.weight)
+        if isinstance(term, Constraint):
+            low, high = (answers.limit(term, what, getattr(term, what)) for what in ("lower", "upper"))
+            for what, bound in (("lower", low), ("upper", high)):
+                if bound.ndim and len(bound) not in (1, len(values)):
+                    told = f"it has {len(values)} values, and its {what} has shape {bound.shape}; give as many, or one"
+                    raise TermError(term, answers.in_words(term), told)
+            if not (low <= high).all():
+                raise TermError(term, answers.in_words(term), "its lower is above its upper; give the lower one first")
+        if np.shape(term.angular) not in ((), (1,), values.shape):
+            told = f"it has {len(values)} values, and its angular has shape {np.shape(term.angular)}; give as many"
+            raise TermError(term, answers.in_words(term), told)
+
+
+def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State) -> tuple[Array, Array]:
+    """Values (m,) of a goal or constraint at a state, and their derivatives (m, nv).
+
+    Args:
+        term: the term.
+        evaluate: its `error` or `value`.
+        state: where.
+
+    Raises:
+        TermError: numbers of the wrong kind, or not as many values as rows.
+        UndefinedTermError: a number that is not finite.
+    """
+    values = answers.values(term, evaluate.__name__, evaluate(state))
+    jacobian = answers.rows(term, "jacobian", term.jacobian(state), (state,))
+    count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
+    if count != len(values):
+        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape ({len(values)}, nv)"
+        raise TermError(term, answers.in_words(term), told)
+    return values, state.dense_jacobian(jacobian)
 
 
 def check_measure(where: str, measure: Measure, state: State) -> None:
-    """Check the value, gradient and curvature of a measure at a state.
+    """Check the value, gradient, curvature and squares of a measure at a state.
 
     Raises:
-        InputError: shapes that do not fit, a value that is not finite, or a negative curvature.
+        TermError: numbers of the wrong kind, shapes that do not fit, or a negative curvature.
+        UndefinedTermError: a value that is not finite.
     """
-    name = f"{where} ({type(measure).__name__})"
-    gradient, curvature = np.asarray(measure.gradient(state)), np.asarray(measure.curvature(state))
-    wanted = (state.model.nv,)
-    if gradient.shape != wanted or curvature.shape != wanted:
-        raise InputError(
-            f"{name} has a gradient {gradient.shape} and a curvature {curvature.shape}; give shape {wanted}"
-        )
-    if not (np.isfinite(measure.value(state)) and np.isfinite(gradient).all() and np.isfinite(curvature).all()):
-        raise InputError(f"{name} is not finite at the start; its formula must give finite numbers at every posture")
-    if (curvature < 0.0).any():
-        raise InputError(f"{name} has a negative curvature; give a diagonal that is zero or more")
+    with named(where, measure):
+        answers.weight(measure, "weight", measure.weight)
+        answers.one(measure, "value", measure.value(state))
+        answers.freedoms(measure, "gradient", measure.gradient(state), (state,))
+        answers.diagonal(measure, "curvature", measure.curvature(state), (state,))
+        answers.squares(measure, "squares", measure.squares(state), (state,))
