@@ -150,11 +150,11 @@ class _Broken(wb.Goal):
 
 @pytest.mark.parametrize(("kind", "said"), [("nan", "not finite"), ("shape", "give shape")])
 def test_new_goals_are_checked_as_the_first_ones_and_refused_whole(scene, kind, said):
-    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\) .*{said}"):
+    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\): .*{said}"):
         wb.Problem(scene, goals=[GOAL, _Broken(kind)])
     problem = wb.Problem(scene, goals=[GOAL])
     before = problem.goals
-    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\) .*{said}"):
+    with pytest.raises(wb.InputError, match=rf"goals\[1\] \(_Broken\): .*{said}"):
         problem.retarget([wb.Posture("standing"), _Broken(kind)])
     assert problem.goals is before
 

@@ -80,6 +80,12 @@ class TermError(InputError):
 class UndefinedTermError(TermError):
     """A term of one's own has a value or derivative that is not finite at a posture; it may be at others."""
 
+    WHERE = "at a posture"
+
+    def of_iteration(self, number: int) -> str:
+        """The sentence, of the posture of an iteration."""
+        return str(self).replace(self.WHERE, f"{self.WHERE} of iteration {number}", 1)
+
 
 class UnknownNameError(WholebodyError, KeyError):
     """An unknown name; the message lists the nearest known names."""

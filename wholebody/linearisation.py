@@ -23,6 +23,7 @@ from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import StepLimit
+from wholebody.tasks.checks import undefined
 from wholebody.term_plan import OtherTerm, TermPlan, checked_count, checked_rows, make_plan
 from wholebody.workspace import Workspace
 
@@ -281,19 +282,8 @@ class Lineariser:
         plan = self._plan
         if not (plan.others or plan.other_bounds or plan.other_measures):
             return None
-        state = self.state.update(q)
-        try:
-            for term, evaluate, _, _ in plan.others:
-                evaluate(state)
-                term.jacobian(state)
-            for bound in plan.other_bounds:
-                bound.bounds(state, self.dt)
-            for measure in plan.other_measures:
-                for ask in (measure.value, measure.gradient, measure.curvature, measure.squares):
-                    ask(state)
-        except UndefinedTermError as error:
-            return error
-        return None
+        own = [*(other.term for other in plan.others), *plan.other_bounds, *plan.other_measures]
+        return undefined(own, self.state.update(q), self.dt)
 
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
         return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)

@@ -21,8 +21,8 @@ from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.linearisation import Lineariser
 from wholebody.scene import Scene
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.answers import in_words
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.term_plan import TermPlan, make_plan

@@ -327,11 +327,8 @@ def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array
     checked_count(term, rows, expected)
 
 
-def checked_count(term: Goal | Constraint, rows: int, expected: int) -> None:
+def checked_count(term: Goal | Constraint | Measure, rows: int, expected: int) -> None:
     """Raise InputError where a term of one's own has another number of rows than at the start."""
     if rows != expected:
-        raise TermError(
-            term,
-            type(term).__name__,
-            f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows at all postures",
-        )
+        told = f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows"
+        raise TermError(term, type(term).__name__, f"{told} at all postures")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -81,6 +81,9 @@ def concluded(
     """
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
+    if control.undefined is not None:
+        control.undefined = problem.placed(control.undefined)
+        ending = replace(ending, settled=False, unit="postures where all terms are finite")
     status = _status(judgement, ending, enough, bool(control.reason))
     if ending.contradictions is None:
         why = "" if status == "solved" else explanation(problem)
@@ -90,6 +93,7 @@ def concluded(
     if why and ending.caveat and not judgement.holds(enough):
         why += f"; {ending.caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
+    after = (judgement.in_the_way, _way_out(problem, judgement), ending.remark, _undefined(status, control))
     return Solution(
         q=ending.q,
         status=status,
@@ -98,7 +102,7 @@ def concluded(
         assessment=judgement,
         trace=ending.trace,
         method=method,
-        message=said + judgement.in_the_way + _way_out(problem, judgement) + ending.remark,
+        message=said + "".join(after),
         programs=ending.programs,
     )
 
@@ -126,6 +130,13 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     why = "what must hold cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     caveat = f"; {ending.caveat}" if ending.caveat else ""
     return f"{why}: {name} is missed by {missed:.3g} m or rad{caveat}"
+
+
+def _undefined(status: Status, control: Control) -> str:
+    """Which term of one's own had no finite number where a step led, if the problem is not solved."""
+    if status == "solved" or control.undefined is None:
+        return ""
+    return f"; a step was taken back: {control.undefined.of_iteration(control.undefined_at)}"
 
 
 def _way_out(problem: Problem, judgement: Assessment) -> str:

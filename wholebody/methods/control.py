@@ -15,7 +15,7 @@ import numpy as np
 from wholebody.assessment import Assessment
 from wholebody.checks import a, number
 from wholebody.compiled import compile_seconds
-from wholebody.errors import InputError
+from wholebody.errors import InputError, UndefinedTermError
 from wholebody.solution import TraceEntry
 
 LONGEST = 4.0
@@ -37,6 +37,9 @@ class Control:
 
     Attributes:
         reason: why the solve was ended, for its message; empty before.
+        undefined: why the last step that was taken back led to a posture where a term of one's own is not finite; None
+            where there was none.
+        undefined_at: the iteration of that step.
     """
 
     def __init__(self, time_limit: float | None = None, progress: Progress | None = None) -> None:
@@ -52,6 +55,8 @@ class Control:
         if progress is not None and not callable(progress):
             raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")
         self.reason = ""
+        self.undefined: UndefinedTermError | None = None
+        self.undefined_at, self._told = 0, 0
         self._time_limit, self._progress = time_limit, progress
         self._began, self._began_at = self._now(), time.monotonic()
         self._handler: Any = None
@@ -85,8 +90,13 @@ class Control:
         broken = max(judgement.clearance_violation, judgement.constraint_violation, judgement.limit_violation)
         return f"{self.reason}: {left}" + (f", and what must hold is missed by {broken:.3g} m or rad" * (broken > 1e-4))
 
+    def step_back(self, error: UndefinedTermError) -> None:
+        """Note that a step was taken back: a term of one's own is not finite where it leads."""
+        self.undefined, self.undefined_at = error, self._told + 1
+
     def tell(self, entry: TraceEntry) -> None:
         """Report an iteration to the caller."""
+        self._told += 1
         if self._progress is not None and self._progress(entry) is True and not self.reason:
             self.reason = "progress ended it"
 

@@ -32,9 +32,11 @@ from wholebody.methods.differential import REST
 from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
 from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.answers import values
+from wholebody.tasks.checks import undefined, values_and_rows
 
 SHARE = 0.5  # of the tolerance, to which goals and equalities are met: the assessment rounds differently
+HALVINGS = 12  # of a step to where a term of one's own is not finite, before the descent ends
 RANK = 1e-8  # squared singular values below this share of the largest count as zero
 
 
@@ -139,30 +141,45 @@ class _Descent:
                 return True
             if self.steps == method.iterations or self._control.over:
                 break
-            moved = problem.scene.figure.clamp(
-                np.asarray(pin.integrate(problem.scene.model, q, self._step(held, wanted)))
-            )
+            moved = self._moved(q, self._step(held, wanted))
+            if moved is None:
+                return False
             step = float(np.abs(pin.difference(problem.scene.model, q, moved)).max(initial=0.0))
             q = moved
             self.steps += 1
         return False
 
+    def _moved(self, q: Array, way: Array) -> Array | None:
+        """Where a way (nv,), or a half of it or less, leads from q (nq,); None if a term is not finite on all of it."""
+        problem = self._problem
+        asked = (*problem.goals, *problem.stated, *problem.bounds, *problem.measures)
+        for _ in range(HALVINGS):
+            moved = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, q, way)))
+            error = undefined(
+                (*problem.goals, *problem.stated, *problem.bounds, *problem.measures), self._state.update(moved)
+            )
+            if error is None:
+                return moved
+            self._control.step_back(error)
+            way = 0.5 * way
+        return None
+
     def _held(self) -> Array:
         """Errors of all equalities."""
-        return _joined([term.lower - np.atleast_1d(term.value(self._state)) for term in self._problem.stated])
+        return _joined([term.lower - values(term, "value", term.value(self._state)) for term in self._problem.stated])
 
     def _wanted(self) -> Array:
         """Errors of all goals, multiplied by the roots of their weights."""
         goals = self._problem.goals
-        return _joined([-(goal.weight**0.5) * np.atleast_1d(goal.error(self._state)) for goal in goals])
+        return _joined([-(goal.weight**0.5) * values(goal, "error", goal.error(self._state)) for goal in goals])
 
     def _step(self, held: Array, wanted: Array) -> Array:
         """Displacement (nv,), within the limits."""
         problem, state = self._problem, self._state
-        of_held = _jacobian(problem.stated, state)
-        of_wanted = _jacobian(problem.goals, state) * np.repeat(
-            [goal.weight**0.5 for goal in problem.goals], [np.atleast_1d(g.error(state)).size for g in problem.goals]
-        ).reshape(-1, 1)
+        of_held = _rows([values_and_rows(term, term.value, state)[1] for term in problem.stated], state)
+        of_wanted = _rows(
+            [goal.weight**0.5 * values_and_rows(goal, goal.error, state)[1] for goal in problem.goals], state
+        )
         lower, upper = problem.scene.figure.tangent_bounds(state.q)
         for bound in problem.bounds:
             low, high = bound.bounds(state, None)
@@ -209,9 +226,8 @@ def _damped(jacobian: Array, error: Array, damping: float) -> Array:
     return np.asarray(jacobian.T @ np.linalg.solve(square, error))
 
 
-def _jacobian(terms: Sequence[Goal | Constraint], state: State) -> Array:
+def _rows(rows: Sequence[Array], state: State) -> Array:
     """Rows (m, nv) of all terms."""
-    rows = [state.dense_jacobian(term.jacobian(state)) for term in terms]
     return np.concatenate(rows) if rows else np.zeros((0, state.model.nv))
 
 

@@ -21,6 +21,7 @@ from wholebody.figures.state import State, Wrench
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.checks import defined
 from wholebody.tasks.discomfort import Discomfort
 from wholebody.tasks.distance import Displacement, Effort
 from wholebody.tasks.rhythm import Rhythm
@@ -132,7 +133,7 @@ class _Walk:
 def _columns(term: Goal | Constraint, states: Iterable[State]) -> Mask:
     """(m, nv) degrees of freedom on which each row depends: exact for wrenches, otherwise from the sampled postures."""
     found: Mask | None = None
-    for state in states:
+    for state in defined(term, states):
         jacobian = term.jacobian(state)
         if isinstance(jacobian, Wrench):
             between = _dofs(state, state.support[jacobian.joint] != state.support[jacobian.against])
@@ -149,7 +150,7 @@ def _dofs(state: State, columns: Mask) -> Mask:
 
 
 def _slopes(measure: Measure, states: Iterable[State]) -> Mask:
-    return np.asarray(np.any([np.abs(measure.gradient(state)) > NOTHING for state in states], axis=0))
+    return np.asarray(np.any([np.abs(measure.gradient(state)) > NOTHING for state in defined(measure, states)], axis=0))
 
 
 def _kinds(term: Constraint, state: State) -> tuple[Mask, Mask]:

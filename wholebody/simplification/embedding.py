@@ -16,6 +16,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.arrays import Array, Mask
+from wholebody.errors import UndefinedTermError
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
@@ -181,7 +182,10 @@ def restated_term(
         assert isinstance(term, Bound)
         return EmbeddedBound(term, embedding)
     state = State(scene.model)
-    wanted = _values(embedded, state, start)
+    try:
+        wanted = _values(embedded, state, start)
+    except UndefinedTermError:  # of one's own, at a posture that was tried
+        return embedded
     if isinstance(embedded, Constraint):
         wanted, rows = _moving_rows(wanted)
         if not rows:

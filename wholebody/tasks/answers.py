@@ -35,6 +35,16 @@ def in_words(term: object) -> str:
     return f"{type(term).__name__}({frame})" if isinstance(frame, str) else type(term).__name__
 
 
+def is_own(term: object) -> bool:
+    """Whether a term is of a class of one's own, or stands for one on a simplified figure."""
+    inner = getattr(term, "term", None)
+    return not _is_ours(type(term)) or (inner is not None and is_own(inner))
+
+
+def _is_ours(kind: type) -> bool:
+    return kind.__module__.partition(".")[0] == _OURS
+
+
 def check_answers(kind: type, table: Mapping[str, tuple[str, Check]]) -> None:
     """Have the answers of a class of terms checked.
 
@@ -44,7 +54,7 @@ def check_answers(kind: type, table: Mapping[str, tuple[str, Check]]) -> None:
     """
     for name, (what, check) in table.items():
         owner = next((base for base in kind.__mro__ if name in vars(base)), None)
-        if owner is None or owner.__module__.partition(".")[0] == _OURS:
+        if owner is None or _is_ours(owner):
             continue
         found = vars(owner)[name]
         if isinstance(found, property):
@@ -232,5 +242,5 @@ def _known(term: object, what: str, found: Array) -> Array:
 
 
 def _undefined(term: object, what: str, found: float) -> UndefinedTermError:
-    told = f"its {what} has {found:g} at a posture, which is not finite; its formula must give finite numbers at every"
-    return UndefinedTermError(term, in_words(term), f"{told} posture")
+    told = f"its {what} has {found:g} {UndefinedTermError.WHERE}, which is not finite; its formula must give finite"
+    return UndefinedTermError(term, in_words(term), f"{told} numbers at every posture")

@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.errors import TermError
+from wholebody.errors import TermError, UndefinedTermError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
-from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.base import Constraint, Goal, Measure, Term
+
+_ASKED = (("error", 1), ("value", 1), ("jacobian", 1), ("gradient", 1), ("curvature", 1), ("squares", 1), ("bounds", 2))
+"""What terms are asked at a state, and of how many arguments."""
 
 
 @contextmanager
@@ -70,9 +73,34 @@ def values_and_rows(term: Any, evaluate: Callable[[State], Array], state: State)
     jacobian = answers.rows(term, "jacobian", term.jacobian(state), (state,))
     count = len(jacobian.rows if isinstance(jacobian, Wrench) else jacobian)
     if count != len(values):
-        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape ({len(values)}, nv)"
+        wanted = (len(values), state.model.nv)
+        told = f"it has {len(values)} values and a jacobian of {count} rows at a posture; give shape {wanted}"
         raise TermError(term, answers.in_words(term), told)
     return values, state.dense_jacobian(jacobian)
+
+
+def undefined(terms: Iterable[Term], state: State, dt: float | None = None) -> UndefinedTermError | None:
+    """Why a state cannot be used: the first term of one's own that is not finite there; None where all are.
+
+    Args:
+        terms: resolved goals, constraints, bounds and measures.
+        state: where.
+        dt: seconds of a step, for bounds.
+    """
+    try:
+        for term in filter(answers.is_own, terms):
+            for what, arguments in _ASKED:
+                ask = getattr(term, what, None)
+                if ask is not None:
+                    ask(state, *((dt,) if arguments == 2 else ()))
+    except UndefinedTermError as error:
+        return error
+    return None
+
+
+def defined(term: Term, states: Iterable[State]) -> Iterator[State]:
+    """Those of some states where a term is finite: postures all over the limits are tried, and some may not be."""
+    return (state for state in states if undefined((term,), state) is None)
 
 
 def check_measure(where: str, measure: Measure, state: State) -> None:

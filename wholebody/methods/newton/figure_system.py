@@ -12,6 +12,8 @@ from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import ActiveSystem, Patterns
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
+from wholebody.tasks.answers import is_own
+from wholebody.tasks.checks import undefined
 from wholebody.workspace import Workspace
 
 HARD = Key("", False, False, 1.0)
@@ -62,6 +64,7 @@ class FigureSystem(ActiveSystem):
         self.patterns = Patterns(count, self.bodies.weight, algebra)
         self._ordered = np.zeros(0)
         self._laid: tuple[object, ...] = ()
+        self._own = tuple(filter(is_own, problem.measures))
         self.arrive(self.variables(problem.start))
 
     def variables(self, q: Array) -> Array:
@@ -75,6 +78,11 @@ class FigureSystem(ActiveSystem):
     def posture(self, x: Array) -> Array:
         """The posture (nq,) of the bodies x (7 n,)."""
         return self.q if x is self._ordered else self.bodies.posture(x)
+
+    def defined(self, q: Array) -> bool:
+        """Whether all terms of one's own are finite at a posture (nq,)."""
+        problem, state = self.problem, self.workspace.state.update(q)
+        return undefined((*problem.goals, *problem.constraints, *problem.measures), state) is None
 
     def retarget(self) -> None:
         """Update to the problem's new goals."""
@@ -101,6 +109,8 @@ class FigureSystem(ActiveSystem):
         """Renew limits and contacts at x; returns whether the pattern changed."""
         if x is not self._ordered:
             x = self.retract(x)
+        if self._own and (error := undefined(self._own, self.workspace.state.update(self.q))) is not None:
+            raise error  # measures are read where a step ends, and not on the way there
         self._left = self.q
         self.bodies.choose_limits(self._limits, self.q)
         self.objective.renew(self.q)

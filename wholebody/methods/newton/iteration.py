@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.errors import UndefinedTermError
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.methods.newton.system import ActiveSystem
@@ -80,9 +81,9 @@ class Iteration:
         self.state: Inequalities = inequalities(self.kind, self.residual[self.one_sided])
 
     def _move(self, x: Array, residual: Array | None) -> None:
-        self.x = x
-        self.residual = self.system.residual(x) if residual is None else residual
-        self.values = self.system.values(x)
+        residual = self.system.residual(x) if residual is None else residual
+        values = self.system.values(x)
+        self.x, self.residual, self.values = x, residual, values
         error = np.abs(self._error(self.residual))
         self.goal = float(error[self.goal_rows].max(initial=0.0))
         error[self.goal_rows] = 0.0
@@ -135,11 +136,10 @@ class Iteration:
                 continue
             refused = 0
             trial, length, free = self.shorten(trial, step, length)
-            found = self.system.residual(trial)
-            after = self._norms(found)
+            after = self._norms_at(trial)
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
             better = self._better(before, after, promised, 0.0 if restore else funnel) or not self.state.finished()
-            if not (free and better):
+            if not (free and better and sum(after) < np.inf and self.advance(trial, length)):
                 self.residuals.append(self.residuals[-1])
                 if damping >= MOST_DAMPING:
                     self.stationary = True
@@ -155,7 +155,6 @@ class Iteration:
             nearer = sum(after) < (1.0 - (LEAST_PROGRESS if early_exit else STAGNANT)) * least
             least = min(least, sum(after))
             stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
-            self.advance(trial, length)
             gain = before[1] - promised[1]
             if restore or before[1] - after[1] >= GOOD * gain:
                 damping = max(damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0, self.least_damping)
@@ -184,14 +183,24 @@ class Iteration:
             trial = self.active_system.retract(self.x + length * step)
         return trial, length, self.active_system.passes()
 
-    def advance(self, trial: Array, length: float) -> None:
-        """Accept a trial, which is this share of the last step, and evaluate its equations."""
-        if self.active_system.arrive(trial):
-            self.begin(trial)
-        else:
-            self._move(trial, None)
-            self.state.accept(length, self.residual[self.one_sided])
+    def advance(self, trial: Array, length: float) -> bool:
+        """Accept a trial, which is this share of the last step, and evaluate its equations.
+
+        False, and nothing changes, where a term of one's own is not finite there.
+        """
+        here = self.x
+        try:
+            if self.active_system.arrive(trial):
+                self.begin(trial)
+            else:
+                self._move(trial, None)
+                self.state.accept(length, self.residual[self.one_sided])
+        except UndefinedTermError as error:
+            self.active_system.control.step_back(error)
+            self.begin(here)
+            return False
         self.residuals.append(max(self.hard, self.goal))
+        return True
 
     def step(
         self, damping: float, share: float, goal_share: float, goals: bool, measures: Measures, proximity: float = 1.0
@@ -239,6 +248,14 @@ class Iteration:
                 break
         return at
 
+    def _norms_at(self, x: Array) -> tuple[float, float]:
+        """The same at the variables x (7 n,); infinite where a term of one's own is not finite there."""
+        try:
+            return self._norms(self.system.residual(x))
+        except UndefinedTermError as error:
+            self.active_system.control.step_back(error)
+            return np.inf, np.inf
+
     def _norms(self, residual: Array) -> tuple[float, float]:
         """Norms of the errors of the constraints, and of the goals."""
         error = self._error(residual)
@@ -256,7 +273,7 @@ class Iteration:
     ) -> bool:
         """Whether a step reduces goal errors in the funnel, or restores the constraints (Gould and Toint 2010)."""
         hard, goal = after
-        if not np.isfinite(hard + goal):
+        if not hard + goal < np.inf:  # nor NaN
             return False
         if hard + goal <= 0.1 * self.tolerance:
             return True

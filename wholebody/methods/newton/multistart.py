@@ -132,11 +132,12 @@ class Search:
     def _starts(self, q: Array) -> Iterator[tuple[Array, str]]:
         problem = self.active_system.problem
         start = off_limits(problem, self.active_system.workspace.state, q)
-        if start is not None:
+        if start is not None and self.active_system.defined(start):
             yield start, " from a start with bent joints"
         rng = np.random.default_rng(self.settings.seed)
         for start in restarts(problem, self.active_system.workspace.state, q, rng, self.settings.restarts):
-            yield start, " from another start"
+            if self.active_system.defined(start):
+                yield start, " from another start"
 
     def _go(self, q: Array, how: str, iterations: int, system: FigureSystem | None = None) -> SearchResult:
         """The result from a posture (nq,), by the search's own equations or by others of the same problem."""

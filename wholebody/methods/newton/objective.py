@@ -22,6 +22,7 @@ from wholebody.methods.newton.tangent_rows import TangentRows, square_rows
 from wholebody.problem import Problem
 from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
 from wholebody.tasks.base import Measure
+from wholebody.tasks.checks import defined
 
 MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
 """Measures that are minimised over the revolute joints, and over a root that they count."""
@@ -134,4 +135,5 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
     others = np.ones(state.model.nv, dtype=bool)
     others[tangent] = False
     postures = [start, *random_postures(state.model, SAMPLES, seed=1)] if others.any() else []
-    return not any(np.abs(measure.gradient(state.update(q))[others]).max() > 0.0 for q in postures)
+    states = defined(measure, (state.update(q) for q in postures))
+    return not any(np.abs(measure.gradient(at)[others]).max() > 0.0 for at in states)

@@ -13,6 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.errors import UndefinedTermError
 from wholebody.methods.acceleration import Anderson
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
@@ -65,10 +66,10 @@ def refine(
             memory.reset()
             continue
         trial, length, free = run.shorten(trial, way, length)
+        free = free and run.advance(trial, length)
         if free:
-            run.advance(trial, length)
             run.iterate(BACK, goals=True, measures="keep")
-        value = measure(run.x)
+        value = _measured(active_system, measure, run.x)
         change = least - value
         if free and run.met and change > ROUNDING * abs(least):
             memory.record(run.x - best)
@@ -91,3 +92,12 @@ def refine(
                 break
             share *= SHORTER
     return best, len(run.residuals) - 1
+
+
+def _measured(active_system: ActiveSystem, measure: Callable[[Array], float], x: Array) -> float:
+    """The measures at x (7 n,); infinite where one of one's own is not finite there."""
+    try:
+        return measure(x)
+    except UndefinedTermError as error:
+        active_system.control.step_back(error)
+        return np.inf

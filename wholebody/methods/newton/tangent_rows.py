@@ -15,11 +15,14 @@ from collections.abc import Callable
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
+from wholebody.errors import TermError
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.tasks.base import Constraint, Goal, Measure
+from wholebody.tasks.checks import defined
+from wholebody.term_plan import checked_count
 
 SAMPLES = 3  # postures that tell which degrees of freedom a residual depends on
 
@@ -77,7 +80,7 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
     """Rows of a goal: its error."""
     error = np.atleast_1d(goal.error(bodies.start_state))
     return TangentRows(
-        bodies, label, goal.error, lambda state: state.dense_jacobian(goal.jacobian(state)),
+        bodies, label, *_of_rows(goal, goal.error, len(error)),
         np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
     )  # fmt: skip
 
@@ -88,18 +91,40 @@ def square_rows(bodies: FigureBodies, measure: Measure, label: str) -> TangentRo
 
     def squares(state: State) -> tuple[Array, Array]:
         found = measure.squares(state)
-        assert found is not None
+        if found is None:
+            raise TermError(measure, label, "it has squares at one posture and none at another; give them at all")
+        checked_count(measure, len(found[0]), count)
         return root * found[0], root * found[1]
 
-    if measure.squares(bodies.start_state) is None:
+    first = measure.squares(bodies.start_state)
+    if first is None:
         return None
+    count = len(first[0])
     postures = random_postures(bodies.model, SAMPLES, seed=1)
-    depends = np.any([squares(bodies.state_of(q))[1] != 0.0 for q in postures], axis=0)
-    count = len(depends)
+    seen = [squares(state)[1] != 0.0 for state in defined(measure, map(bodies.state_of, postures))]
+    depends = np.any(seen, axis=0) if seen else np.ones((count, bodies.model.nv), dtype=bool)
     return TangentRows(
         bodies, label, lambda state: squares(state)[0], lambda state: squares(state)[1], np.arange(count),
         np.ones(count), np.zeros(count), depends,
     )  # fmt: skip
+
+
+def _of_rows(
+    term: Goal | Constraint, ask: Callable[[State], Array], count: int
+) -> tuple[Callable[[State], Array], Callable[[State], Array]]:
+    """Values and derivatives of a term, which has as many rows at all postures as at the start."""
+
+    def value(state: State) -> Array:
+        found = np.atleast_1d(ask(state))
+        checked_count(term, len(found), count)
+        return found
+
+    def slope(state: State) -> Array:
+        found = state.dense_jacobian(term.jacobian(state))
+        checked_count(term, len(found), count)
+        return found
+
+    return value, slope
 
 
 def constraint_rows(
@@ -115,8 +140,7 @@ def constraint_rows(
     def rows(chosen: Indices, sign: Array, bound: Array) -> TangentRows | None:
         if not len(chosen):
             return None
-        slope = lambda state: state.dense_jacobian(term.jacobian(state))  # noqa: E731
-        return TangentRows(bodies, label, term.value, slope, chosen, sign, bound)
+        return TangentRows(bodies, label, *_of_rows(term, term.value, size[0]), chosen, sign, bound)
 
     sides = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
     return (

@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.errors import UndefinedTermError
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
@@ -116,11 +117,16 @@ class CurvedReach:
             if gain <= (flat * here.violation.total if held else enough):
                 converged = True
                 break
-            there = self._iterate_at(
-                lineariser, np.asarray(pin.integrate(lineariser.state.model, here.at.q, x)), within
-            )
-            ratio = (here.violation.total - there.violation.total) / gain
             step = float(np.abs(x).max(initial=0.0))
+            try:
+                there = self._iterate_at(
+                    lineariser, np.asarray(pin.integrate(lineariser.state.model, here.at.q, x)), within
+                )
+            except UndefinedTermError as error:
+                self._control.step_back(error)
+                radius = SHRINK * min(radius, step)
+                continue
+            ratio = (here.violation.total - there.violation.total) / gain
             blocked = ratio > WORTH and within > 0.0 and self._jumps(here, there)
             if ratio < POOR or blocked:
                 radius = SHRINK * min(radius, step)

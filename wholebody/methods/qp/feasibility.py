@@ -20,6 +20,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
+from wholebody.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
@@ -36,6 +37,7 @@ STEP = 0.2  # rad, m: most that a degree of freedom moves in a program; larger =
 LEAST_STEP = 1e-3  # rad, m: of the box; smaller = slower to end where steps go to and fro
 DAMPING = 0.05  # share of the squared error, as in `sqp`; less = dozens of bounds hold a step, and programs are dear
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
+SHORTEST = 0.3  # after a step to where a term of one's own is not finite
 WITHIN = 0.1  # m: pairs nearer than this get rows
 DIRECTIONS_LATER = 2.5e-3  # share of their weight that directions have while places come first
 PLACED = 0.01  # m: places nearer than this are reached, and directions count
@@ -105,16 +107,23 @@ class Feasibility:
                 continue
             if stuck:
                 q = self._turned_on(here, program, step, wrapped)
-                if q is None:
+                there = None if q is None else self._moved(q)
+                if there is None:
                     return _end(here, True, count)
-                here, history, box = self._iterate_at(q), [], STEP
+                here, history, box = there, [], STEP
                 last = np.zeros_like(step)
                 working_set.reset()
                 self._record(here, 2.0 * np.pi, "turned on")
                 continue
             box = max(SHORTER * box, LEAST_STEP) if float(step @ last) < 0.0 else min(LONGER * box, STEP)
             last = step
-            here = self._iterate_at(np.asarray(pin.integrate(self.lineariser.state.model, here.at.q, step)))
+            there = self._moved(np.asarray(pin.integrate(self.lineariser.state.model, here.at.q, step)))
+            if there is None:
+                if box < LEAST_STEP:
+                    return _end(here, False, count)
+                box, last = SHORTEST * min(box, float(np.abs(step).max())), np.zeros_like(step)
+                continue
+            here = there
             self._record(here, float(np.abs(step).max(initial=0.0)), "goal")
         return _end(here, here.violation.worst <= self.tolerance, count)
 
@@ -160,6 +169,14 @@ class Feasibility:
                 moved[limits.idx_q[index]] = there[index]
                 return moved
         return None
+
+    def _moved(self, q: Array) -> Iterate | None:
+        """What is at a posture (nq,); None where a term of one's own is not finite there."""
+        try:
+            return self._iterate_at(q)
+        except UndefinedTermError as error:
+            self.control.step_back(error)
+            return None
 
     def _iterate_at(self, q: Array) -> Iterate:
         at = self.lineariser.at(q, WITHIN)

@@ -110,7 +110,7 @@ class Search:
         least = least_left(self.contradictions)
         if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
-        hooked = [*hooked_hands(self.problem, self.lineariser.state, start)]
+        hooked = [*self._defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
         near = self.best.violation.left <= RELAXATION_DEPTH  # as far as limbs in the way keep goals off
         again = self._relaxed_probes(iter([start] if near else []))
@@ -126,7 +126,9 @@ class Search:
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
         if few := self._moving() < FEW:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
-        others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
+        others = self._defined(
+            (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
+        )
         for local, how in self._relaxed_probes(chain([] if near else [start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -144,7 +146,8 @@ class Search:
         """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
         if _held(self.best, self.settings.tolerance):
             return
-        if (q := posture_apart(self.problem, self.lineariser.workspace, self.best.q)) is not None:
+        q = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
+        if q is not None and self.lineariser.undefined(q) is None:
             self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
@@ -170,6 +173,10 @@ class Search:
             if not reached:
                 self._minima.add(probe.violation.total, probe.converged)
             yield self._try(probe.q, "restart") if reached else probe, "from another start"
+
+    def _defined(self, starts: Iterator[Array]) -> Iterator[Array]:
+        """Those of some postures (nq,) where all terms of one's own are finite."""
+        return (q for q in starts if self.lineariser.undefined(q) is None)
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
         """Look whether the goals can be met from a start, by few programs and without regard to the measures.
@@ -215,7 +222,7 @@ class Search:
         """Where nothing leads out of what the best posture is inside of, begin at the figure's other postures."""
         if _held(self.best, self.settings.tolerance) or self.contradictions:
             return
-        for q in named_postures(self.problem, self.lineariser.state, self.problem.start):
+        for q in self._defined(named_postures(self.problem, self.lineariser.state, self.problem.start)):
             if not self.control.over:
                 local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "probe").once(q)
                 self.spent += local.iterations
@@ -243,7 +250,7 @@ class Search:
             agreeing, others = AGREEING_FEW, throughout(self.problem, state, start, rng, REACH_TRIALS_FEW - 1)
         else:
             agreeing, others = AGREEING, restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)
-        for begin in chain([q], others):
+        for begin in chain([q], self._defined(others)):
             local = reach.through_everything(begin, REACHED * tolerance, self._at_most(REACH_TRIAL_PROGRAMS))
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance and begin is not q:

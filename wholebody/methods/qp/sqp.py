@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
+from wholebody.errors import UndefinedTermError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.linearisation import Linearisation, Lineariser
@@ -258,13 +259,18 @@ class SQP:
         fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
         if fast is not None:
             leap = self._moved(here, fast)
-            acceptance = self._judge(here, leap, step)
-            if acceptance.accepted and not self._jumps(here, leap):
+            acceptance = StepAcceptance(False, False, False, "undefined")
+            if leap is not None:
+                acceptance = self._judge(here, leap, step)
+            if leap is not None and acceptance.accepted and not self._jumps(here, leap):
                 self._record(leap, "accelerated")
                 return self._take(here, leap, program, step, fast, acceptance)
             self._ahead.rejected()
         dq = step.dq
         there = self._moved(here, dq)
+        if there is None:
+            self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
+            return None
         acceptance = self._judge(here, there, step)
         promising = not acceptance.accepted and self._promises(here, there)
         if (acceptance.accepted or promising) and self._jumps(here, there):
@@ -275,18 +281,22 @@ class SQP:
             self._ahead.reset()
             self._shift = np.zeros_like(self._shift)
             return there
-        if not acceptance.accepted and self._full_step:
-            self._full_step = self._damping < FULL_STEP_DAMPING[1]
-            self._damping = FULL_STEP_DAMPING[1] if self._full_step else 0.0
-            return None
         if not acceptance.accepted:
-            self._stretch = 1.0
-            self._radius = 0.3 * min(there.longest, self._radius)
-            self._damping = max(0.3, 2.0 * self._damping) if acceptance.by != "rejected measure" else self._damping
-            self._shift = np.zeros_like(self._shift)
-            self._ahead.reset()
+            self._reject(there.longest, acceptance.by)
             return None
         return self._take(here, there, program, step, dq, acceptance)
+
+    def _reject(self, longest: float, by: str) -> None:
+        """Ask for less after a step whose longest entry is this was rejected."""
+        if self._full_step:
+            self._full_step = self._damping < FULL_STEP_DAMPING[1]
+            self._damping = FULL_STEP_DAMPING[1] if self._full_step else 0.0
+            return
+        self._stretch = 1.0
+        self._radius = 0.3 * min(longest, self._radius)
+        self._damping = max(0.3, 2.0 * self._damping) if by != "rejected measure" else self._damping
+        self._shift = np.zeros_like(self._shift)
+        self._ahead.reset()
 
     def _take(
         self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, way: Array,
@@ -328,10 +338,14 @@ class SQP:
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
 
-    def _moved(self, here: Iterate, way: Array) -> Iterate:
-        """Where a way (nv,) leads."""
+    def _moved(self, here: Iterate, way: Array) -> Iterate | None:
+        """Where a way (nv,) leads; None where a term of one's own is not finite there."""
         q = pin.integrate(self.lineariser.state.model, here.at.q, way)
-        return self._iterate_at(q, float(np.abs(way).max(initial=0.0)))
+        try:
+            return self._iterate_at(q, float(np.abs(way).max(initial=0.0)))
+        except UndefinedTermError as error:
+            self.control.step_back(error)
+            return None
 
     def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
         within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))

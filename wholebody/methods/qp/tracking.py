@@ -12,6 +12,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import flag, number, posture, time_step
+from wholebody.errors import TermError
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.base import Method, goal_error, nearest_to
@@ -60,6 +61,7 @@ class QPStep(NamedTuple):
         share: how much of the program's displacement was gone: less than 1 where it was longer than what was looked at.
         collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
         path: shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
+        note: which term of one's own is not finite where the step would have ended, so that it was cut; else empty.
     """
 
     q: Array
@@ -74,6 +76,7 @@ class QPStep(NamedTuple):
     share: float
     collisions: tuple[Collision, ...] = ()
     path: tuple[tuple[float, Array], ...] = ()
+    note: str = ""
 
 
 class FrameStep(NamedTuple):
@@ -149,6 +152,7 @@ class QPTracker(NotCopyable):
         Raises:
             InputError: q is no posture, objects came to or left the scene, or another thread is within a step of this
                 tracker.
+            TermError: a term of one's own is not finite at q, or answers no numbers of its shape.
         """
         flag(measures, "measures")
         with self._alone:
@@ -156,7 +160,10 @@ class QPTracker(NotCopyable):
             self.workspace.refresh()
             self._renew()
             motion = self.workspace.next_frame()
-            return self._step(q, measures) if motion is None else self._among_moving(q, measures, motion)
+            try:
+                return self._step(q, measures) if motion is None else self._among_moving(q, measures, motion)
+            except TermError as error:
+                raise self.problem.placed(error) from None
 
     def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
         """One frame of a motion: programs until the goals are met as a frame should, or another brings little.
@@ -227,7 +234,7 @@ class QPTracker(NotCopyable):
         self._left = None
         if depth > OUT:
             free = free_end(model, q, OUT, self._projection_rows)
-            if free is not None:
+            if free is not None and self._lineariser.undefined(free) is None:
                 path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
         self._program.take(self.dt)
         collisions = motion.collisions(path)
@@ -283,10 +290,25 @@ class QPTracker(NotCopyable):
             program.ended(following, displacement, share == 1.0)
         else:
             program.ended(following, displacement, False)
+        note = ""
+        undefined = self._lineariser.undefined(following)
+        if undefined is not None:
+            note = f"the step was cut: {self.problem.placed(undefined)}"
+            displacement, share, following = self._cut(at.q, displacement, share)
+            program.ended(following, displacement, False)
         return QPStep(
             following, displacement, displacement / self.dt, len(at.contacts.distance), len(at.gap), answer.exact,
-            answer.iterations, answer.by, self._working_set.solver.counted(), share,
+            answer.iterations, answer.by, self._working_set.solver.counted(), share, note=note,
         )  # fmt: skip
+
+    def _cut(self, q: Array, displacement: Array, share: float) -> tuple[Array, float, Array]:
+        """The part of a step from q (nq,) that ends where all terms of one's own are finite; none if there is none."""
+        for _ in range(CUTS):
+            displacement, share = 0.5 * displacement, 0.5 * share
+            following = np.asarray(pin.integrate(self.workspace.model, q, displacement))
+            if self._lineariser.undefined(following) is None:
+                return displacement, share, following
+        return 0.0 * displacement, 0.0, q.copy()
 
     def _corrected(
         self, at: PackedLinearisation, displacement: Array, share: float, midway: bool
@@ -393,6 +415,7 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),
+        note=next((step.note for step in steps if step.note), ""),
         iterations=sum(step.iterations for step in steps),
         programs=dict(sum((Counter(step.programs) for step in steps), Counter[str]())),
         share=min(step.share for step in steps),
