@@ -244,6 +244,11 @@ class FixedAttributes:
         return value
 
 
+def settle(record: object, name: str, value: object) -> None:
+    """Keep a value of a record as its check returned it: what counts on with it gets a float, not a fraction."""
+    object.__setattr__(record, name, value)
+
+
 def function(value: _T, what: str) -> _T:
     """Something that can be called, or None.
 

@@ -161,6 +161,9 @@ def _differences(term: Any, state: State, q: Array) -> tuple[Array, Array]:
         step[dof] = STEP
         ahead = _value(term, state.update(pin.integrate(model, q, step)))
         behind = _value(term, state.update(pin.integrate(model, q, -step)))
+        if not ahead.shape == behind.shape == here.shape:
+            sizes = f"{len(here)} values at one posture and {len(ahead)} and {len(behind)} beside it"
+            raise InputError(f"{type(term).__name__}: it has {sizes}; give as many at all postures")
         columns.append((ahead - behind) / (2.0 * STEP))
         kinks.append(np.abs(ahead + behind - 2.0 * here) / (2.0 * STEP))
     return np.array(columns).T, np.array(kinks).T

@@ -15,7 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP, number, posture, time_step
+from wholebody.checks import TIME_STEP, number, posture, settle, time_step
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
@@ -44,9 +44,9 @@ class Spring:
 
     def __post_init__(self) -> None:
         """Check the constants."""
-        number(self.stiffness, "Spring: stiffness", SOFTEST, GREATEST, "N/m")
-        number(self.damping, "Spring: damping", 0.0, GREATEST, "N s/m")
-        number(self.mass, "Spring: mass", LIGHTEST, HEAVIEST, "kg")
+        settle(self, "stiffness", number(self.stiffness, "Spring: stiffness", SOFTEST, GREATEST, "N/m"))
+        settle(self, "damping", number(self.damping, "Spring: damping", 0.0, GREATEST, "N s/m"))
+        settle(self, "mass", number(self.mass, "Spring: mass", LIGHTEST, HEAVIEST, "kg"))
 
     def transition(self, time: float) -> Array:
         """The matrix (2, 2) that takes x and x' over a time of so many seconds.

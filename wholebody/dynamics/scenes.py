@@ -101,7 +101,7 @@ def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float 
     Raises:
         InputError: nothing in the scene moves by itself, or a value of the wrong kind, shape or range.
     """
-    whole(frames, "frames", 1, MOST_FRAMES)
+    frames = whole(frames, "frames", 1, MOST_FRAMES)
     if not any(thing.body is not None for thing in scene.objects.values()):
         raise InputError(f"{name}: nothing moves by itself; give an object a density or a mass")
     track = Track.of(scene.figure, np.tile(posture(q, scene.model.nq), (frames, 1)), dt, name)

@@ -80,13 +80,13 @@ class Lift:
     def __post_init__(self) -> None:
         """Check the values."""
         for name in ("horizontal", "vertical", "travel"):
-            checks.number(getattr(self, name), f"Lift: {name}", 0.0, 3.0, "m")
-        checks.number(self.asymmetry, "Lift: asymmetry", 0.0, pi, "rad")
-        checks.number(self.frequency, "Lift: frequency", 0.0, 60.0, "lifts a minute")
-        checks.number(self.duration, "Lift: duration", 0.0, 8.0, "hours")
+            checks.settle(self, name, checks.number(getattr(self, name), f"Lift: {name}", 0.0, 3.0, "m"))
+        checks.settle(self, "asymmetry", checks.number(self.asymmetry, "Lift: asymmetry", 0.0, pi, "rad"))
+        checks.settle(self, "frequency", checks.number(self.frequency, "Lift: frequency", 0.0, 60.0, "lifts a minute"))
+        checks.settle(self, "duration", checks.number(self.duration, "Lift: duration", 0.0, 8.0, "hours"))
         checks.choice(self.coupling, COUPLINGS, "Lift: coupling")
         if self.load is not None:
-            checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg")
+            checks.settle(self, "load", checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg"))
 
     def __str__(self) -> str:
         """The limit, what makes it zero, and the lifting index of a load."""

@@ -74,7 +74,7 @@ class Owas:
             InputError: a code out of its range.
         """
         for name, most in {"back": 4, "arms": 3, "legs": 7, "load": 3}.items():
-            checks.whole(getattr(self, name), f"Owas: {name}", 1, most)
+            checks.settle(self, name, checks.whole(getattr(self, name), f"Owas: {name}", 1, most))
 
     @property
     def code(self) -> str:

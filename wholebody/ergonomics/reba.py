@@ -89,9 +89,9 @@ class RebaParts:
             InputError: a score out of its range.
         """
         for name, most in {"neck": 3, "trunk": 5, "legs": 4, "upper_arm": 6, "lower_arm": 2, "wrist": 3}.items():
-            checks.whole(getattr(self, name), f"RebaParts: {name}", 1, most)
+            checks.settle(self, name, checks.whole(getattr(self, name), f"RebaParts: {name}", 1, most))
         for name in ("load", "coupling", "activity"):
-            checks.whole(getattr(self, name), f"RebaParts: {name}", 0, 3)
+            checks.settle(self, name, checks.whole(getattr(self, name), f"RebaParts: {name}", 0, 3))
 
     @property
     def body(self) -> int:

@@ -105,9 +105,9 @@ class RulaParts:
         """
         limits = {"upper_arm": 6, "lower_arm": 3, "wrist": 4, "wrist_twist": 2, "neck": 6, "trunk": 6, "legs": 2}
         for name, most in limits.items():
-            checks.whole(getattr(self, name), f"RulaParts: {name}", 1, most)
-        checks.whole(self.muscle, "RulaParts: muscle", 0, 1)
-        checks.whole(self.force, "RulaParts: force", 0, 3)
+            checks.settle(self, name, checks.whole(getattr(self, name), f"RulaParts: {name}", 1, most))
+        checks.settle(self, "muscle", checks.whole(self.muscle, "RulaParts: muscle", 0, 1))
+        checks.settle(self, "force", checks.whole(self.force, "RulaParts: force", 0, 3))
 
     @property
     def arm(self) -> int:

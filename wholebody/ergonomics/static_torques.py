@@ -72,7 +72,7 @@ def static_torques(
     person = check_person(figure, "static_torques: figure")
     q = checks.posture(q, person.model.nq, "static_torques: q")
     load = checks.number(load, "static_torques: load", 0.0, HEAVIEST, "kg")
-    checks.flag(seated, "static_torques: seated")
+    seated = checks.flag(seated, "static_torques: seated")
     strength = Strength() if strength is None else checks.instance(
         strength, Strength, "static_torques: strength", "give wb.Strength(percentile=50, sex='female')"
     )  # fmt: skip

@@ -50,8 +50,10 @@ class FieldOfView:
     def __post_init__(self) -> None:
         """Check the values."""
         for name in ("horizontal", "up", "down"):
-            checks.number(getattr(self, name), f"FieldOfView: {name}", 1e-3, pi, "rad")
-        checks.number(self.declination, "FieldOfView: declination", -pi / 2, pi / 2, "rad")
+            checks.settle(self, name, checks.number(getattr(self, name), f"FieldOfView: {name}", 1e-3, pi, "rad"))
+        checks.settle(
+            self, "declination", checks.number(self.declination, "FieldOfView: declination", -pi / 2, pi / 2, "rad")
+        )
 
     def off(self, direction: Array) -> float:
         """How far a direction (3,) in the eyes' axes is off the line of sight: 1 at the border of the cone.

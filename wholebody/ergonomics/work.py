@@ -57,13 +57,13 @@ class Work:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        checks.number(self.load, "Work: load", 0.0, HEAVIEST, "kg")
+        checks.settle(self, "load", checks.number(self.load, "Work: load", 0.0, HEAVIEST, "kg"))
         checks.choice(self.coupling, COUPLINGS, "Work: coupling")
         for name in ("static", "repeated", "shock", "unstable", "arms_supported", "legs_supported", "walking"):
-            checks.flag(getattr(self, name), f"Work: {name}")
+            checks.settle(self, name, checks.flag(getattr(self, name), f"Work: {name}"))
         for name in ("seated", "back_supported"):
             if getattr(self, name) is not None:
-                checks.flag(getattr(self, name), f"Work: {name}")
+                checks.settle(self, name, checks.flag(getattr(self, name), f"Work: {name}"))
         if self.seated and self.walking:
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 

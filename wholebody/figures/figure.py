@@ -370,7 +370,7 @@ class Figure(checks.FixedAttributes):
         """
         if self.root != "free":
             raise InputError(f"{self.name} has a fixed root and stays where it is; load it with root='free'")
-        if getattr(scene, "model", None) is not self.model:
+        if getattr(scene, "model", None) is not self.model or not hasattr(scene, "piece_owner"):
             raise InputError(f"grounded: give a scene of this figure, not {checks.shown(scene)}; see wb.Scene(figure)")
         return grounded(self.model, self.segments, self._checked(q), scene)
 

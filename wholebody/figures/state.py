@@ -122,7 +122,7 @@ class State:
             index = whole(index, "the index of a frame", 0, self.model.nframes - 1)
         placement = self._frames.get(index)
         if placement is None:
-            whole(index, "the index of a frame", 0, self.model.nframes - 1)
+            index = whole(index, "the index of a frame", 0, self.model.nframes - 1)
             placement = self._frames[index] = pin.updateFramePlacement(self.model, self.data, index)
         return placement
 

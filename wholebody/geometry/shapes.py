@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.arrays import Array
-from wholebody.checks import array, choice, number, path, shown, whole
+from wholebody.checks import array, choice, number, path, settle, shown, whole
 from wholebody.errors import InputError
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
@@ -338,8 +338,8 @@ class Mesh(Shape):
     def __post_init__(self) -> None:
         scale = number(self.scale, "Mesh scale", 1e-12, 1e12, "metres for each unit of the file, such as 0.001")
         choice(self.up, ("z", "y"), "Mesh up")
-        whole(self.max_vertices, "Mesh max_vertices", *MAX_VERTICES)
-        number(self.threshold, "Mesh threshold", *THRESHOLD)
+        settle(self, "max_vertices", whole(self.max_vertices, "Mesh max_vertices", *MAX_VERTICES))
+        settle(self, "threshold", number(self.threshold, "Mesh threshold", *THRESHOLD))
         if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
             object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):

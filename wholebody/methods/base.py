@@ -209,7 +209,7 @@ class SolvingTracker(NotCopyable):
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
         if tolerance is not None:
-            number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+            tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
         return SolvedStep(np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds)
 

@@ -139,11 +139,12 @@ def ctrl_c_ends_all() -> Iterator[None]:
         signal.signal(signal.SIGINT, signal.default_int_handler)
 
 
-def check_time_limit(value: float | None) -> None:
-    """Check a method's setting `time_limit`.
+def check_time_limit(value: float | None) -> float | None:
+    """A method's setting `time_limit`.
 
     Raises:
         InputError: it is neither None nor a positive number.
     """
-    if value is not None and not (isinstance(value, float) and value == np.inf):
-        number(value, "time_limit", *LIMITS, "s, math.inf for no limit, or None")
+    if value is None or (isinstance(value, float) and value == np.inf):
+        return value
+    return number(value, "time_limit", *LIMITS, "s, math.inf for no limit, or None")

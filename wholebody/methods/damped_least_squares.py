@@ -24,6 +24,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.assessment import goal_errors
+from wholebody.checks import settle
 from wholebody.figures.state import State
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
@@ -70,7 +71,7 @@ class DampedLeastSquares(SolvesAnew):
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, damping=DAMPING)
-        check_time_limit(self.time_limit)
+        settle(self, "time_limit", check_time_limit(self.time_limit))
 
     @property
     def name(self) -> str:
@@ -155,9 +156,7 @@ class _Descent:
         asked = (*problem.goals, *problem.stated, *problem.bounds, *problem.measures)
         for _ in range(HALVINGS):
             moved = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, q, way)))
-            error = undefined(
-                (*problem.goals, *problem.stated, *problem.bounds, *problem.measures), self._state.update(moved)
-            )
+            error = undefined(asked, self._state.update(moved))
             if error is None:
                 return moved
             self._control.step_back(error)

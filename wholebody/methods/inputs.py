@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.checks import instance, number, whole
+from wholebody.checks import instance, number, settle, whole
 from wholebody.problem import Problem
 
 
@@ -21,12 +21,11 @@ class Range(NamedTuple):
     high: float
     whole: bool = False
 
-    def check(self, value: object, name: str) -> None:
-        """Raise InputError if a value is not in the range."""
+    def check(self, value: object, name: str) -> float:
+        """The value as a number; an InputError if it is not in the range."""
         if self.whole:
-            whole(value, name, int(self.low), int(self.high))
-        else:
-            number(value, name, self.low, self.high)
+            return whole(value, name, int(self.low), int(self.high))
+        return number(value, name, self.low, self.high)
 
 
 TOLERANCE = Range(1e-10, 0.1)
@@ -52,10 +51,10 @@ def check_problem(problem: object, what: str) -> Problem:
 
 
 def check_settings(method: object, **ranges: Range) -> None:
-    """Check settings of a method by their names.
+    """Check settings of a method by their names, and keep them as numbers.
 
     Raises:
         InputError: one is not a number of its range.
     """
     for name, allowed in ranges.items():
-        allowed.check(getattr(method, name), name)
+        settle(method, name, allowed.check(getattr(method, name), name))

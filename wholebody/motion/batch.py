@@ -115,7 +115,7 @@ def avoid_many(
         raise InputError(f"{what}: two pieces of equipment are named {checks.shown(twice)}; give each another name")
     worn: dict[str, Worn] = {label(one): one for one in pieces}
     ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
-    checks.flag(hold_feet, f"{what}: hold_feet")
+    hold_feet = checks.flag(hold_feet, f"{what}: hold_feet")
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")

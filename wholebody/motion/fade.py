@@ -48,9 +48,9 @@ class Fade:
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        checks.number(self.clearance, "Fade: clearance", 0.0, 0.5, "m")
-        checks.number(self.fade, "Fade: fade", 0.0, 100.0, "s")
-        checks.whole(self.rounds, "Fade: rounds", 1, 1000)
+        checks.settle(self, "clearance", checks.number(self.clearance, "Fade: clearance", 0.0, 0.5, "m"))
+        checks.settle(self, "fade", checks.number(self.fade, "Fade: fade", 0.0, 100.0, "s"))
+        checks.settle(self, "rounds", checks.whole(self.rounds, "Fade: rounds", 1, 1000))
 
     @property
     def name(self) -> str:

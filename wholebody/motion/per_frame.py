@@ -48,8 +48,8 @@ class PerFrame:
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m")
-        checks.flag(self.backward, "PerFrame: backward")
+        checks.settle(self, "clearance", checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m"))
+        checks.settle(self, "backward", checks.flag(self.backward, "PerFrame: backward"))
 
     @property
     def name(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices
 from wholebody.checks import array as checked_array
-from wholebody.checks import instance, listed, text, time_step, whole
+from wholebody.checks import instance, listed, settle, text, time_step, whole
 from wholebody.errors import InputError
 from wholebody.tracking.tracks import LARGEST
 
@@ -67,7 +67,7 @@ class SkeletonMotion:
         object.__setattr__(self, "parents", _parents(self.parents, self.name))
         if len(self.parents) != count:
             raise InputError(f"{self.name}: {len(self.parents)} parents for {count} joints; give one for each")
-        time_step(self.dt, f"{self.name}: dt")
+        settle(self, "dt", time_step(self.dt, f"{self.name}: dt"))
         places = checked_array(self.positions, f"{self.name}: positions", "(n, j, 3), metres")
         frames = len(places) if places.ndim else 0
         shapes = {"offsets": (count, 3), "rotations": (frames, count, 3, 3), "positions": (frames, count, 3)}
@@ -99,8 +99,8 @@ class SkeletonMotion:
         Raises:
             InputError: there is no frame among them.
         """
-        whole(first, f"{self.name}: first", 0, len(self))
-        whole(last, f"{self.name}: last", 0, len(self))
+        first = whole(first, f"{self.name}: first", 0, len(self))
+        last = whole(last, f"{self.name}: last", 0, len(self))
         frames = slice(first, last)
         return self._with(rotations=self.rotations[frames], positions=self.positions[frames])
 

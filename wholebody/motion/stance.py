@@ -64,7 +64,7 @@ class StanceFeet:
         if self.feet is not None:
             object.__setattr__(self, "feet", tuple(checks.listed(self.feet, "StanceFeet: feet", "['left_foot']")))
         for name, most in (("speed", 100.0), ("height", 10.0), ("least", 100.0)):
-            checks.number(getattr(self, name), f"StanceFeet: {name}", 0.0, most)
+            checks.settle(self, name, checks.number(getattr(self, name), f"StanceFeet: {name}", 0.0, most))
 
     def names(self, figure: Figure) -> tuple[str, ...]:
         """Frames of the feet of a figure.

@@ -96,7 +96,9 @@ class Strength:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        checks.number(self.percentile, "Strength: percentile", PERCENTILES[0], PERCENTILES[-1])
+        checks.settle(
+            self, "percentile", checks.number(self.percentile, "Strength: percentile", PERCENTILES[0], PERCENTILES[-1])
+        )
         checks.known(self.sex, SEXES, "sex", "Strength")
 
     def limits(self, figure: Figure) -> tuple[Array, Array]:

@@ -152,9 +152,9 @@ def torques(
         InputError: something else than a clip, a value out of range, or a figure without mass or feet.
     """
     clip = checks.instance(clip, Clip, "torques: clip", "read one with wb.read_clip(path, figure)")
-    checks.number(friction, "torques: friction", 1e-3, 100.0)
+    friction = checks.number(friction, "torques: friction", 1e-3, 100.0)
     if cutoff is not None:
-        checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
+        cutoff = checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
     strength = (
         Strength()
         if strength is None

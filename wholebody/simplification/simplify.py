@@ -76,7 +76,7 @@ def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
         InputError: it is no problem, or objects were added to or removed from its scene after it was made.
     """
     checks.instance(problem, Problem, "simplify: problem", "state one with wb.Problem(scene, goals=[...])")
-    checks.flag(lock, "lock")
+    lock = checks.flag(lock, "lock")
     return leave_out(problem, Parts(lock=lock))
 
 

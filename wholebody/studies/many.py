@@ -129,7 +129,7 @@ def solve_many(
     what = "solve_many"
     named = _named(problems, what)
     running = Running.checked(what, method, jobs, cluster, seconds, progress)
-    checks.flag(warm_start, f"{what}: warm_start")
+    warm_start = checks.flag(warm_start, f"{what}: warm_start")
     store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
     cases = []
     for name, problem in named:

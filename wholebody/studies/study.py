@@ -88,7 +88,7 @@ def study(
     else:
         raise InputError(f"study: task is {checks.shown(task)}; give the path of a task file, or a function")
     running = Running.checked(what, chosen, jobs, cluster, seconds, progress)
-    checks.flag(warm_start, f"{what}: warm_start")
+    warm_start = checks.flag(warm_start, f"{what}: warm_start")
     given = {"people": people, "targets": targets, "layouts": layouts}
     factors = [_named(values, f"{what}: {name}") for name, values in given.items()]
     if not any(factors):

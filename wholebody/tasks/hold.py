@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
-from wholebody.checks import flag, shown
+from wholebody.checks import flag, settle, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
@@ -45,7 +45,7 @@ class Hold(Constraint):
 
     def __post_init__(self) -> None:
         """Check the values."""
-        flag(self.orientation, f"Hold({shown(self.frame)}): orientation")
+        settle(self, "orientation", flag(self.orientation, f"Hold({shown(self.frame)}): orientation"))
         if self.at is not None:
             object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({shown(self.frame)}): at"))
 

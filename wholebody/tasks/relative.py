@@ -6,7 +6,7 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 from wholebody.arrays import Array
-from wholebody.checks import flag, shown
+from wholebody.checks import flag, settle, shown
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings, filled
@@ -47,7 +47,7 @@ class Relative(PlacementGoal):
     def __post_init__(self) -> None:
         """Check the values."""
         where = f"Relative({shown(self.frame)}, {shown(self.to)})"
-        flag(self.orientation, f"{where}: orientation")
+        settle(self, "orientation", flag(self.orientation, f"{where}: orientation"))
         if self.placement is not None:
             object.__setattr__(self, "_placement", inputs.target_placement(self.placement, f"{where}: placement"))
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))

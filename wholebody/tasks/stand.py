@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
-from wholebody.checks import flag, listed, number, shown
+from wholebody.checks import flag, listed, number, settle, shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
@@ -60,7 +60,7 @@ class Stand(Constraint):
         if not feet:
             raise InputError(f"{where}: feet is empty; give a list of names, such as ['left_foot', 'right_foot']")
         object.__setattr__(self, "feet", feet)
-        flag(self.balance, f"{where}: balance")
+        settle(self, "balance", flag(self.balance, f"{where}: balance"))
         object.__setattr__(self, "margin", number(self.margin, f"{where}: margin", 0.0, 1.0, "m"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:

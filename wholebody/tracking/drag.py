@@ -202,7 +202,7 @@ class Drag(NotCopyable, Generic[Answer]):
         """
         self._run: ProblemDrag | AssemblyDrag
         if isinstance(problem, Assembly):
-            time_step(dt, "dt")
+            dt = time_step(dt, "dt")
             if method not in ("qp", "newton"):
                 raise InputError(
                     f"Drag: an assembly is solved by Newton steps, not by {shown(method)}; leave method out"

@@ -95,7 +95,7 @@ class FrameLoop(NotCopyable):
         known(overlap, OVERLAPS, "way to remove overlap", "overlap")
         dt = time_step(dt, "dt")
         SEED.check(seed, "seed")
-        flag(rigid, "rigid")
+        rigid = flag(rigid, "rigid")
         for name in listed(touching, "FrameLoop: touching", "['ball']"):
             known(name, scene.objects, "object", "touching")
         self.scene, self.overlap, self.count, self._touching = scene, overlap, 0, tuple(touching)

@@ -36,7 +36,7 @@ def moving_goal(problem: Problem, number: int) -> Point | Frame:
     """
     if not problem.goals:
         raise InputError("the problem has no goals; give it a Point or a Frame")
-    whole(number, "the number of the goal", 0, len(problem.goals) - 1)
+    number = whole(number, "the number of the goal", 0, len(problem.goals) - 1)
     goal = problem.goals[number]
     if not isinstance(goal, (Point, Frame)):
         raise InputError(f"goals[{number}] is a {type(goal).__name__}; only a Point or a Frame can be moved")

@@ -91,7 +91,7 @@ def spread(corners: ArrayLike, frames: int | None = None, dt: float = FRAME) -> 
         raise InputError(f"a path has shape {given.shape}; give at least two corners, shape (k, 3), metres")
     places = np.array([point(corner, f"corners[{place}]") for place, corner in enumerate(given)])
     if frames is not None:
-        whole(frames, "frames", 1, MOST_FRAMES)
+        frames = whole(frames, "frames", 1, MOST_FRAMES)
     dt = time_step(dt, "dt")
     way = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
     if frames is None and way[-1] / (SPEED * dt) > MOST_FRAMES:

@@ -56,7 +56,7 @@ class ScenePlan:
             InputError: fewer than one frame, or a seed or a time step out of range.
         """
         if frames is not None:
-            whole(frames, "frames", 1, MOST_FRAMES)
+            frames = whole(frames, "frames", 1, MOST_FRAMES)
         SEED.check(seed, "seed")
         dt = number(dt, "dt", *TIME_STEPS, "s")
         figure = load(self.figure)

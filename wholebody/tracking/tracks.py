@@ -11,7 +11,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import array, instance, known, listed, shown, text, time_step, whole
+from wholebody.checks import array, instance, known, listed, settle, shown, text, time_step, whole
 from wholebody.checks import posture as checked_posture
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
@@ -79,7 +79,7 @@ class Track:
         q = array(self.q, f"{self.name}: q", "postures, shape (frames, nq)").copy()
         if q.ndim != 2 or not len(q):
             raise InputError(f"{self.name}: a track is (frames, nq) with at least one frame, not {q.shape}")
-        time_step(self.dt, f"{self.name}: dt")
+        settle(self, "dt", time_step(self.dt, f"{self.name}: dt"))
         joints = listed(self.joints, f"{self.name}: joints", "figure.joints")
         if not all(isinstance(joint, str) for joint in joints):
             raise InputError(f"{self.name}: joints is {shown(self.joints)}; give names, such as figure.joints")
@@ -108,8 +108,8 @@ class Track:
         Raises:
             InputError: there is no frame among them.
         """
-        whole(first, "first", 0, len(self))
-        whole(last, "last", 0, len(self))
+        first = whole(first, "first", 0, len(self))
+        last = whole(last, "last", 0, len(self))
         if not first < last:
             raise InputError(f"{self.name}: frames {first} to {last} of {len(self)}; give 0 <= first < last")
         return Track(self.q[first:last], self.dt, self.joints, self.name)
@@ -120,7 +120,7 @@ class Track:
         Raises:
             InputError: the number is less than one.
         """
-        whole(frames, f"{self.name}: frames", 1, MOST_FRAMES)
+        frames = whole(frames, f"{self.name}: frames", 1, MOST_FRAMES)
         return Track(self.q[np.arange(frames) % len(self)], self.dt, self.joints, self.name)
 
     def check(self, figure: Figure) -> None:

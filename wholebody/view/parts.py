@@ -113,7 +113,7 @@ class Parts:
     def contacts(self, q: Array, within: float = 0.05) -> _Nothing:
         """No contacts."""
         checks.posture(q, self.model.nq)
-        checks.number(within, "within", -FARTHEST, FARTHEST, "m")
+        within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
         return _Nothing()
 
 

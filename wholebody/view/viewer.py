@@ -90,7 +90,7 @@ class Viewer:
         see_through = checks.listed(see_through, "see_through", "['table']")
         for name in see_through:
             checks.known(name, viewed.objects, "object", "see_through")
-        checks.flag(names, "names")
+        names = checks.flag(names, "names")
         checks.text(title, "title")
         self._host, self._port = checks.text(host, "host"), checks.whole(port, "port", 0, 65535)
         self.title = title
@@ -332,7 +332,7 @@ class Viewer:
             InputError: nothing is shown yet, the size is out of range, or the file cannot be written.
             MissingPackageError: there is no Chromium.
         """
-        checks.flag(legend, "legend")
+        legend = checks.flag(legend, "legend")
         place = check_writable(checks.path(path, "path"))
         wanted = [command for command in self._commands() if command.op != ANIMATION]
         return write(place, self._screenshots.picture(wanted, size, legend=legend))

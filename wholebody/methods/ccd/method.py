@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import posture
+from wholebody.checks import posture, settle
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
@@ -88,7 +88,7 @@ class CCD:
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=CCD_TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
-        check_time_limit(self.time_limit)
+        settle(self, "time_limit", check_time_limit(self.time_limit))
 
     @property
     def name(self) -> str:

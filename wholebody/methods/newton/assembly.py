@@ -250,11 +250,11 @@ class Assembly(AssemblyJoints):
             InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
             UnknownNameError: no such linear algebra.
         """
-        number(tolerance, "tolerance", FINEST, TOLERANCE.high)
-        whole(iterations, "iterations", int(ITERATIONS.low), int(ITERATIONS.high))
+        tolerance = number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        iterations = whole(iterations, "iterations", int(ITERATIONS.low), int(ITERATIONS.high))
         known(algebra, NAMES, "linear algebra")
         choice(inequalities, KINDS, "inequalities")
-        flag(nearest, "nearest")
+        nearest = flag(nearest, "nearest")
         with self._alone:
             prepared = self._ready(algebra)
             active = prepared.active
@@ -287,7 +287,7 @@ class Assembly(AssemblyJoints):
         Raises:
             InputError: there are no bodies, the tolerance is out of range, or another thread solves this assembly.
         """
-        number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        tolerance = number(tolerance, "tolerance", FINEST, TOLERANCE.high)
         with self._alone:
             active = self._ready(None).active
             start = active.begin(self.variables(), self._goal_batches())

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from wholebody.checks import choice, known
+from wholebody.checks import choice, known, settle
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
@@ -60,7 +60,7 @@ class Newton:
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
         known(self.algebra, NAMES, "linear algebra")
         choice(self.inequalities, KINDS, "inequalities")
-        check_time_limit(self.time_limit)
+        settle(self, "time_limit", check_time_limit(self.time_limit))
 
     @property
     def name(self) -> str:

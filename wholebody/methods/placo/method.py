@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.arrays import Array, Indices
-from wholebody.checks import choice
+from wholebody.checks import choice, settle
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
@@ -62,7 +62,7 @@ class Placo(SolvesAnew):
             InputError: a setting out of range.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
-        check_time_limit(self.time_limit)
+        settle(self, "time_limit", check_time_limit(self.time_limit))
         choice(self.holds, HOLDS, "holds")
 
     @property

@@ -6,7 +6,7 @@ import time
 from dataclasses import dataclass, replace
 
 from wholebody.assessment import assess
-from wholebody.checks import flag
+from wholebody.checks import flag, settle
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
@@ -61,9 +61,9 @@ class QP:
             UnknownNameError: no such QP solver.
         """
         check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS, seed=SEED)
-        flag(self.hot_start, "hot_start")
-        flag(self.measures, "measures")
-        check_time_limit(self.time_limit)
+        settle(self, "hot_start", flag(self.hot_start, "hot_start"))
+        settle(self, "measures", flag(self.measures, "measures"))
+        settle(self, "time_limit", check_time_limit(self.time_limit))
         make_solver(self.solver)
 
     @property

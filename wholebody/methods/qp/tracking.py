@@ -154,7 +154,7 @@ class QPTracker(NotCopyable):
                 tracker.
             TermError: a term of one's own is not finite at q, or answers no numbers of its shape.
         """
-        flag(measures, "measures")
+        measures = flag(measures, "measures")
         with self._alone:
             self.problem.check_fresh()
             self.workspace.refresh()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from wholebody.arrays import Array
-from wholebody.checks import choice, listed, number, text, whole
+from wholebody.checks import choice, listed, number, settle, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
@@ -86,15 +86,15 @@ class Bisection:
             frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
             checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
             object.__setattr__(self, "evaluation", checked)
-        number(self.buffer, "Bisection: buffer", 0.0, MOST_BUFFER, "percent")
-        whole(self.least, "Bisection: least", 1, MOST_FRAMES)
+        settle(self, "buffer", number(self.buffer, "Bisection: buffer", 0.0, MOST_BUFFER, "percent"))
+        settle(self, "least", whole(self.least, "Bisection: least", 1, MOST_FRAMES))
         choice(self.interpolation, ("linear", "quadratic"), "Bisection: interpolation")
         for name in ("planes", "frozen"):
             given = getattr(self, name)
             if given is not None:
                 names = listed(given, f"Bisection: {name}", "['left_elbow']")
                 object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
-        number(self.room, "Bisection: room", 0.0, MOST_ROOM, "m")
+        settle(self, "room", number(self.room, "Bisection: room", 0.0, MOST_ROOM, "m"))
         method_for_motions(self.method)
 
     @property

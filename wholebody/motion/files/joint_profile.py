@@ -101,7 +101,7 @@ def sampled(times: Array, curves: Array, figure: Figure, dt: float, name: str = 
         array(times, "times", "seconds, shape (k,)"),
         array(curves, "curves", "values, shape (k, 6 + joints)"),
     )
-    time_step(dt, "dt")
+    dt = time_step(dt, "dt")
     wide = GLOBAL + figure.model.nq - ROOT_SIZE
     if times.ndim != 1 or len(times) < 2 or not (np.diff(times) > 0.0).all() or not np.isfinite(times).all():
         raise InputError("times are at least two, ascending and finite, seconds")

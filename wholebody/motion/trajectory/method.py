@@ -67,12 +67,12 @@ class Trajectory:
 
     def __post_init__(self) -> None:
         """Check the settings."""
-        checks.number(self.clearance, "Trajectory: clearance", 0.0, 0.5, "m")
+        checks.settle(self, "clearance", checks.number(self.clearance, "Trajectory: clearance", 0.0, 0.5, "m"))
         if self.time is not None:
-            checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s")
-        checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s")
-        checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000)
-        checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0)
+            checks.settle(self, "time", checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s"))
+        checks.settle(self, "margin", checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s"))
+        checks.settle(self, "iterations", checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000))
+        checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.Strength(percentile=50)")
         banded_solver(self.solver)
