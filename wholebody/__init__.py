@@ -12,17 +12,21 @@ The public names are loaded when they are first used, so that ``import wholebody
 
 from __future__ import annotations
 
-from importlib import import_module
-from typing import TYPE_CHECKING
+from wholebody.interrupts import end_quietly
 
-from wholebody.errors import (
+end_quietly()  # before anything that takes time
+
+from importlib import import_module  # noqa: E402
+from typing import TYPE_CHECKING  # noqa: E402
+
+from wholebody.errors import (  # noqa: E402
     FileFormatError,
     InputError,
     MissingPackageError,
     UnknownNameError,
     WholebodyError,
 )
-from wholebody.version import __version__
+from wholebody.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:
     from wholebody.assessment import Assessment, assess

@@ -11,6 +11,7 @@ import os
 import warnings
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from numbers import Number
 from operator import index
 from pathlib import Path
 from reprlib import Repr
@@ -289,6 +290,10 @@ def array(value: object, what: str, wanted: str) -> Array:
         found = np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError):
         found = np.empty(0, dtype=object)
+    if found.dtype.kind == "O" and found.size and all(isinstance(one, Number) for one in found.flat):
+        real_ones = [_real(one) for one in found.flat]  # fractions and decimals
+        if None not in real_ones:
+            return np.array(real_ones, dtype=np.float64).reshape(found.shape)
     if found.dtype.kind not in NUMERIC:
         raise InputError(f"{what} is {shown(value)}, not numbers; give {wanted}")
     real: Array = found if found.dtype == np.float64 else found.astype(np.float64)

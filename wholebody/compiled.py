@@ -132,7 +132,17 @@ def _loop_type() -> Any:
     class Kept(FunctionCache):  # type: ignore[misc]
         def load_overload(self, sig: Any, target_context: Any) -> Any:
             rtsys.initialize(target_context)
-            return self._load_overload(sig, target_context)
+            try:
+                return self._load_overload(sig, target_context)
+            except Exception as error:  # cut short or unreadable, pickle raises anything: as if nothing were kept
+                logging.getLogger(__name__).info("%s: what was kept of it cannot be read (%s)", self._name, error)
+                with suppress(OSError):
+                    self.flush()
+                return None
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with suppress(Exception):  # a folder that is full or read-only: the next process compiles anew
+                self._save_overload(sig, data)
 
     class Loop(CPUDispatcher):  # type: ignore[misc]
         def enable_caching(self) -> None:

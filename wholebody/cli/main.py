@@ -7,10 +7,13 @@ import logging
 import os
 import sys
 from collections.abc import Sequence
+from contextlib import suppress
 from importlib import import_module
+from io import TextIOWrapper
 
 from wholebody.cli.arguments import Parser
 from wholebody.errors import WholebodyError
+from wholebody.interrupts import raise_again
 from wholebody.version import __version__
 
 COMMANDS = (
@@ -52,19 +55,57 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns:
         The exit code: 0, 1 or 2 (see `EXIT_CODES`), 130 after Ctrl-C.
     """
-    given = sys.argv[1:] if argv is None else list(argv)
-    arguments = parser([name for name in COMMANDS if name in given[:1]] or COMMANDS).parse_args(given)
-    _tell_progress()
     try:
-        return int(arguments.run(arguments))
+        if not _ready():
+            return 2
+        try:
+            return _run(sys.argv[1:] if argv is None else list(argv))
+        finally:
+            sys.stdout.flush()  # what cannot be written is told, and not at the end of the process
     except WholebodyError as error:
-        print(f"wholebody: {error}", file=sys.stderr)
+        _say(str(error))
         return 2
     except KeyboardInterrupt:
         return 130
     except BrokenPipeError:  # the reader of our output, such as head, has closed the pipe
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _discard_output()
         return 0
+    except OSError as error:
+        where = f": {error.filename}" if error.filename else ""
+        _say(f"the output cannot be written: {error.strerror or error}{where}")
+        _discard_output()
+        return 2
+
+
+def _run(given: list[str]) -> int:
+    arguments = parser([name for name in COMMANDS if name in given[:1]] or COMMANDS).parse_args(given)
+    raise_again()
+    _tell_progress()
+    return int(arguments.run(arguments))
+
+
+def _ready() -> bool:
+    """Have whatever is printed be written, in escapes where the encoding lacks a letter; whether there is a stdout."""
+    if sys.stderr is None:
+        sys.stderr = open(os.devnull, "w")  # noqa: SIM115 (for the rest of the process)
+    if sys.stdout is None:
+        _say("stdout is closed, so nothing can be told; send it to a file or to /dev/null")
+        return False
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+    return True
+
+
+def _say(told: str) -> None:
+    with suppress(OSError):
+        print(f"wholebody: {told}", file=sys.stderr, flush=True)
+
+
+def _discard_output() -> None:
+    """What is left to be written goes nowhere: Python would try again, and tell, when the process ends."""
+    with suppress(OSError, ValueError):  # a stdout of somebody else has no file
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def _tell_progress() -> None:
