@@ -128,6 +128,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     if not isinstance(problem, Problem):
         raise InputError(f"assess: problem is {a(type(problem))}, not a Problem; state one with wb.Problem(scene)")
     q = posture(q, problem.scene.model.nq)
+    problem.scene.figure.warn_of_angles(q, "assess: q")
     built = problem.scene.built
     problem.check_fresh()
     with all_pairs(built).borrow() as pairs:

@@ -219,6 +219,7 @@ class Problem(checks.FixedAttributes):
         """
         result = copy.copy(self)
         result.start = checks.posture(q, self.scene.model.nq, "with_start: q")
+        self.scene.figure.warn_of_angles(result.start, "with_start: q")
         return result
 
     @contextmanager
@@ -343,6 +344,7 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
     if isinstance(start, str):
         return np.array(figure.posture(start), dtype=float)
     q = checks.posture(start, scene.model.nq, "start")
+    figure.warn_of_angles(q, "start")
     if np.abs(q).max(initial=0.0) > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
     normal = pin.normalize(scene.model, q)

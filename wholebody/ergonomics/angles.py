@@ -155,6 +155,7 @@ def body_angles(figure: Figure, q: Array) -> BodyAngles:
         InputError: a figure without these names, or q has the wrong shape or is not finite.
     """
     check_person(figure, "body_angles: figure")
+    figure.warn_of_angles(checks.posture(q, figure.model.nq, "body_angles: q"), "body_angles: q")
     now = _Body(figure, checks.posture(q, figure.model.nq, "body_angles: q"))
     upright = _Body(figure, pin.neutral(figure.model))
     line, line_upright = now.trunk(), upright.trunk()

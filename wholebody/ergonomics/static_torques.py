@@ -71,6 +71,7 @@ def static_torques(
     """
     person = check_person(figure, "static_torques: figure")
     q = checks.posture(q, person.model.nq, "static_torques: q")
+    person.warn_of_angles(q, "static_torques: q")
     load = checks.number(load, "static_torques: load", 0.0, HEAVIEST, "kg")
     seated = checks.flag(seated, "static_torques: seated")
     strength = Strength() if strength is None else checks.instance(

@@ -114,6 +114,7 @@ def sight(scene: Scene, q: Array, point: Array, field: FieldOfView = LARGEST) ->
     """
     checks.instance(scene, Scene, "sight: scene", "make one with wb.Scene(figure)")
     q = checks.posture(q, scene.model.nq, "sight: q")
+    scene.figure.warn_of_angles(q, "sight: q")
     target = inputs.point(point, "sight: point")
     checks.instance(field, FieldOfView, "sight: field", "give one such as FieldOfView()")
     if EYES not in scene.figure.frames:

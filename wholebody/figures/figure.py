@@ -24,6 +24,9 @@ LARGEST = 1e6
 FAR_OUT = 1.0
 """Radians beyond a limit from which a value was probably meant in degrees."""
 
+MOST_TURNED = 4.0 * np.pi
+"""Radians, two turns: a joint without limits that is turned farther was probably meant in degrees."""
+
 SLIDING = "JointModelP"
 """How the names of Pinocchio's prismatic joints begin."""
 
@@ -73,6 +76,22 @@ def check_model(model: pin.Model, name: str) -> None:
         joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
         speed = model.velocityLimit[wrong[0]]
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
+
+
+def _turning(model: pin.Model) -> tuple[Indices, Array, Array]:
+    """Places in a posture (n,) of joints that turn by one number, and least and greatest values, two turns if none."""
+    joints = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1]
+    places = np.array([j.idx_q for j in joints if not j.shortname().startswith(SLIDING)], dtype=np.intp)
+    low, high = model.lowerPositionLimit[places], model.upperPositionLimit[places]
+    return places, np.where(np.isfinite(low), low, -MOST_TURNED), np.where(np.isfinite(high), high, MOST_TURNED)
+
+
+def _as_degrees(what: str, value: float, low: float, high: float) -> str:
+    """What is told of an angle [rad] that is far out of its limits."""
+    if low <= np.radians(value) <= high:
+        out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
+        return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
+    return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"
 
 
 class Figure(checks.FixedAttributes):
@@ -144,6 +163,7 @@ class Figure(checks.FixedAttributes):
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
+        self._turning = _turning(model)
         self.followers = MappingProxyType(followers_of(model))
         root = 6 if self.root == "free" else 0
         self.effort_weights = np.ones(model.nv)
@@ -307,22 +327,51 @@ class Figure(checks.FixedAttributes):
         for name, given in values.items():
             joint = self.model.joints[self.joint_id(name)]
             value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
-            if joint.nq == 1 and not joint.shortname().startswith(SLIDING):
-                low, high = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
-                if not low - FAR_OUT <= value <= high + FAR_OUT and low <= np.radians(value) <= high:
-                    told = f"joint {name!r} is {value:g} rad, far out of its limits; {value:g} degrees are"
-                    checks.warn(f"{told} {np.radians(value):.4g}")
             if name in self.followers:
                 q[joint.idx_q] = self.followers[name].leading(value)
+                self._warn(name, value, joint.idx_q, q)
             elif joint.nq == 1:
                 q[joint.idx_q] = value
+                self._warn(name, value, joint.idx_q, q)
             elif (joint.nq, joint.nv) == (2, 1):
+                if abs(value) > MOST_TURNED:
+                    checks.warn(_as_degrees(f"joint {name!r}", value, -np.inf, np.inf))
                 q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 raise InputError(
                     f"joint {name!r} has {joint.nv} degrees of freedom; set its part of the posture itself"
                 )
         return q
+
+    def warn_of_angles(self, q: Array, what: str) -> bool:
+        """Warn of the joint that is farthest out of its limits, if its angle was probably meant in degrees.
+
+        Args:
+            q: (nq,) a posture, or (n, nq) several.
+            what: they are, for the message: "start".
+
+        Returns:
+            Whether it was said.
+        """
+        places, low, high = self._turning
+        values = np.atleast_2d(q)[:, places]
+        beyond = np.maximum(low - values, values - high)
+        if not beyond.size or not float(beyond.max()) > FAR_OUT:
+            return False
+        frame, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
+        joint = next(joint for joint in self.model.joints if joint.idx_q == places[column] and joint.nq == 1)
+        where = f"{what}: joint {self.model.names[joint.id]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
+        limits = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
+        checks.warn(_as_degrees(where, float(values[frame, column]), *limits))
+        return True
+
+    def _warn(self, name: str, value: float, place: int, q: Array) -> None:
+        """Warn if a value of a joint, which is at a place of q (nq,), was probably meant in degrees."""
+        places, low, high = self._turning
+        for column in np.flatnonzero(places == place):
+            if not low[column] - FAR_OUT <= q[place] <= high[column] + FAR_OUT:
+                limits = self.model.lowerPositionLimit[place], self.model.upperPositionLimit[place]
+                checks.warn(_as_degrees(f"joint {name!r}", value, *limits))
 
     def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
         """Return lower and upper bound, each (nv,), of the displacement of q (nq,) within the limits.
@@ -386,6 +435,7 @@ class Figure(checks.FixedAttributes):
             InputError: no joint remains.
         """
         q = self.neutral if posture is None else self.posture(posture) if isinstance(posture, str) else posture
+        self.warn_of_angles(self._checked(q), "reduced: posture")
         parts = reduced_parts(self, self.joint_names(joints), self._checked(q))
         return Figure(self.name, parts.model, parts.geometry, self.detail, parts.description, parts.visual)
 

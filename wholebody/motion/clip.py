@@ -58,6 +58,7 @@ class Clip:
             )
         check_frames(q, self.name, lambda column: column_name(self.figure, column))
         q = self._normalised(q)
+        self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
 

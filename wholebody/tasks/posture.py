@@ -90,6 +90,7 @@ class Posture(Goal):
             except UnknownNameError as error:
                 raise UnknownNameError(error.kind, error.name, error.known, "Posture") from None
         q = numbers(self.target, (scene.model.nq,), "Posture: target")
+        scene.figure.warn_of_angles(q, "Posture: target")
         normal = np.asarray(pin.normalize(scene.model, q))
         if np.abs(normal - q).max(initial=0.0) > ROUNDING:
             raise InputError("Posture: target holds a quaternion that is not of unit length; use pin.normalize")

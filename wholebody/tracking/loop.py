@@ -104,6 +104,7 @@ class FrameLoop(NotCopyable):
         reason = invalid_reason(scene, q)
         if reason:
             raise InputError(f"frame 0: {reason}; begin with a posture of {scene.figure.name}")
+        self._said = scene.figure.warn_of_angles(q, "start")
         self.shown, self._note = free_start(scene, q, rigid)
         self._workspace = scene.workspace()
         self._strategy = self._strategy_for(overlap, dt, seed, rigid)
@@ -126,6 +127,7 @@ class FrameLoop(NotCopyable):
         if reason:
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
+            self._said = self._said or self.scene.figure.warn_of_angles(goal, "tracked")  # once for all frames
             resolution = self._strategy.resolve(self.shown, self._within_limits(goal))
         if motion is not None:
             resolution, collisions = self._kept_from_moving(resolution, motion)

@@ -140,6 +140,7 @@ class Track:
             raise InputError(f"{self.name} {what}; {figure.name} takes {figure.model.nq} values: {_order(figure)}")
         if self.joints != figure.joints:
             raise InputError(f"{self.name}: its joints are in another order than {figure.name}'s; use posed(...)")
+        figure.warn_of_angles(self.q, self.name)
         if figure.root == "free":
             off = np.abs(np.linalg.norm(self.q[:, 3:ROOT_SIZE], axis=1) - 1.0)
             if off.max() > UNIT_TOLERANCE:

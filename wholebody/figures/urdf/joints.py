@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi, radians
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -10,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.checks import shown
+from wholebody.checks import shown, warn
 from wholebody.errors import FileFormatError
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
@@ -18,6 +19,9 @@ from wholebody.records import with_values
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 FOLLOWING = ("revolute", "continuous", "prismatic")
+
+TWO_TURNS = 4.0 * pi
+"""Limits beyond this were probably meant in degrees."""
 
 UNLIMITED = 1e4
 """Limits beyond this, radians or metres, count as no limits: some files write 1e16 for no limit."""
@@ -151,6 +155,9 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
         lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
         if lower > upper:
             raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
+        if kind == "revolute" and TWO_TURNS < max(abs(lower), abs(upper)) <= UNLIMITED:
+            told = f"{place} has the limits {lower:g} and {upper:g} rad, more than two turns"
+            warn(f"{told}; {lower:g} and {upper:g} degrees are {radians(lower):.4g} and {radians(upper):.4g}")
         if limit.get("lower") is None and limit.get("upper") is None:
             notes.append(f"joint {shown(name)}: its <limit> has neither lower nor upper, so it moves without limits")
             lower, upper = -np.inf, np.inf

@@ -1,0 +1,89 @@
+"""Angles that were meant in degrees are said, wherever postures and descriptions of robots come in."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.tracking.loop import FrameLoop
+from wholebody.tracking.tracks import Track
+
+ELBOW = "right_elbow_flexion"
+SAID = r"'right_elbow_flexion'.* is 90 rad, far out of its limits; 90 degrees are 1.571"
+
+
+@pytest.fixture(scope="module")
+def scene() -> wb.Scene:
+    return wb.Scene(wb.load("human"))
+
+
+@pytest.fixture(scope="module")
+def wrong(scene: wb.Scene) -> np.ndarray:
+    q = scene.figure.neutral.copy()
+    q[scene.model.joints[scene.figure.joint_id(ELBOW)].idx_q] = 90.0
+    return q
+
+
+@pytest.mark.parametrize(
+    "enter",
+    [
+        lambda scene, q: scene.figure.with_joints(scene.figure.neutral, {ELBOW: 90.0}),
+        lambda scene, q: wb.Problem(scene, q),
+        lambda scene, q: wb.Problem(scene).with_start(q),
+        lambda scene, q: wb.Problem(scene, goals=[wb.Posture(q)]),
+        lambda scene, q: wb.assess(wb.Problem(scene), q),
+        lambda scene, q: wb.Clip(scene.figure, np.array([scene.figure.neutral, q]), 0.02),
+        lambda scene, q: Track.of(scene.figure, [q], 0.02).check(scene.figure),
+        lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
+        lambda scene, q: scene.figure.reduced("left_arm", q),
+        lambda scene, q: wb.body_angles(scene.figure, q),
+    ],
+    ids=["with_joints", "start", "with_start", "goal", "assess", "clip", "track", "frame", "reduced", "body_angles"],
+)
+def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
+    with pytest.warns(UserWarning, match=SAID):
+        enter(scene, wrong)
+
+
+def test_far_out_of_the_limits_is_said_also_where_degrees_would_be(scene):
+    with pytest.warns(UserWarning, match=r"is 720 rad, far out of its limits, which are 0 and .* rad"):
+        scene.figure.with_joints(scene.figure.neutral, {ELBOW: 720.0})
+
+
+def test_postures_within_and_a_little_beyond_the_limits_are_not_said(scene):
+    figure = scene.figure
+    high = figure.model.upperPositionLimit[figure.model.joints[figure.joint_id(ELBOW)].idx_q]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for name in figure.postures:
+            wb.Problem(scene, figure.posture(name))
+        wb.Problem(scene, figure.with_joints(figure.neutral, {ELBOW: high + 0.9}))
+
+
+ROBOT = """<robot name="arm"><link name="base"/><link name="tip">
+<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="turn" type="{kind}"><parent link="base"/><child link="tip"/><axis xyz="0 0 1"/><origin rpy="{rpy}"/>
+<limit lower="{low}" upper="{high}" velocity="1" effort="1"/></joint></robot>"""
+
+
+@pytest.mark.parametrize(
+    ("rpy", "kind", "low", "said"),
+    [
+        ("0 90 0", "revolute", -1.0, r"rpy='0 90 0', more than a turn in radians; .* degrees are 0 1.571 0"),
+        ("0 0 0", "revolute", -90.0, r"limits -90 and 1 rad, more than two turns; .* degrees are -1.571"),
+    ],
+)
+def test_degrees_in_the_description_of_a_robot_are_said(tmp_path, rpy, kind, low, said):
+    (tmp_path / "arm.urdf").write_text(ROBOT.format(rpy=rpy, kind=kind, low=low, high=1))
+    with pytest.warns(UserWarning, match=said):
+        wb.load(str(tmp_path / "arm.urdf"))
+
+
+def test_turns_without_limits_are_said_beyond_two_turns(tmp_path):
+    (tmp_path / "arm.urdf").write_text(ROBOT.format(rpy="0 0 0", kind="continuous", low=0, high=0))
+    figure = wb.load(str(tmp_path / "arm.urdf"))
+    with pytest.warns(UserWarning, match=r"'turn' is 90 rad, more than two turns; 90 degrees are 1.571"):
+        figure.with_joints(figure.neutral, {"turn": 90.0})
