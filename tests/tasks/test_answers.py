@@ -1,15 +1,17 @@
-"""No NaN, infinity or odd answer of a term of one's own passes a judge, and methods step back from where there is one."""
+"""No NaN, infinity or odd answer of a term of one's own passes a judge, and methods step back from where one is."""
 
 from __future__ import annotations
 
 import pickle
+import re
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.errors import TermError, UndefinedTermError
+from wholebody.errors import UndefinedTermError
 from wholebody.figures.state import Wrench
 
 FAR = 0.15  # m: farther to the front than this the terms below are not defined; the goal is at 0.3
@@ -107,18 +109,29 @@ IDS = [f"{kind.__name__} {part} {np.ravel(bad)[0]}" for kind, part, bad in TERMS
 @pytest.mark.parametrize(("kind", "part", "bad"), TERMS, ids=IDS)
 def test_the_assessment_names_a_term_that_is_not_finite(scene, kind, part, bad):
     problem, q = stated(scene, kind(part, bad)), reached(scene)
-    with pytest.raises(UndefinedTermError, match=rf"{kind.__name__}.*: its {part} has .*which is not finite"):
+
+    def judge():
         judged = wb.assess(problem, q)
-        judged.optimality, judged.blockers  # noqa: B018
-        assert not judged.met(1e9) or not judged.holds(1e9) or (kind is Bend and np.isfinite(judged.measure))
-        problem.lineariser(problem.workspace()).at(q, 0.1)  # a curvature is none of the posture's, but the method's
+        return judged.optimality, judged.blockers, problem.lineariser(problem.workspace()).at(q, 0.1)
+
+    with pytest.raises(UndefinedTermError, match=rf"{kind.__name__}.*: its {part} has .*which is not finite"):
+        judge()
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "dls"])
-@pytest.mark.parametrize(("kind", "part", "bad"), TERMS, ids=IDS)
+@pytest.mark.parametrize(
+    ("kind", "part", "bad", "method"),
+    [
+        *((*term, method) for term in TERMS for method in ("qp", "dls")),
+        *((*term, "newton") for term in TERMS if term[1] in ("error", "gradient") and np.isnan(term[2]).all()),
+    ],
+)
 def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method):
     problem = stated(scene, kind(part, bad))
-    chosen = {"qp": wb.QP(restarts=1, budget=40), "newton": wb.Newton(restarts=0), "dls": wb.DampedLeastSquares()}
+    chosen = {
+        "qp": wb.QP(restarts=1, budget=40),
+        "newton": wb.Newton(restarts=0, iterations=12),
+        "dls": wb.DampedLeastSquares(),
+    }
     if chosen[method].accepts(problem) is not None:
         pytest.skip("the method takes no such term")
     solution = wb.solve(problem, chosen[method])
@@ -127,8 +140,6 @@ def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method)
     place = {Reach: r"goals\[0\] \(Reach\)", Keep: r"constraints\[2\], Keep", Bend: r"measures\[0\] \(Bend\)"}
     assert np.isfinite(solution.assessment.goal_error)
     assert "of iteration" in solution.message
-    import re
-
     assert re.search(rf"{place[kind]}: its {part} has \S+ at a posture of iteration \d+", solution.message)
 
 
@@ -154,10 +165,9 @@ def test_trackers_stay_where_terms_are_finite(scene, method, term):
 
 
 def test_an_assessment_with_nan_meets_and_holds_nothing(scene):
-    from dataclasses import replace
-
     judged = wb.assess(wb.Problem(scene), scene.figure.neutral)
-    assert judged.met(1.0) and judged.holds(1.0)
+    assert judged.met(1.0)
+    assert judged.holds(1.0)
     for name in ("goal_error", "goal_angle"):
         assert not replace(judged, **{name: np.nan}).met(1e9)
     assert not replace(judged, goal_errors=(0.0, np.nan)).met(1e9)
@@ -166,33 +176,23 @@ def test_an_assessment_with_nan_meets_and_holds_nothing(scene):
 
 
 class Odd(_Own, wb.Goal):
-    """Answers something else from the tenth time that it is asked."""
+    """Answers something else from the fifth time that it is asked."""
 
     asked = 0
 
     def error(self, state):
         self.asked += 1
         usual = self.tip.moved(state) - (0.3, 0.0, 0.2)
-        return self.bad if self.part == "error" and self.asked > 9 else usual
+        return self.bad if self.part == "error" and self.asked > LATE else usual
 
     def jacobian(self, state):
-        return (
-            self.bad if self.part == "jacobian" and self.asked > 9 else Wrench(self.tip.wrench(state), self.tip.joint)
-        )
+        odd = self.part == "jacobian" and self.asked > LATE
+        return self.bad if odd else Wrench(self.tip.wrench(state), self.tip.joint)
 
 
-ODD = [
-    "far",
-    None,
-    np.ones(3) * 1j,
-    object(),
-    np.zeros(2),
-    np.zeros(4),
-    np.zeros((3, 3)),
-    [None] * 3,
-    {},
-    [[1], [1, 2]],
-]
+LATE = 4
+SHAPES = [np.zeros(2), np.zeros(4), np.zeros((3, 3))]
+ODD = ["far", None, np.ones(3) * 1j, object(), *SHAPES, [None] * 3, {}, [[1], [1, 2]]]
 
 
 @pytest.mark.parametrize("part", ["error", "jacobian"])
@@ -213,7 +213,7 @@ def test_odd_answers_are_one_sentence(scene, part, bad):
         lambda problem: wb.check_derivatives(problem.goals[0], scene), assess_often, track,
     ):  # fmt: skip
         problem = wb.Problem(scene, goals=[Odd(part, bad)])
-        with pytest.raises(TermError if use is not None else wb.InputError, match="Odd"):
+        with pytest.raises(wb.InputError, match="Odd"):
             use(problem)
 
 

@@ -87,6 +87,8 @@ class FigureSystem(ActiveSystem):
     def retarget(self) -> None:
         """Update to the problem's new goals."""
         problem = self.problem
+        if any(map(is_own, problem.goals)):
+            self.bodies.state_of(problem.start)  # where they are asked for their rows: a step may have been taken back
         if self._yielding:
             asked = constraint_equations(problem, self.bodies).yielding()
         else:
