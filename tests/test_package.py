@@ -19,6 +19,7 @@ PACKAGE = Path(wholebody.__file__).parent
 HEAVY = ("pinocchio", "coal", "numpy", "scipy", "osqp", "placo", "meshcat", "trimesh", "matplotlib", "rich")
 ROOMS = (
     *(
+        "interrupts",
         "errors",
         "arrays",
         "version",

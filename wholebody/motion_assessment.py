@@ -99,7 +99,7 @@ def cone_violation(scene: Scene, q: Array) -> float:
     if not scene.figure.cones:
         return 0.0
     cones, state = ReachCones().resolve(scene, q[0]), State(scene.model)
-    return max(0.0, *(-float(cones.value(state.update(posture)).min()) for posture in q))
+    return float(np.max([0.0, *(-float(cones.value(state.update(posture)).min()) for posture in q)]))
 
 
 def velocities(model: pin.Model, q: Array, dt: float) -> Array:

@@ -9,7 +9,7 @@ import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from importlib import import_module
-from io import TextIOWrapper
+from io import TextIOWrapper, UnsupportedOperation
 
 from wholebody.cli.arguments import Parser
 from wholebody.errors import WholebodyError
@@ -91,6 +91,8 @@ def _ready() -> bool:
     if sys.stdout is None:
         _say("stdout is closed, so nothing can be told; send it to a file or to /dev/null")
         return False
+    with suppress(UnsupportedOperation):  # a stdout of somebody else has no file
+        os.write(sys.stdout.fileno(), b"")  # tells whether it can be written, before anything is computed
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")

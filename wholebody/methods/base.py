@@ -266,4 +266,4 @@ def nearest_to(problem: Problem, q: Array) -> Problem:
 def goal_error(problem: Problem, workspace: Workspace, q: Array) -> float:
     """Largest norm of a goal's error at a posture (nq,), metres or radians."""
     state = workspace.state.update(q)
-    return max((float(np.linalg.norm(goal.error(state))) for goal in problem.goals), default=0.0)
+    return float(np.max([0.0, *(np.linalg.norm(goal.error(state)) for goal in problem.goals)]))

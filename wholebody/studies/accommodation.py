@@ -116,9 +116,10 @@ def accommodation(
     point = None if sees is None else inputs.point(sees, "accommodation: sees")
     population = people(count, sexes)
     records = study(task, people=population, method=method, jobs=jobs, folder=folder, progress=progress)
-    reaches = tuple(one.q is not None and max(one.goal_error, one.goal_angle) <= REACHED for one in records)
+    reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
     fits = tuple(
-        one.q is not None and max(one.penetration, one.limit_violation, one.constraint_violation) <= FITS
+        one.q is not None
+        and all(missed <= FITS for missed in (one.penetration, one.limit_violation, one.constraint_violation))
         for one in records
     )
     seen = None

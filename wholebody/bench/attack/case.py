@@ -20,6 +20,7 @@ PATTERN = (
     + ("file", "sweep", "file", "solve") * 3
     + ("file", "solve", "file", "stream") * 2
     + ("file", "solve", "file", "argument")
+    + ("file", "own term", "file", "solve")
 )
 """Kinds of cases in turn: two mutated files for each solve, as the targets of a long run have it."""
 KINDS = tuple(dict.fromkeys(PATTERN))
@@ -77,7 +78,7 @@ class Case:
     @property
     def name(self) -> str:
         """Name of the folder in which a failure is written."""
-        return f"{self.kind}-{self.seed}-{self.number:06d}"
+        return f"{'-'.join(self.kind.split())}-{self.seed}-{self.number:06d}"
 
 
 def kind_of(number: int) -> str:

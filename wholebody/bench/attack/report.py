@@ -23,6 +23,7 @@ ATTACKED = {
     "sweep": "sweeps against a fine subdivision",
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
+    "own term": "solves and steps with terms of one's own that are not finite, or answer something odd",
 }
 INDEX = "README.md"
 UNWRITTEN = '''"""A case that cannot be written."""
