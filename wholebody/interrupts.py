@@ -23,9 +23,12 @@ def raise_again() -> None:
 
 def _is_command(words: list[str]) -> bool:
     """Whether a process was started by ``wholebody`` or ``python -m wholebody``, with these words."""
-    for number, word in enumerate(words[1:], start=1):
+    rest = iter(words[1:])
+    for word in rest:
         if word == "-m":
-            return words[number + 1 : number + 2] == ["wholebody"]
-        if not word.startswith("-"):
+            return next(rest, "") == "wholebody"
+        if word in ("-X", "-W"):
+            next(rest, "")
+        elif not word.startswith("-"):
             return word.replace("\\", "/").rpartition("/")[2] in ("wholebody", "wholebody.exe", "wholebody-script.py")
     return False

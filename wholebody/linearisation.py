@@ -6,7 +6,7 @@ contacts. Terms of other classes join through their own methods, and cost only t
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from functools import lru_cache
 from math import sqrt
@@ -275,15 +275,16 @@ class Lineariser:
             self._measure(plan.other_measures, measure)
 
     def undefined(self, q: Array) -> UndefinedTermError | None:
-        """Why a posture (nq,) cannot be used: a term of one's own is not finite there; None where all are.
-
-        Without terms of one's own nothing is computed.
-        """
+        """Why a term of one's own is not finite at a posture (nq,); None where all are, or where there are none."""
         plan = self._plan
         if not (plan.others or plan.other_bounds or plan.other_measures):
             return None
         own = [*(other.term for other in plan.others), *plan.other_bounds, *plan.other_measures]
         return undefined(own, self.state.update(q), self.dt)
+
+    def defined(self, postures: Iterable[Array]) -> Iterator[Array]:
+        """Those of some postures (nq,) where all terms of one's own are finite."""
+        return (q for q in postures if self.undefined(q) is None)
 
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
         return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
@@ -328,12 +329,7 @@ class Lineariser:
 
     def _write_rows(self, wrench: Wrench, rows: Array) -> None:
         """Write the rows (m, nv) of a wrench."""
-        joint, against, last = int(wrench.joint), int(wrench.against), self.state.model.njoints - 1
-        if not (0 <= joint <= last and 0 <= against <= last):
-            raise InputError(f"a Wrench is of the joints {joint} and {against}; give indices from 0 to {last}")
-        wrenches = np.ascontiguousarray(wrench.rows, dtype=float)
-        if wrenches.shape != (len(rows), 6):
-            raise InputError(f"the rows of a Wrench have shape {wrenches.shape}; give ({len(rows)}, 6)")
+        wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
         self._kernel.wrench_rows(
             wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
         )

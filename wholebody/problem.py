@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from functools import cache
 from operator import is_
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import pinocchio as pin
@@ -29,6 +29,8 @@ from wholebody.term_plan import TermPlan, make_plan
 from wholebody.workspace import Workspace
 
 LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
+
+_TermError = TypeVar("_TermError", bound=TermError)
 
 _KINDS: dict[str, tuple[type, ...]] = {
     "goals": (Goal,), "constraints": (Constraint,), "bounds": (Bound,), "measures": (Measure,)
@@ -183,10 +185,10 @@ class Problem(checks.FixedAttributes):
             found.append(f"{name} (by default)" if id(term) in defaults else f"constraints[{next(places)}], {name}")
         return tuple(found)
 
-    def placed(self, error: TermError) -> TermError:
+    def placed(self, error: _TermError) -> _TermError:
         """What is told of a term, with its place in this problem in front: "goals[1] (Mine)"."""
         groups = (("goals", self.goals), ("bounds", self.bounds), ("measures", self.measures))
-        names = [*zip(self.constraint_names, self.constraints, strict=True)]
+        names: list[tuple[str, object]] = [*zip(self.constraint_names, self.constraints, strict=True)]
         names += [(f"{what}[{n}] ({in_words(term)})", term) for what, terms in groups for n, term in enumerate(terms)]
         found = next((name for name, term in names if term is error.term), error.name)
         return type(error)(error.term, found, error.told)

@@ -50,7 +50,7 @@ def test_letters_that_stdout_lacks_are_written_as_escapes(tmp_path):
     folder = tmp_path / "\u00fcn\u00ef"
     folder.mkdir()
     out = folder / "hand.urdf"
-    found = run("figure", "hand", "--out", str(out), environment={"PYTHONIOENCODING": "ascii"})
+    found = run("figure", "human", "--out", str(out), environment={"PYTHONIOENCODING": "ascii"})
     assert found.returncode == 0, found.stderr
     assert out.exists()
     assert "\\xfcn\\xef" in found.stdout + found.stderr

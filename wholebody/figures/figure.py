@@ -12,6 +12,7 @@ import pinocchio as pin
 from wholebody import checks
 from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.degrees import Turning, warn_of_turns
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.reduction import reduced_parts
@@ -20,15 +21,6 @@ from wholebody.records import as_dict
 
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
-
-FAR_OUT = 1.0
-"""Radians beyond a limit from which a value was probably meant in degrees."""
-
-MOST_TURNED = 4.0 * np.pi
-"""Radians, two turns: a joint without limits that is turned farther was probably meant in degrees."""
-
-SLIDING = "JointModelP"
-"""How the names of Pinocchio's prismatic joints begin."""
 
 HEAVIEST = 1e9
 """Kilograms: greatest mass carried by one joint."""
@@ -76,22 +68,6 @@ def check_model(model: pin.Model, name: str) -> None:
         joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
         speed = model.velocityLimit[wrong[0]]
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
-
-
-def _turning(model: pin.Model) -> tuple[Indices, Array, Array]:
-    """Places in a posture (n,) of joints that turn by one number, and least and greatest values, two turns if none."""
-    joints = [joint for joint in list(model.joints)[1:] if joint.nq == joint.nv == 1]
-    places = np.array([j.idx_q for j in joints if not j.shortname().startswith(SLIDING)], dtype=np.intp)
-    low, high = model.lowerPositionLimit[places], model.upperPositionLimit[places]
-    return places, np.where(np.isfinite(low), low, -MOST_TURNED), np.where(np.isfinite(high), high, MOST_TURNED)
-
-
-def _as_degrees(what: str, value: float, low: float, high: float) -> str:
-    """What is told of an angle [rad] that is far out of its limits."""
-    if low <= np.radians(value) <= high:
-        out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
-        return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
-    return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"
 
 
 class Figure(checks.FixedAttributes):
@@ -163,7 +139,7 @@ class Figure(checks.FixedAttributes):
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
-        self._turning = _turning(model)
+        self._turning = Turning(model)
         self.followers = MappingProxyType(followers_of(model))
         root = 6 if self.root == "free" else 0
         self.effort_weights = np.ones(model.nv)
@@ -329,13 +305,12 @@ class Figure(checks.FixedAttributes):
             value = checks.number(given, f"joint {name!r}", -LARGEST, LARGEST, "radians (metres for sliding joints)")
             if name in self.followers:
                 q[joint.idx_q] = self.followers[name].leading(value)
-                self._warn(name, value, joint.idx_q, q)
+                self._turning.warn_of(name, value, joint.idx_q, q)
             elif joint.nq == 1:
                 q[joint.idx_q] = value
-                self._warn(name, value, joint.idx_q, q)
+                self._turning.warn_of(name, value, joint.idx_q, q)
             elif (joint.nq, joint.nv) == (2, 1):
-                if abs(value) > MOST_TURNED:
-                    checks.warn(_as_degrees(f"joint {name!r}", value, -np.inf, np.inf))
+                warn_of_turns(name, value)
                 q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 raise InputError(
@@ -344,34 +319,8 @@ class Figure(checks.FixedAttributes):
         return q
 
     def warn_of_angles(self, q: Array, what: str) -> bool:
-        """Warn of the joint that is farthest out of its limits, if its angle was probably meant in degrees.
-
-        Args:
-            q: (nq,) a posture, or (n, nq) several.
-            what: they are, for the message: "start".
-
-        Returns:
-            Whether it was said.
-        """
-        places, low, high = self._turning
-        values = np.atleast_2d(q)[:, places]
-        beyond = np.maximum(low - values, values - high)
-        if not beyond.size or not float(beyond.max()) > FAR_OUT:
-            return False
-        frame, column = np.unravel_index(int(np.argmax(beyond)), beyond.shape)
-        joint = next(joint for joint in self.model.joints if joint.idx_q == places[column] and joint.nq == 1)
-        where = f"{what}: joint {self.model.names[joint.id]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
-        limits = self.model.lowerPositionLimit[joint.idx_q], self.model.upperPositionLimit[joint.idx_q]
-        checks.warn(_as_degrees(where, float(values[frame, column]), *limits))
-        return True
-
-    def _warn(self, name: str, value: float, place: int, q: Array) -> None:
-        """Warn if a value of a joint, which is at a place of q (nq,), was probably meant in degrees."""
-        places, low, high = self._turning
-        for column in np.flatnonzero(places == place):
-            if not low[column] - FAR_OUT <= q[place] <= high[column] + FAR_OUT:
-                limits = self.model.lowerPositionLimit[place], self.model.upperPositionLimit[place]
-                checks.warn(_as_degrees(f"joint {name!r}", value, *limits))
+        """Warn of the angle farthest out of limits in q, (nq,) or (n, nq), `what` it is called; whether it was said."""
+        return self._turning.warn(q, what)
 
     def tangent_bounds(self, q: Array) -> tuple[Array, Array]:
         """Return lower and upper bound, each (nv,), of the displacement of q (nq,) within the limits.

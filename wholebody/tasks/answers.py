@@ -99,7 +99,8 @@ def rows(term: object, what: str, given: Any, arguments: tuple[Any, ...] = ()) -
         if found.ndim != 2 or found.shape[1] != 6:
             raise _wrong(term, f"the rows of its Wrench have shape {found.shape}; give (m, 6)")
         last = sys.maxsize if model is None else model.njoints - 1
-        if not all(isinstance(joint, Integral) and 0 <= joint <= last for joint in given[1:]):
+        joints: tuple[Any, ...] = given[1:]
+        if not all(isinstance(joint, Integral) and 0 <= int(joint) <= last for joint in joints):
             raise _wrong(term, f"its Wrench is of the joints {given[1]} and {given[2]}; give indices from 0 to {last}")
         return Wrench(_finite(term, what, found), int(given.joint), int(given.against))
     found = _numbers(term, what, given, "a Wrench or rows, shape (m, nv)")

@@ -22,7 +22,7 @@ from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, Quadra
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
-from wholebody.methods.qp.tracking import QPStep
+from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
 _QP_BUDGETS: tuple[Budget, ...] = (

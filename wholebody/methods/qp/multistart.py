@@ -110,7 +110,7 @@ class Search:
         least = least_left(self.contradictions)
         if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
-        hooked = [*self._defined(hooked_hands(self.problem, self.lineariser.state, start))]
+        hooked = [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
         near = self.best.violation.left <= RELAXATION_DEPTH  # as far as limbs in the way keep goals off
         again = self._relaxed_probes(iter([start] if near else []))
@@ -126,9 +126,7 @@ class Search:
         count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
         if few := self._moving() < FEW:
             self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
-        others = self._defined(
-            (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
-        )
+        others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
         for local, how in self._relaxed_probes(chain([] if near else [start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -146,8 +144,8 @@ class Search:
         """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
         if _held(self.best, self.settings.tolerance):
             return
-        q = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
-        if q is not None and self.lineariser.undefined(q) is None:
+        apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
+        for q in self.lineariser.defined([] if apart is None else [apart]):
             self._accept(self._probe(q, 0.0), "from where contacts that cancel are left")
 
     def _relaxed_probes(self, starts: Iterator[Array]) -> Iterator[tuple[LocalSolution, str]]:
@@ -156,7 +154,7 @@ class Search:
         A probe first goes through things, where limbs can change sides, and then is pushed out of them. Where many in
         a row, although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
         """
-        for q in starts:
+        for q in self.lineariser.defined(starts):
             complete = self._minima.complete or self._relaxed_minima.complete
             if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
@@ -173,10 +171,6 @@ class Search:
             if not reached:
                 self._minima.add(probe.violation.total, probe.converged)
             yield self._try(probe.q, "restart") if reached else probe, "from another start"
-
-    def _defined(self, starts: Iterator[Array]) -> Iterator[Array]:
-        """Those of some postures (nq,) where all terms of one's own are finite."""
-        return (q for q in starts if self.lineariser.undefined(q) is None)
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
         """Look whether the goals can be met from a start, by few programs and without regard to the measures.
@@ -222,7 +216,7 @@ class Search:
         """Where nothing leads out of what the best posture is inside of, begin at the figure's other postures."""
         if _held(self.best, self.settings.tolerance) or self.contradictions:
             return
-        for q in self._defined(named_postures(self.problem, self.lineariser.state, self.problem.start)):
+        for q in self.lineariser.defined(named_postures(self.problem, self.lineariser.state, self.problem.start)):
             if not self.control.over:
                 local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "probe").once(q)
                 self.spent += local.iterations
@@ -241,8 +235,7 @@ class Search:
         """
         if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)
-        tolerance, state = self.settings.tolerance, self.lineariser.state
-        reach = self._curved()
+        tolerance, state, reach = self.settings.tolerance, self.lineariser.state, self._curved()
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng(self.settings.seed)
         self._out_of_reach = False
@@ -250,7 +243,7 @@ class Search:
             agreeing, others = AGREEING_FEW, throughout(self.problem, state, start, rng, REACH_TRIALS_FEW - 1)
         else:
             agreeing, others = AGREEING, restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)
-        for begin in chain([q], self._defined(others)):
+        for begin in chain([q], self.lineariser.defined(others)):
             local = reach.through_everything(begin, REACHED * tolerance, self._at_most(REACH_TRIAL_PROGRAMS))
             self.spent += local.iterations
             if local.violation.worst <= REACHED * tolerance and begin is not q:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -21,9 +20,10 @@ from wholebody.methods.qp.escaping import WITHIN, ProjectionRows, free_end, proj
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
+from wholebody.methods.qp.steps import FrameStep, QPStep
 from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.moving_things import MOST_SHARES, Collision, FrameMotion
+from wholebody.moving_things import MOST_SHARES, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.records import with_values
@@ -43,54 +43,6 @@ PROGRAMS = (3, 6)  # most of a frame, and where less than `OF_A_FRAME` is asked 
 BRAKED = 1e-6  # m, rad: what must hold is missed by more where joints brake for their limits: they do not then
 OUT = 5e-5  # m: overlap with what came into the figure that is left; half of what counts as an overlap
 WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
-
-
-class QPStep(NamedTuple):
-    """Answer of one step.
-
-    Attributes:
-        q: (nq,) the next posture.
-        displacement: (nv,) tangent displacement to it, radians and metres.
-        velocity: (nv,) displacement / dt.
-        contacts: how many pairs had rows.
-        rows: how many contact rows.
-        exact: whether the program was solved to rounding.
-        iterations: iterations of the QP solver.
-        by: what closed the last program, see `QPSolution`.
-        programs: how many programs each closed: one a step, and more where it was looked at twice.
-        share: how much of the program's displacement was gone: less than 1 where it was longer than what was looked at.
-        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
-        path: shares of the step, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
-        note: which term of one's own is not finite where the step would have ended, so that it was cut; else empty.
-    """
-
-    q: Array
-    displacement: Array
-    velocity: Array
-    contacts: int
-    rows: int
-    exact: bool
-    iterations: int
-    by: str
-    programs: Mapping[str, int]
-    share: float
-    collisions: tuple[Collision, ...] = ()
-    path: tuple[tuple[float, Array], ...] = ()
-    note: str = ""
-
-
-class FrameStep(NamedTuple):
-    """Answer of one frame.
-
-    Attributes:
-        q: (nq,) the next posture.
-        iterations: programs.
-        collisions: see `QPStep`.
-    """
-
-    q: Array
-    iterations: int
-    collisions: tuple[Collision, ...] = ()
 
 
 class QPTracker(NotCopyable):
