@@ -100,6 +100,18 @@ def quarter(x):
 """
 
 
+def test_what_was_kept_and_cannot_be_read_back_is_compiled_anew(run, tmp_path: Path) -> None:
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    run(**kept)
+    for ending in ("*.nb[ic]", "*.nbc"):  # with the index, and with it whole
+        files = [*(tmp_path / "kept").rglob(ending)]
+        assert files
+        for file in files:
+            file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+        assert run(**kept)[0][:3] == ["3.0", "4.0", "True"]
+    assert run(**kept)[0][:3] == ["3.0", "4.0", "False"]  # and kept
+
+
 def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
     """In the user's cache, which is taken where the package cannot be written to."""
     (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
