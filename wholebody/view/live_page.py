@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.errors import WholebodyError
 from wholebody.methods import METHODS
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.gltf import drawn_triangles
+from wholebody.view.viser_server import viser_server
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
@@ -49,12 +50,6 @@ class LivePage:
         Raises:
             MissingPackageError: viser is not installed.
         """
-        try:
-            import viser
-        except ImportError:
-            raise MissingPackageError(
-                "dragging in a browser needs viser, which is not installed; run: pip install 'wholebody[drag]'"
-            ) from None
         self.drag, self.frames = drag, 0
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
@@ -63,7 +58,7 @@ class LivePage:
         self._settling = 0  # frames that are left after the mouse let go
         self._sent: dict[int, Any] = {}
         self._stopped = threading.Event()
-        self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
+        self.server = viser_server(port, "wholebody drag")
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
