@@ -46,7 +46,7 @@ def viser_server(port: int, label: str) -> Any:
 
     with _STARTING:
         libraries = getattr(_infra, "websockets", None)
-        _infra.websockets = SimpleNamespace(  # type: ignore[attr-defined]
+        _infra.websockets = SimpleNamespace(
             asyncio=SimpleNamespace(server=SimpleNamespace(serve=serve)),
             exceptions=getattr(libraries, "exceptions", None),
             datastructures=getattr(libraries, "datastructures", None),
