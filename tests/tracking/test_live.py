@@ -87,3 +87,79 @@ def test_mistakes_are_named(drag: LiveDrag) -> None:
     )
     frame_with_trouble.take("right_palm")
     assert "cannot take" in frame_with_trouble.move(frame_with_trouble.place("right_palm")).status
+
+
+def jointed() -> wb.Assembly:
+    """A rod on a spherical joint at the origin, and a ball on its end, above a table."""
+    made = wb.Assembly().body("rod", (0, 0, 0.5), shape=wb.Capsule(0.03, 0.6))
+    made.body("ball", (0, 0, 1.0), shape=wb.Sphere(0.08))
+    made.spherical("world", "rod", at=(0, 0, 0.1)).spherical("rod", "ball", at=(0, 0, 0.9))
+    return made.add(wb.HalfSpace(), name="floor").add(wb.Box((0.2, 0.2, 0.2)), name="block", at=(0.8, 0, 0.5))
+
+
+def test_an_assembly_is_dragged_by_its_bodies() -> None:
+    made = jointed()
+    before = made.q
+    drag = LiveDrag(made)
+    assert drag.handles == ("rod", "ball")
+    assert drag.things == ("block",)
+    np.testing.assert_allclose(drag.place("ball"), (0, 0, 1.0), atol=1e-12)
+    frame = along(drag, "ball", (0.3, 0.2, -0.1), 40)
+    np.testing.assert_allclose(drag.place("ball"), (0.3, 0.2, 0.9), atol=2e-3)
+    assert np.linalg.norm(drag.place("rod") - (0, 0, 0.1)) == pytest.approx(0.4, abs=1e-4)  # on its joint still
+    assert frame.overlap < 1e-4
+    assert frame.status == "dragging ball, by newton/auto"
+    np.testing.assert_array_equal(made.q, before)  # the caller's own stays
+    assert drag.toggle("rod")
+    rod = drag.place("rod")
+    along(drag, "ball", (0.0, 0.05, 0.05))
+    np.testing.assert_allclose(drag.place("rod"), rod, atol=1e-4)
+    assert not drag.toggle("rod")
+    assert drag.undo()
+    np.testing.assert_allclose(drag.place("ball"), (0.3, 0.2, 0.9), atol=2e-3)
+    assert drag.undo()
+    np.testing.assert_allclose(drag.q, before, atol=1e-12)
+    with pytest.raises(wb.InputError, match="no task file"):
+        drag.stated()
+
+
+def test_a_thing_pushes_an_assembly() -> None:
+    drag = LiveDrag(jointed())
+    frame = along(drag, "block", (-0.75, 0.0, 0.0), 60)
+    assert drag.scene.objects["block"].placement.translation[0] == pytest.approx(0.05, abs=1e-9)
+    assert np.linalg.norm(drag.place("rod") - (0, 0, 0.5)) > 0.03
+    assert frame.overlap < 1e-3
+    assert drag.undo()
+    np.testing.assert_allclose(drag.place("rod"), (0, 0, 0.5), atol=1e-12)
+
+
+def test_a_person_in_an_assembly_has_hands_and_feet() -> None:
+    scene = wb.Scene(wb.load("avatar"))
+    start = scene.figure.posture(scene.figure.postures[0])
+    made = wb.Assembly().figure("anna", scene.figure, start)
+    made.body("crate", (2, 0, 0.5), shape=wb.Box((0.3, 0.3, 0.3)))
+    drag = LiveDrag(made)
+    assert {"crate", "anna/right_palm", "anna/left_sole"} <= set(drag.handles)
+    expected = scene.state(start).frame(scene.figure.frame_id("right_palm"))
+    np.testing.assert_allclose(drag.place("anna/right_palm"), expected.translation, atol=1e-9)
+    before = drag.place("anna/right_palm")
+    along(drag, "anna/right_palm", (0.1, 0.0, 0.1), 12)
+    np.testing.assert_allclose(drag.place("anna/right_palm"), before + (0.1, 0.0, 0.1), atol=3e-3)
+
+
+@pytest.mark.parametrize("given", [wb.Assembly(), wb.Assembly().body("block", (0, 0, 0))], ids=["empty", "no shapes"])
+def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged(given: wb.Assembly) -> None:
+    if not given.bodies:
+        with pytest.raises(wb.InputError, match="no bodies"):
+            LiveDrag(given)
+        return
+    drag = LiveDrag(given)
+    along(drag, "block", (0.2, 0.0, 0.0))
+    np.testing.assert_allclose(drag.place("block"), (0.2, 0.0, 0.0), atol=1e-3)
+    with pytest.raises(wb.InputError, match="Newton steps"):
+        drag.choose("ccd")
+
+
+def test_what_cannot_be_dragged_is_refused() -> None:
+    with pytest.raises(wb.InputError, match="is not what can be dragged"):
+        LiveDrag("human")  # type: ignore[arg-type]
