@@ -117,8 +117,8 @@ class LiveDrag:
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame.
 
-        A goal inside of a thing takes the longer the deeper it is. So after a slow frame the goal goes a part of the way
-        alone; moved to the same place again, it goes on. A figure that cannot follow keeps its posture, and the status
+        A goal inside of a thing takes the longer the deeper it is. So after a slow frame the goal goes a part of the
+        way; moved to the same place again, it goes on. A figure that cannot follow keeps its posture, and the status
         says why.
 
         Raises:

@@ -300,13 +300,13 @@ class Viewer:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the scene as one HTML file that opens in any browser without a network, FILE.glb as glTF.
 
-        HTML has the motion, glTF pieces and things at the posture, or at the motion's beginning. FILE.png is `picture`.
-        Returns the path; raises like `picture`, and an InputError for other endings: `movie` writes GIF and MP4.
+        HTML has the motion, glTF pieces and things at the posture, or at its beginning. FILE.png is `picture`, which
+        raises the same; other endings are refused. Returns the path.
         """
         place, commands = checked_target(path, "save: path", "a scene", SAVED), self._commands()
+        gltf = place.suffix.lower() == ".glb"
         if place.suffix.lower() == ".png":
             return self.picture(place)
-        gltf = place.suffix.lower() == ".glb"
         made = posture_glb(self._composition.scene, self._seen[0]) if gltf else static_page(commands, self.title)
         return write(place, made)
 
@@ -330,8 +330,7 @@ class Viewer:
             The path.
 
         Raises:
-            InputError: nothing is shown yet, the size is out of range, the name does not end in .png, or the file
-                cannot be written.
+            InputError: nothing is shown yet, the size is out of range, or the file is no .png or cannot be written.
             MissingPackageError: there is no Chromium.
         """
         checks.flag(legend, "legend")
@@ -361,8 +360,7 @@ class Viewer:
         wanted, told = self._commands(), checks.function(progress, "movie: progress")
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
-        count, dt = self._motion
-        place = check_movie(path)
+        (count, dt), place = self._motion, check_movie(path)
         times, fps = frame_times(place, count, dt, fps)
         drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), told)
         return write(place, movie(place.suffix, drawn, fps))
