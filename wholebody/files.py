@@ -14,12 +14,13 @@ import stat
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
+from wholebody import checks
 from wholebody.errors import FileFormatError, InputError, one_line
 
 LARGEST_TEXT = 10_000_000
@@ -229,6 +230,37 @@ def check_writable(path: Path) -> Path:
     if not os.access(path.parent, os.W_OK | os.X_OK):
         raise InputError(f"{_named(path)} cannot be written: its folder may not be written to; give another place")
     return path
+
+
+def checked_target(path: object, what: str, content: str, endings: Collection[str]) -> Path:
+    """The path of a file to write, checked before long work: its ending as by `checked_ending`, and its folder.
+
+    Raises:
+        InputError: no path, another ending, or its folder is missing or not writable.
+    """
+    return check_writable(checked_ending(path, what, content, endings))
+
+
+def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:
+    """The path of a file to write in the format that the ending of its name says.
+
+    Args:
+        path: the argument.
+        what: its name in the message about what is no path.
+        content: what the file has, in messages: "a scene".
+        endings: of names, in lower case, each with its dot: the formats in which it can be written.
+
+    Raises:
+        InputError: no path, or the ending of its name is no such format.
+    """
+    place = checks.path(path, what)
+    if place.suffix.lower() not in endings:
+        given = one_line(place.suffix) or "a file without ending"
+        raise InputError(
+            f"{_named(place.name)}: {content} cannot be written as {given}; give the name the ending "
+            f"{' or '.join(sorted(endings))}"
+        )
+    return place
 
 
 def make_folder(path: Path) -> None:

@@ -8,7 +8,10 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.tracking import live
 from wholebody.tracking.live import LiveDrag
+
+SETTLING = 60
 
 
 @pytest.fixture
@@ -23,6 +26,9 @@ def along(drag: LiveDrag, name: str, way: Any, frames: int = 30) -> Any:
     drag.take(name)
     for share in np.linspace(0.0, 1.0, frames)[1:]:
         frame = drag.move(start + share * np.array(way))
+    for _ in range(SETTLING):  # frames that were slow, as on a busy machine, leave some way
+        if frame.error > 1e-3:
+            frame = drag.move(start + np.array(way))
     drag.let_go()
     return frame
 
@@ -87,3 +93,97 @@ def test_mistakes_are_named(drag: LiveDrag) -> None:
     )
     frame_with_trouble.take("right_palm")
     assert "cannot take" in frame_with_trouble.move(frame_with_trouble.place("right_palm")).status
+
+
+def jointed() -> wb.Assembly:
+    """A rod on a spherical joint at the origin, and a ball on its end, above a table."""
+    made = wb.Assembly().body("rod", (0, 0, 0.5), shape=wb.Capsule(0.03, 0.6))
+    made.body("ball", (0, 0, 1.0), shape=wb.Sphere(0.08))
+    made.spherical("world", "rod", at=(0, 0, 0.1)).spherical("rod", "ball", at=(0, 0, 0.9))
+    return made.add(wb.HalfSpace(), name="floor").add(wb.Box((0.2, 0.2, 0.2)), name="block", at=(0.8, 0, 0.5))
+
+
+def test_an_assembly_is_dragged_by_its_bodies() -> None:
+    made = jointed()
+    before = made.q
+    drag = LiveDrag(made)
+    assert drag.handles == ("rod", "ball")
+    assert drag.things == ("block",)
+    np.testing.assert_allclose(drag.place("ball"), (0, 0, 1.0), atol=1e-12)
+    frame = along(drag, "ball", (0.3, 0.2, -0.1), 40)
+    np.testing.assert_allclose(drag.place("ball"), (0.3, 0.2, 0.9), atol=2e-3)
+    assert np.linalg.norm(drag.place("rod") - (0, 0, 0.1)) == pytest.approx(0.4, abs=1e-4)  # on its joint still
+    assert frame.overlap < 1e-4
+    assert frame.status == "dragging ball, by newton/auto"
+    np.testing.assert_array_equal(made.q, before)  # the caller's own stays
+    assert drag.toggle("rod")
+    rod = drag.place("rod")
+    along(drag, "ball", (0.0, 0.05, 0.05))
+    np.testing.assert_allclose(drag.place("rod"), rod, atol=1e-4)
+    assert not drag.toggle("rod")
+    assert drag.undo()
+    np.testing.assert_allclose(drag.place("ball"), (0.3, 0.2, 0.9), atol=2e-3)
+    assert drag.undo()
+    np.testing.assert_allclose(drag.q, before, atol=1e-12)
+    with pytest.raises(wb.InputError, match="no task file"):
+        drag.stated()
+
+
+def test_a_thing_pushes_an_assembly() -> None:
+    drag = LiveDrag(jointed())
+    frame = along(drag, "block", (-0.75, 0.0, 0.0), 60)
+    assert drag.scene.objects["block"].placement.translation[0] == pytest.approx(0.05, abs=1e-9)
+    assert np.linalg.norm(drag.place("rod") - (0, 0, 0.5)) > 0.03
+    assert frame.overlap < 1e-3
+    assert drag.undo()
+    np.testing.assert_allclose(drag.place("rod"), (0, 0, 0.5), atol=1e-12)
+
+
+def test_a_person_in_an_assembly_has_hands_and_feet() -> None:
+    scene = wb.Scene(wb.load("avatar"))
+    start = scene.figure.posture(scene.figure.postures[0])
+    made = wb.Assembly().figure("anna", scene.figure, start)
+    made.body("crate", (2, 0, 0.5), shape=wb.Box((0.3, 0.3, 0.3)))
+    drag = LiveDrag(made)
+    assert {"crate", "anna/right_palm", "anna/left_sole"} <= set(drag.handles)
+    expected = scene.state(start).frame(scene.figure.frame_id("right_palm"))
+    np.testing.assert_allclose(drag.place("anna/right_palm"), expected.translation, atol=1e-9)
+    before = drag.place("anna/right_palm")
+    along(drag, "anna/right_palm", (0.1, 0.0, 0.1), 12)
+    np.testing.assert_allclose(drag.place("anna/right_palm"), before + (0.1, 0.0, 0.1), atol=3e-3)
+
+
+@pytest.mark.parametrize("given", [wb.Assembly(), wb.Assembly().body("block", (0, 0, 0))], ids=["empty", "no shapes"])
+def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged(given: wb.Assembly) -> None:
+    if not given.bodies:
+        with pytest.raises(wb.InputError, match="no bodies"):
+            LiveDrag(given)
+        return
+    drag = LiveDrag(given)
+    along(drag, "block", (0.2, 0.0, 0.0))
+    np.testing.assert_allclose(drag.place("block"), (0.2, 0.0, 0.0), atol=1e-3)
+    with pytest.raises(wb.InputError, match="Newton steps"):
+        drag.choose("ccd")
+
+
+def test_what_cannot_be_dragged_is_refused() -> None:
+    with pytest.raises(wb.InputError, match="is not what can be dragged"):
+        LiveDrag("human")  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("method", ["qp", "newton"])
+def test_slow_frames_go_a_part_of_the_way_and_arrive(
+    drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By a clock of which every frame takes ten."""
+    drag.choose(method)
+    start = drag.place("right_palm")
+    drag.take("right_palm")
+    now = iter(np.arange(1000) * 10.0 * live.FRAME)
+    monkeypatch.setattr(live.time, "thread_time", lambda: next(now))
+    goal, lefts = start + (0.05, 0.0, 0.05), []
+    for _ in range(60):
+        before = drag.place("right_palm")
+        lefts.append(drag.move(goal).error)
+        assert np.linalg.norm(drag.place("right_palm") - before) < max(0.5 * lefts[-1], 0.0025) or len(lefts) == 1
+    assert lefts[-1] < 1e-3

@@ -142,7 +142,7 @@ def test_mistakes_are_named(exhibit: Any, tmp_path: Path, monkeypatch: pytest.Mo
     with pytest.raises(InputError, match="call play"):
         viewer.movie(tmp_path / "x.gif")
     viewer.play([q])
-    with pytest.raises(InputError, match=r"\.gif or a \.mp4"):
+    with pytest.raises(InputError, match=r"\.gif or \.mp4"):
         viewer.movie(tmp_path / "x.avi")
     with pytest.raises(InputError, match="fps"):
         viewer.movie(tmp_path / "x.gif", fps=0)

@@ -6,19 +6,23 @@ import http.client
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
+import wholebody
 from wholebody.view import Viewer
 from wholebody.view.sender import ViewerClosedError
+from wholebody.view.viser_server import viser_server
 
 
 def listening(port: int) -> list[str]:
@@ -39,17 +43,40 @@ def status(url: str, **headers: str) -> int:
         return error.code
 
 
-def handshake(url: str, origin: str) -> int:
-    """Answer to a page of this origin that opens the socket."""
-    upgrade = {"Connection": "Upgrade", "Upgrade": "websocket", "Sec-WebSocket-Version": "13"}
-    connection = http.client.HTTPConnection(urlsplit(url).netloc, timeout=60)
+UPGRADE = {
+    "Connection": "Upgrade",
+    "Upgrade": "websocket",
+    "Sec-WebSocket-Version": "13",
+    "Sec-WebSocket-Key": "A" * 22 + "==",
+}
+
+
+def answer(url: str, *headers: tuple[str, str]) -> int:
+    """Status of the answer to a request with just these headers; a name may be there twice, or not at all."""
+    parts = urlsplit(url)
+    connection = http.client.HTTPConnection(parts.netloc, timeout=60)
     try:
-        connection.request(
-            "GET", "/socket", headers={**upgrade, "Sec-WebSocket-Key": "A" * 22 + "==", "Origin": origin}
-        )
+        connection.putrequest("GET", parts.path, skip_host=True)
+        for name, value in headers:
+            connection.putheader(name, value)
+        connection.endheaders()
         return connection.getresponse().status
     finally:
         connection.close()
+
+
+@pytest.fixture(params=["the viewer's", "the live drag's"])
+def served(request: pytest.FixtureRequest, exhibit: Any) -> Iterator[tuple[str, str]]:
+    """Return the address of a page of ours, and that of its socket: one for each server of the package."""
+    if request.param == "the viewer's":
+        with Viewer(exhibit) as viewer:
+            yield viewer.url, viewer.url + "socket"
+    else:
+        pytest.importorskip("viser")
+        server = viser_server(8391, "a page")
+        url = f"http://127.0.0.1:{server.get_port()}/"
+        yield url, url
+        server.stop()
 
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="reads Linux's table of sockets")
@@ -59,15 +86,72 @@ def test_it_listens_on_the_loopback_address_only(exhibit: Any) -> None:
         assert listening(port) == [f"0100007F:{port:04X}"]
 
 
-def test_it_refuses_foreign_names_and_origins(exhibit: Any) -> None:
-    with Viewer(exhibit) as viewer:
+def test_pages_and_sockets_refuse_foreign_names_and_origins(served: tuple[str, str]) -> None:
+    netloc = urlsplit(served[0]).netloc
+    port = netloc.partition(":")[2]
+    local, evil = f"localhost:{port}", f"evil.example:{port}"
+    for url, extra, good in ((served[0], {}, 200), (served[1], UPGRADE, 101)):
+        more = tuple(extra.items())
+        for host in (netloc, local, netloc.upper(), f"[::1]:{port}"):
+            assert answer(url, ("Host", host), *more) == good
+            assert answer(url, ("Host", host), ("Origin", f"http://{host}"), *more) == good
+        foreign = (evil, "evil.example", f"127.0.0.1.{evil}", f"8.8.8.8:{port}", f"[::2]:{port}", f"x@{evil}", "")
+        for host in foreign:
+            assert answer(url, ("Host", host), *more) in (400, 403), host
+            assert answer(url, ("Host", host), ("Origin", f"http://{host}"), *more) in (400, 403), host
+        origins = (
+            f"http://{evil}",
+            "http://evil.example",
+            "null",
+            f"http://{netloc}.evil.example",
+            "http://127.0.0.1:1",
+        )
+        for origin in (*origins, f"http://{local}"):
+            assert answer(url, ("Host", netloc), ("Origin", origin), *more) == 403, origin
+        assert answer(url, *more) in (400, 403)
+        assert answer(url, ("Host", netloc), ("Host", evil), *more) in (400, 403)
+        twice = (("Origin", f"http://{netloc}"), ("Origin", f"http://{evil}"))
+        assert answer(url, ("Host", netloc), *twice, *more) in (400, 403)
+    assert status(served[0] + "../page.py") == 404
+
+
+def test_no_other_module_serves_anything() -> None:
+    """So the guard of these two servers is that of every page."""
+    serving = re.compile(
+        r"\b(bind_sockets|create_server|start_server|ViserServer|HTTPServer|TCPServer|websockets?\.\S*serve|"
+        r"MeshcatVisualizer|meshcat\.Visualizer|\.bind\(\(|http\.server|socketserver)\b"
+    )
+    package = Path(wholebody.__file__).parent
+    found = {path.name for path in package.rglob("*.py") if serving.search(path.read_text(encoding="utf-8"))}
+    assert found == {"server.py", "viser_server.py", "live_page.py"}  # live_page.py names the type of its server
+
+
+def test_a_page_on_ipv6_answers(exhibit: Any) -> None:
+    try:
+        with socket.socket(socket.AF_INET6) as probe:
+            probe.bind(("::1", 0))
+    except OSError:
+        pytest.skip("this machine has no IPv6")
+    with Viewer(exhibit, host="::1") as viewer:
         assert status(viewer.url) == 200
         assert status(viewer.url, Host="evil.example") == 403
-        assert [handshake(viewer.url, origin) for origin in (viewer.url.rstrip("/"), "http://evil.example")] == [
-            101,
-            403,
-        ]
-        assert status(viewer.url + "../page.py") == 404
+
+
+def test_a_page_for_other_machines_answers_addresses_and_its_own_name(exhibit: Any) -> None:
+    with Viewer(exhibit, host="0.0.0.0") as viewer:
+        for host in ("192.0.2.7", "[2001:db8::1]:80", socket.gethostname()):
+            assert answer(viewer.url, ("Host", host)) == 200
+        assert answer(viewer.url, ("Host", "evil.example")) == 403
+
+
+def test_the_live_drags_server_prints_nothing(capfd: pytest.CaptureFixture[str]) -> None:
+    pytest.importorskip("viser")
+    server = viser_server(8391, "a page")
+    url = f"http://127.0.0.1:{server.get_port()}/"
+    wanted = {**UPGRADE, "Host": urlsplit(url).netloc, "Sec-WebSocket-Protocol": "viser-v0.0.0"}  # of another version
+    assert answer(url, *wanted.items()) == 101
+    server.stop()
+    assert capfd.readouterr() == ("", "")
 
 
 def test_waiting_without_a_browser_ends_and_leaves_the_viewer_working(exhibit: Any) -> None:

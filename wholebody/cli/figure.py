@@ -51,11 +51,11 @@ def _write(name: str, options: dict[str, Any], out: Path) -> int:
     from wholebody.figures.anthropometry import make_person
     from wholebody.figures.packaged_urdf import write_human
     from wholebody.figures.proportions import proportioned
+    from wholebody.files import checked_ending
 
     if name != "human" or "detail" in options:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")
-    if out.suffix != ".urdf":
-        raise InputError(f"--out: {out} does not end in .urdf; give it that ending")
+    checked_ending(out, "--out", "a person", (".urdf",))
     size = {name: value for name, value in options.items() if name not in ("proportions", "hands")}
     person = proportioned(make_person(**size), options.get("proportions"))
     write_human(out, person, options.get("hands", "rigid"))

@@ -60,10 +60,12 @@ def run(arguments: argparse.Namespace) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
     from wholebody.cli.picture import viewer_of
     from wholebody.errors import InputError
+    from wholebody.files import checked_target
+    from wholebody.view.viewer import SAVED
 
     save: Path | None = arguments.save
-    if save is not None and save.suffix.lower() not in (".html", ".png", ".glb"):
-        raise InputError(f"--save: {save} ends in none of .html, .png and .glb; give it one of them")
+    if save is not None:
+        checked_target(save, "--save", "a scene", SAVED)
     if save is not None and (arguments.port or arguments.host != LOCAL):
         raise InputError("--port and --host are for the live page; leave them out beside --save")
     problem, q, view, title = _subject(arguments.what, person_options(arguments))
@@ -76,10 +78,8 @@ def run(arguments: argparse.Namespace) -> int:
             viewer.open()
             viewer.wait(math.inf)
             viewer.wait_until_closed()
-        elif save.suffix.lower() in (".html", ".glb"):
-            print(f"wrote {viewer.save(save)}")
         else:
-            print(f"wrote {viewer.picture(save)}")
+            print(f"wrote {viewer.save(save)}")
     return 0
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from os import PathLike
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -20,6 +22,7 @@ from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 from wholebody.figures.urdf.xml_reading import read_xml
+from wholebody.files import Scratch, write
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes for the placement of a body; Pinocchio ignores them for a first body that is fixed."""
@@ -56,7 +59,8 @@ def xml_figure(
         return urdf_figure(path, root, package_dirs, concavity, samples, seed)
     if root not in (None, "fixed", "free"):
         raise InputError(f"root is {shown(root)}; give 'fixed' or 'free'")
-    model, meshes = _read(place, root)
+    with _readable(place, outermost) as file:
+        model, meshes = _read(place, file, root)
     check_size(model, place)
     links = tuple(frame.name for frame in model.frames if frame.type == pin.FrameType.BODY)
     if not links:
@@ -68,14 +72,40 @@ def xml_figure(
     return robot_figure(name, model, links, geometry, (*_unread(outermost), *notes), samples, seed)
 
 
-def _read(path: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
+@contextmanager
+def _readable(path: Path, outermost: Element) -> Iterator[Path]:
+    """The file that Pinocchio reads: the given one, or a copy without textures if one of them has no file.
+
+    Of each texture without a file Pinocchio prints a line on standard output. Collision geometry has no textures. The
+    copy finds its meshes where the file does.
+    """
+    textures = [(asset, one) for asset in outermost.iter("asset") for one in asset.findall("texture")]
+    if all(texture.get("file") is not None for _, texture in textures):
+        yield path
+        return
+    for asset, texture in textures:
+        asset.remove(texture)
+    for material in outermost.iter("material"):
+        material.attrib.pop("texture", None)
+    compiler = outermost.find("compiler")  # Pinocchio reads the first
+    if compiler is None:
+        compiler = Element("compiler")
+        outermost.insert(0, compiler)
+    for name in {"meshdir", "assetdir"} & set(compiler.attrib) or {"meshdir"}:
+        compiler.set(name, str(path.absolute().parent / compiler.get(name, "")))
+    with Scratch() as folder:
+        yield write(folder / path.name, ElementTree.tostring(outermost))
+
+
+def _read(path: Path, file: Path, root: str | None) -> tuple[pin.Model, pin.GeometryModel]:
+    """What Pinocchio reads of a file, or of its copy; messages name the file."""
     base = [pin.JointModelFreeFlyer(), ROOT_JOINT] if root == "free" else []
     try:
-        built = pin.buildModelFromMJCF(str(path), *base)
+        built = pin.buildModelFromMJCF(str(file), *base)
         model = built[0] if isinstance(built, tuple) else built  # a tuple with its constraints, if the root has a name
-        meshes = pin.buildGeomFromMJCF(model, str(path), pin.COLLISION)
+        meshes = pin.buildGeomFromMJCF(model, str(file), pin.COLLISION)
     except Exception as error:  # boost's and Pinocchio's own, of several kinds
-        reason = " ".join(str(error).split()).rpartition("message: ")[2]
+        reason = " ".join(str(error).split()).rpartition("message: ")[2].replace(str(file), str(path))
         raise FileFormatError(f"{path}: Pinocchio cannot read it ({reason}); convert it to URDF") from None
     first = model.joints[1] if model.njoints > 1 else None
     if first is not None and first.nq == 7:

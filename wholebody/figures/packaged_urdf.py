@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.errors import UnknownNameError, WholebodyError
-from wholebody.files import make_folder, write
+from wholebody.files import checked_ending, make_folder, write
 
 if TYPE_CHECKING:
     from wholebody.figures.anthropometry import Person
@@ -53,14 +53,18 @@ def task_paths() -> dict[str, Path]:
 
 
 def write_human(path: str | os.PathLike[str], person: Person, hands: str = "rigid") -> None:
-    """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`."""
+    """Write the URDF of a person, pieces as capsules and boxes; `hands` as for `human_spec`.
+
+    Raises:
+        InputError: the name does not end in .urdf, or the file cannot be written.
+    """
     from wholebody.figures.body_spec import urdf_text
     from wholebody.figures.human.figure import figure_of
     from wholebody.figures.human.spec import human_spec
     from wholebody.figures.urdf.extension import extension_text
 
-    spec = human_spec(person, hands=hands)
-    _write(Path(path), urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
+    target, spec = checked_ending(path, "write_human: path", "a person", (".urdf",)), human_spec(person, hands=hands)
+    _write(target, urdf_text(spec, extension_text(figure_of(spec, "capsules", person.sex))))
 
 
 def packaged_files() -> dict[str, str]:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Array
 from wholebody.checks import array, number, shown
 from wholebody.errors import InputError
 
@@ -30,6 +31,18 @@ class Piece(NamedTuple):
     geometry: Any
     placement: pin.SE3
     volume: float
+
+
+def box_corners(geometry: Any) -> Array:
+    """Corners (8, 3) of the axis-aligned box around a coal shape in its own axes, metres; endless for a half-space.
+
+    coal writes the box into the shape. So it is computed of a copy: the shape is part of a scene, whose pickles would
+    change, and an endless box cannot be read from one.
+    """
+    own = geometry.clone()
+    own.computeLocalAABB()
+    sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
+    return np.array([[sides[x, 0], sides[y, 1], sides[z, 2]] for x, y, z in np.ndindex(2, 2, 2)])
 
 
 def check_length(value: object, what: str) -> float:

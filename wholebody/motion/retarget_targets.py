@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import box_corners
 from wholebody.motion.footfalls import SMALL, Footfalls, held
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
@@ -81,10 +82,8 @@ def standing_places(figure: Figure, roles: Roles) -> tuple[dict[str, Array], dic
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry)
     low = np.inf
     for piece, at in zip(figure.geometry.geometryObjects, geometry.oMg, strict=True):
-        piece.geometry.computeLocalAABB()
-        box = piece.geometry.aabb_local
-        corners = np.array(np.meshgrid(*zip(box.min_, box.max_, strict=True))).reshape(3, -1)
-        low = min(low, float((at.rotation @ corners + at.translation[:, None])[2].min()))
+        corners = at.rotation @ box_corners(piece.geometry).T + at.translation[:, None]
+        low = min(low, float(corners[2].min()))
     return (
         {role: at.translation.copy() for role, at in found.items()},
         {role: data.oMf[figure.frame_id(frame)].rotation.copy() for role, frame in roles.turns.items()},

@@ -9,9 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody import checks
 from wholebody.arrays import Array, Mask
-from wholebody.files import check_writable, write
+from wholebody.files import checked_target, write
 from wholebody.problem import Problem
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
@@ -88,9 +87,9 @@ class ReachMap:
         """Write all arrays into an npz file; returns the path.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
-        file = check_writable(checks.path(path, "save: path"))
+        file = checked_target(path, "save: path", "a reach map", (".npz",))
         stream = io.BytesIO()
         np.savez_compressed(
             stream, frame=self.frame, x=self.x, y=self.y, z=self.z, verdict=self.verdict, verdicts=np.array(VERDICTS),
@@ -102,9 +101,9 @@ class ReachMap:
         """Write verdict, left and measure as a legacy VTK file of structured points; returns the path.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
-        file = check_writable(checks.path(path, "to_vtk: path"))
+        file = checked_target(path, "to_vtk: path", "a grid", (".vtk",))
         shape, origin = self.verdict.shape, (self.x[0], self.y[0], self.z[0])
         spacing = [float(axis[1] - axis[0]) if len(axis) > 1 else 1.0 for axis in (self.x, self.y, self.z)]
         lines = [
@@ -127,18 +126,18 @@ class ReachMap:
         """Draw heat maps of all heights into a PNG file; returns the path.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
         from wholebody.studies.reach_pictures import draw_slices
 
-        return draw_slices(self, check_writable(checks.path(path, "picture: path")))
+        return draw_slices(self, checked_target(path, "picture: path", "a picture", (".png",)))
 
     def html(self, path: str | os.PathLike[str]) -> Path:
         """Write a page with a slider over the heights, for any browser, without a network; returns the path.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
         from wholebody.studies.reach_pictures import write_page
 
-        return write_page(self, check_writable(checks.path(path, "html: path")))
+        return write_page(self, checked_target(path, "html: path", "a page", (".htm", ".html")))

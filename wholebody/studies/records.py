@@ -16,7 +16,7 @@ import numpy as np
 from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.errors import MissingPackageError
-from wholebody.files import check_writable, write
+from wholebody.files import checked_target, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
@@ -179,11 +179,11 @@ class Records(Sequence[SolveRecord]):
 
         Raises:
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
-                outcome that no solve has; the file cannot be written.
+                outcome that no solve has; the name has another ending, or the file cannot be written.
         """
         from wholebody.studies.outcome_chart import Cell, draw_outcomes
 
-        file, cells = check_writable(checks.path(path, "chart: path")), []
+        file, cells = checked_target(path, "chart: path", "a chart", (".png",)), []
         for one in self._records:
             others = [value for factor, value in (one.factors or {}).items() if factor != COLUMN]
             row = ", ".join(others) if one.factors else one.name
@@ -195,9 +195,9 @@ class Records(Sequence[SolveRecord]):
         """Write the rows as CSV; returns the path.
 
         Raises:
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
-        file = check_writable(checks.path(path, "to_csv: path"))
+        file = checked_target(path, "to_csv: path", "a table", (".csv",))
         rows = self.rows()
         sheet = io.StringIO()
         made = csv.DictWriter(sheet, list(dict.fromkeys(key for row in rows for key in row)), lineterminator="\n")
@@ -210,9 +210,9 @@ class Records(Sequence[SolveRecord]):
 
         Raises:
             MissingPackageError: pyarrow is not installed.
-            InputError: the file cannot be written.
+            InputError: the name has another ending, or the file cannot be written.
         """
-        file = check_writable(checks.path(path, "to_parquet: path"))
+        file = checked_target(path, "to_parquet: path", "a table", (".parquet", ".pq"))
         try:
             import pyarrow
             import pyarrow.parquet

@@ -15,7 +15,7 @@ from wholebody.checks import instance, posture
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, one_line
 from wholebody.figures.state import State
-from wholebody.files import read_text, write
+from wholebody.files import checked_target, read_text, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
 from wholebody.records import as_dict
@@ -126,9 +126,10 @@ def write_result(task: Task, solution: Solution, path: str | os.PathLike[str]) -
     """Write the solution of a task as a result.json, as `wholebody pose` does.
 
     Raises:
-        InputError: not a task or not a solution of its figure, or the file cannot be written.
+        InputError: not a task or not a solution of its figure, or the file cannot be written or does not end in
+            .json.
     """
-    file = checked_path(path, "write_result: path")
+    file = checked_target(path, "write_result: path", "a result", (".json",))
     instance(task, Task, "write_result: task", "give one of wb.read_task")
     instance(solution, Solution, "write_result: solution", "give one of wb.solve")
     posture(solution.q, task.problem.scene.model.nq, "write_result: the solution's posture")

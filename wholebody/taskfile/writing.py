@@ -13,7 +13,6 @@ import pinocchio as pin
 
 from wholebody import files, tasks
 from wholebody.checks import instance, shown
-from wholebody.checks import path as checked_path
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
@@ -44,9 +43,9 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
 
     Raises:
         InputError: a figure that was not loaded or was reduced, or a term, measure or shape that task files do not
-            have; or the file cannot be written.
+            have; or the file cannot be written or does not end in .toml.
     """
-    target = checked_path(path, "write_task: path")
+    target = files.checked_target(path, "write_task: path", "a task", (".toml",))
     if isinstance(problem, Scene):
         problem = Problem(problem)
     instance(problem, Problem, "write_task: problem", "give a problem or a scene")

@@ -5,7 +5,6 @@ The page that shows it is elsewhere; this is what happens when a handle is taken
 
 from __future__ import annotations
 
-import copy
 import time
 from typing import Any, NamedTuple
 
@@ -13,22 +12,22 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array
-from wholebody.checks import known, numbers
-from wholebody.errors import InputError
-from wholebody.geometry.shapes import HalfSpace
+from wholebody.checks import known, numbers, shown
+from wholebody.errors import InputError, WholebodyError
+from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.solve import method_for_motions
 from wholebody.problem import Problem
-from wholebody.tasks import Hold, Point
 from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
-
-HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
-"""Frames of people with handles: hands, feet, pelvis, head."""
+from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
 
 NEAR = 0.002  # m: pairs nearer than this are counted as contacts
 FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
 MOST_UNDONE = 100  # postures that are remembered
+SLOW, QUICK = 1.5 * FRAME, 0.75 * FRAME  # s of the processor: after such a frame the goal may go half, or twice as far
+LEAST_MOVE = 0.002  # m: a goal may always go so far in a frame
 
 
 class LiveFrame(NamedTuple):
@@ -52,50 +51,49 @@ class LiveFrame(NamedTuple):
 
 
 class LiveDrag:
-    """A problem whose figure and things are dragged.
+    """A problem whose figure and things are dragged, or an assembly whose bodies and things are.
 
     Constraints of the problem that are not holds stay. Goals of the problem are met again and again while a handle is
-    dragged; the handle is one more goal.
+    dragged; the handle is one more goal. Bodies of an assembly are dragged by their origins, by Newton steps alone; the
+    given assembly stays as it is.
 
     Attributes:
-        scene: a copy of the problem's scene; its things are moved.
+        problem: what was given.
+        scene: a copy of its scene; its things are moved.
         q: (nq,) the present posture.
-        handles: frame to the frame's index, of those that can be dragged.
+        handles: names of the frames, or bodies, that can be dragged.
         things: names of the things that can be dragged.
         held: frames that stay where they are.
         taken: the handle that the mouse holds; "" for none.
+        methods: what can be chosen: names of methods, and the configured one that was given.
         method: what follows the handles.
+        chosen: its name among them.
     """
 
-    def __init__(self, problem: Problem, method: str | Method = "qp") -> None:
-        """Begin at the problem's start.
+    def __init__(self, problem: Problem | Assembly, method: str | Method = "qp") -> None:
+        """Begin at the problem's start, or where the assembly's bodies are.
 
         Raises:
-            InputError: the problem's scene changed.
+            InputError: the problem's scene changed, the assembly has no bodies or is to be solved by another method
+                than Newton's, or neither of the two is given.
             UnknownNameError: there is no such method.
         """
-        problem.check_fresh()
+        self._subject: LiveSubject = live_subject(problem)
         self.problem = problem
-        self.scene = copy.copy(problem.scene)
-        figure = self.scene.figure
-        self.q: Array = np.array(problem.start)
-        names = [name for name in HANDLES if name in {*figure.frames, *figure.segments}]
-        names = names or list(dict.fromkeys([chain.tip for chain in figure.chains.values()] or figure.segments[-1:]))
-        self.handles = {name: figure.frame_id(name) for name in names}
-        self.things = tuple(
-            name
-            for name, thing in self.scene.objects.items()
-            if thing.segment is None and not isinstance(thing.shape, HalfSpace)
-        )
-        self._fixed: tuple[Any, ...] = tuple(
-            term for term in (*problem.stated, *problem.bounds) if not _releasable(term, self.handles)
-        )
-        self.held = {_handle_of(term, self.handles) for term in problem.constraints if _releasable(term, self.handles)}
-        self.method: Method = method_for_motions(method)
-        self._undo: list[tuple[Array, dict[str, pin.SE3]]] = []
+        self.scene, self.q = self._subject.scene, self._subject.q
+        self.handles = tuple(self._subject.handles)
+        self.things = things_of(self.scene)
+        self.held = set(self._subject.held)
+        self.methods: dict[str, str | Method] = {name: name for name in installed_methods()}
+        if isinstance(problem, Assembly):
+            self.methods = {"newton": "newton"}
+            method = "newton" if method == "qp" else method
+        self._undo: list[tuple[Array, Any]] = []
         self.taken = ""
+        self.choose(method)
         self._drag: Drag[Any] | None = None
         self._trouble = ""
+        self._most, self._asked = np.inf, 0.0  # m: how far a goal may go in a frame, and was asked to go
         self._state = self.scene.state(self.q)
 
     # ---- what the mouse and the buttons do
@@ -107,19 +105,21 @@ class LiveDrag:
             UnknownNameError: there is no such handle.
         """
         known(name, {*self.handles, *self.things}, "handle")
-        self._undo.append((self.q.copy(), {name: self.scene.objects[name].placement for name in self.things}))
+        self._undo.append((self.q.copy(), self._subject.remembered()))
         del self._undo[:-MOST_UNDONE]
         self.taken = name
         self._restart()
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self.taken, self._drag, self._trouble = "", None, ""
+        self.taken, self._drag, self._trouble, self._most = "", None, "", np.inf
 
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame.
 
-        A figure that cannot follow keeps its posture, and the status says why.
+        A goal inside of a thing takes the longer the deeper it is. So after a slow frame the goal goes a part of the
+        way; moved to the same place again, it goes on. A figure that cannot follow keeps its posture, and the status
+        says why.
 
         Raises:
             InputError: no handle was taken, or the place is not three finite numbers.
@@ -127,7 +127,7 @@ class LiveDrag:
         if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (3,), "the place of a handle")
-        began = time.perf_counter()
+        began, spent = time.perf_counter(), time.thread_time()
         error = 0.0
         if self._drag is not None:
             try:
@@ -135,11 +135,13 @@ class LiveDrag:
                     self._push(place)
                     frame = self._drag.to(self.place(next(iter(self.handles))))
                 else:
-                    frame = self._drag.to(place)
+                    frame = self._drag.to(self._goal(place))
                     error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
                 self.q = np.array(frame.q)
-            except InputError as trouble:
+                self._subject.arrived()
+            except WholebodyError as trouble:
                 self._trouble = str(trouble)
+            self._pace(time.thread_time() - spent)
         return self._report(error, time.perf_counter() - began)
 
     def toggle(self, name: str) -> bool:
@@ -155,12 +157,17 @@ class LiveDrag:
         return name in self.held
 
     def choose(self, method: str | Method) -> None:
-        """Follow by another method.
+        """Follow by another method; its name is one of `methods` then.
 
         Raises:
             UnknownNameError: there is no such method.
+            InputError: an assembly is to be solved by another method than Newton's.
         """
-        self.method = method_for_motions(method)
+        if isinstance(self.problem, Assembly) and method != "newton":
+            raise InputError(f"an assembly is dragged by Newton steps, not by {shown(method)}; leave method out")
+        self.method: Method = method_for_motions(method)
+        self.chosen = method if isinstance(method, str) else self.method.name
+        self.methods.setdefault(self.chosen, method)
         if self.taken:
             self._restart()
 
@@ -169,9 +176,8 @@ class LiveDrag:
         if not self._undo:
             return False
         self.let_go()
-        self.q, places = self._undo.pop()
-        for name, at in places.items():
-            self.scene.move(name, at=at)
+        self.q, remembered = self._undo.pop()
+        self._subject.restore(remembered)
         return True
 
     # ---- what is seen
@@ -184,37 +190,43 @@ class LiveDrag:
         """The same at a posture (nq,)."""
         if name in self.things:
             return np.array(self.scene.objects[name].placement.translation)
-        return np.array(self._state.update(q).frame(self.handles[name]).translation)
+        handle = self._subject.handles[name]
+        return np.array(self._state.update(q).data.oMi[handle.joint].act(handle.local.translation))
 
     def report(self) -> LiveFrame:
         """What there is to say without a frame."""
         return self._report(0.0, 0.0)
 
     def stated(self, goals: object = ()) -> Problem:
-        """The problem with the present posture as its start, and the present holds."""
-        holds = [Hold(name) for name in self.handles if name in self.held and name != self.taken]
-        measures = self.problem.measures if self.problem.measures_given else None
-        return Problem(
-            self.scene,
-            self.q,
-            goals=goals,  # type: ignore[arg-type]
-            constraints=[*self._fixed, *holds],
-            measures=measures,
-            clearance=self.problem.clearance,
-            touching=self.problem.touching,
-            range_of_motion=self.problem.range_of_motion,
-            balance=self.problem.balance,
-        )
+        """The problem with the present posture as its start, and the present holds.
+
+        Raises:
+            InputError: an assembly is dragged.
+        """
+        return self._subject.stated(self.q, goals, self.held - {self.taken})
 
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
-        self._trouble = ""
+        self._trouble, self._most, self._asked = "", np.inf, 0.0
         followed = self.taken if self.taken in self.handles else next(iter(self.handles))
-        goals = [Point(followed, self.place(followed)), *self.problem.goals]
+        held = self.held - {self.taken}
         try:
-            self._drag = Drag(self.stated(goals), self.method)
-        except InputError as trouble:
+            self._drag = self._subject.drag(self.q, followed, self.place(followed), held, self.method)
+        except WholebodyError as trouble:
             self._drag, self._trouble = None, str(trouble)
+
+    def _goal(self, place: Array) -> Array:
+        """Where the goal goes in this frame towards a place (3,)."""
+        here = self.place(self.taken)
+        self._asked = float(np.linalg.norm(place - here))
+        return here + (place - here) * min(1.0, self._most / max(self._asked, LEAST_MOVE))
+
+    def _pace(self, spent: float) -> None:
+        """How far a goal may go in the next frame, after one that took so many seconds of the processor."""
+        if spent > SLOW:
+            self._most = max(0.5 * min(self._most, self._asked), LEAST_MOVE)
+        elif spent < QUICK:
+            self._most *= 2.0
 
     def _push(self, place: Array) -> None:
         at = self.scene.objects[self.taken].placement
@@ -222,7 +234,7 @@ class LiveDrag:
         length = float(np.linalg.norm(way))
         if length > FARTHEST_STEP:
             way *= FARTHEST_STEP / length
-        self.scene.move(self.taken, at=pin.SE3(at.rotation, at.translation + way), over=FRAME)
+        self._subject.move(self.taken, pin.SE3(at.rotation, at.translation + way), FRAME)
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
         contacts = self.scene.contacts(self.q, within=NEAR)
@@ -232,18 +244,3 @@ class LiveDrag:
         if self._trouble:
             status = f"{status}: {self._trouble}"
         return LiveFrame(self.q, error, len(contacts.distance), overlap, seconds, status)
-
-
-def _handle_of(term: object, handles: dict[str, int]) -> str:
-    """The handle that a hold holds: its frame, or a frame on the same segment of a foot or hand."""
-    if not isinstance(term, Hold) or term.relative_to is not None:
-        return ""
-    if term.frame in handles:
-        return term.frame
-    side, _, part = term.frame.partition("_")
-    also = {"foot": "sole", "hand": "palm"}.get(part, "")
-    return f"{side}_{also}" if f"{side}_{also}" in handles else ""
-
-
-def _releasable(term: object, handles: dict[str, int]) -> bool:
-    return bool(_handle_of(term, handles))

@@ -14,7 +14,7 @@ from wholebody.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, kn
 from wholebody.checks import path as checked_path
 from wholebody.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
-from wholebody.files import read_text, write
+from wholebody.files import checked_target, read_text, write
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
 from wholebody.tracking.tracks import Track, check_figure
 
@@ -29,10 +29,10 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
     """Write a track as CSV: time in seconds, the seven values of a free root, then the joints in radians.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the name does not end in .csv, or the file cannot be written.
     """
     instance(track, Track, "write_track: track", "make one with Track.of(figure, q, dt)")
-    path = checked_path(path, "path")
+    path = checked_target(path, "write_track: path", "a track", (".csv",))
     root = ROOT_COLUMNS if track.q.shape[1] > len(track.joints) else ()
     text = io.StringIO(newline="")
     writer = csv.writer(text)

@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
 from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
@@ -30,6 +31,7 @@ class Body:
         thing: name of its object; None for a piece of the figure.
         color: its color without contact.
         plate: whether it is a half-space, which is drawn as a plate.
+        corners: (8, 3) of the box around it, in its own axes, metres.
     """
 
     carrier: str
@@ -38,6 +40,7 @@ class Body:
     thing: str | None
     color: Color
     plate: bool
+    corners: Array
 
     def state_color(self, state: Color) -> Color:
         """Colour in contact: the figure's pieces take this colour, things are tinted, half-spaces keep theirs."""
@@ -101,9 +104,9 @@ class Bodies:
             color = self._thing_color(thing, numbers[thing], piece) if thing is not None else _own_color(piece)
             folder = f"{style.OBJECT_NODE}/{node(thing)}" if thing is not None else style.FIGURE_NODE
             carrier = f"{folder}/{node(names[piece.parentJoint])}"
-            piece.geometry.computeLocalAABB()  # coal computes the box only on request
             plate = type(piece.geometry).__name__ == "Halfspace"
-            self.all.append(Body(carrier, f"{carrier}/{node(piece.name)}", int(piece.parentJoint), thing, color, plate))
+            path, corners = f"{carrier}/{node(piece.name)}", box_corners(piece.geometry)
+            self.all.append(Body(carrier, path, int(piece.parentJoint), thing, color, plate, corners))
         self.carriers = {body.carrier: body.joint for body in self.all}
         self.pieces = pieces
         self._drawn = () if pieces else tuple(self._drawn_figures())
@@ -257,10 +260,8 @@ class Bodies:
     def _box(self, index: int, data: Any) -> Array:
         """Corners (8, 3) in the world of the box around a piece."""
         piece = self.scene.geometry.geometryObjects[index]
-        low, high = piece.geometry.aabb_local.min_, piece.geometry.aabb_local.max_
-        local = np.array([[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])])
         place = data.oMi[self.all[index].joint] * piece.placement
-        return np.asarray(local @ place.rotation.T + place.translation)
+        return np.asarray(self.all[index].corners @ place.rotation.T + place.translation)
 
 
 def _own_color(piece: Any) -> Color:

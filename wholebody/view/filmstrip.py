@@ -10,9 +10,8 @@ from pathlib import Path
 from numpy.typing import ArrayLike
 
 from wholebody.checks import a, listed
-from wholebody.checks import path as checked_path
 from wholebody.errors import InputError
-from wholebody.files import Scratch, check_writable, write
+from wholebody.files import Scratch, checked_target, write
 from wholebody.view.screenshot import check_size
 from wholebody.view.viewer import Viewer
 
@@ -56,7 +55,7 @@ def write_filmstrip(
         raise InputError(f"{len(beside)} ghosts for {len(postures)} postures; give one for each")
     width, height = check_size(size)
     strip = Image.new("RGB", (len(postures) * (width + GAP) - GAP, height), "white")
-    place = check_writable(checked_path(path, "path"))
+    place = checked_target(path, "write_filmstrip: path", "a filmstrip", (".png",))
     with Scratch() as folder:
         for number, q in enumerate(postures):
             if beside is not None:

@@ -12,15 +12,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.methods import METHODS
+from wholebody.errors import WholebodyError
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.gltf import drawn_triangles
+from wholebody.view.viser_server import viser_server
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
-EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the figure's centre of mass
+EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the middle of the handles
 RADIUS = 0.04  # m: of a handle
 SETTLING = 90  # frames after the mouse lets go in which the figure still follows to where it let go
 THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
@@ -49,12 +49,6 @@ class LivePage:
         Raises:
             MissingPackageError: viser is not installed.
         """
-        try:
-            import viser
-        except ImportError:
-            raise MissingPackageError(
-                "dragging in a browser needs viser, which is not installed; run: pip install 'wholebody[drag]'"
-            ) from None
         self.drag, self.frames = drag, 0
         self._save_to, self._save = save_to, save
         self._lock = threading.RLock()
@@ -63,7 +57,7 @@ class LivePage:
         self._settling = 0  # frames that are left after the mouse let go
         self._sent: dict[int, Any] = {}
         self._stopped = threading.Event()
-        self.server: Any = viser.ViserServer(host="127.0.0.1", port=port, label="wholebody drag", verbose=False)
+        self.server = viser_server(port, "wholebody drag")
         self.url = f"http://127.0.0.1:{self.server.get_port()}"
         self.server.scene.set_up_direction("+z")
         self.server.scene.configure_default_lights(cast_shadow=False)  # shadows cost most of a frame without a GPU
@@ -89,8 +83,8 @@ class LivePage:
             pass
 
     def _look(self) -> None:
-        """Look at the whole figure from the front right."""
-        middle = self.drag.scene.state(self.drag.q).center_of_mass()
+        """Look at the middle of the handles from the front right."""
+        middle = np.mean([self.drag.place(name) for name in self.drag.handles], axis=0)
         self.server.initial_camera.position = middle + np.array(EYE)
         self.server.initial_camera.look_at = middle
 
@@ -149,7 +143,7 @@ class LivePage:
     def _panel(self) -> None:
         gui = self.server.gui
         self._status, self._numbers = gui.add_markdown(""), gui.add_markdown("")
-        self._method = gui.add_dropdown("method", tuple(METHODS), initial_value=self.drag.method.name)
+        self._method = gui.add_dropdown("method", tuple(self.drag.methods), initial_value=self.drag.chosen)
         self._method.on_update(self._choose)
         self._boxes: dict[str, Any] = {}
         for name in self.drag.handles:
@@ -161,7 +155,7 @@ class LivePage:
 
     def _choose(self, _: Any) -> None:
         with self._lock:
-            self.drag.choose(self._method.value)
+            self.drag.choose(self.drag.methods[self._method.value])
 
     def _ticked(self, name: str, _: Any) -> None:
         if self._boxes[name].value != (name in self.drag.held):

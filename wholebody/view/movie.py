@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.checks import number
-from wholebody.checks import path as checked_path
-from wholebody.errors import InputError, MissingPackageError, WholebodyError
-from wholebody.files import Scratch
+from wholebody.errors import MissingPackageError, WholebodyError
+from wholebody.files import Scratch, checked_target
 
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""
@@ -31,12 +30,10 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
     """Return the path of a movie that can be written.
 
     Raises:
-        InputError: it ends neither in .gif nor in .mp4.
+        InputError: it ends neither in .gif nor in .mp4, or its folder is missing or not writable.
         MissingPackageError: it ends in .mp4 and there is no ffmpeg.
     """
-    path = checked_path(path, "path")
-    if path.suffix.lower() not in FASTEST:
-        raise InputError(f"{path}: a movie is a .gif or a .mp4; give the file one of these endings")
+    path = checked_target(path, "movie: path", "a movie", FASTEST)
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise MissingPackageError(
             f"{path}: writing MP4 needs ffmpeg; run: apt-get install ffmpeg, or write a .gif, which needs nothing"

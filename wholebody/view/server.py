@@ -13,6 +13,7 @@ import contextlib
 import ipaddress
 import json
 import os
+import re
 import socket
 import struct
 import sys
@@ -28,6 +29,7 @@ LOCAL = ("127.0.0.1", "localhost", "::1")
 EVERYWHERE = ("0.0.0.0", "::")
 FIRST_PORT, PORTS = 7000, 100
 PARENT_POLL = 0.5  # s
+_HOST = re.compile(r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^\[\]:/@\s]+))(:\d+)?")
 
 
 class Command(NamedTuple):
@@ -205,18 +207,35 @@ class Hub:
             self.syncs.clear()
 
 
-def accepted_names(host: str) -> frozenset[str]:
-    """Host names that a server at `host` accepts in requests: another name would be DNS rebinding."""
-    names = {*LOCAL, host.lower()}
-    if host not in LOCAL:
-        names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
-    return frozenset(names)
+class Guard:
+    """Which requests a server of ours answers: those that call this machine by its name, from our own pages.
+
+    A request of any other name reached this machine by DNS rebinding. One with another origin is of a page of somebody
+    else that runs in the user's browser.
+    """
+
+    def __init__(self, host: str) -> None:
+        """Accept the names of this machine at which a server at `host` can be reached."""
+        names = {*LOCAL, host.lower()}
+        if host not in LOCAL:
+            names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
+        self._names, self._addresses = frozenset(names), host not in LOCAL
+
+    def accepts(self, host: str | None, origin: str | None) -> bool:
+        """Whether to answer a request with these headers `Host` and `Origin`; None where it has none, or several."""
+        read = _HOST.fullmatch(host.lower()) if host is not None else None
+        if read is None:
+            return False
+        name = read["address"] or read["name"]
+        if name not in self._names and not (self._addresses and is_address(name)):
+            return False
+        return origin is None or origin.lower().partition("://")[2] == read[0]
 
 
 def is_address(name: str) -> bool:
     """Whether a name is an IP address, for which DNS rebinding is impossible."""
     try:
-        ipaddress.ip_address(name.strip("[]"))
+        ipaddress.ip_address(name)
     except ValueError:
         return False
     return True
@@ -227,22 +246,22 @@ def make_application(hub: Hub, host: str) -> Any:
     from tornado.web import Application, HTTPError, RequestHandler
     from tornado.websocket import WebSocketHandler
 
-    names = accepted_names(host)
+    guard = Guard(host)
 
-    class LocalOnly(RequestHandler):  # type: ignore[misc]
-        """Refuses requests that reached this machine under a foreign name (DNS rebinding)."""
+    class Guarded(RequestHandler):  # type: ignore[misc]
+        """Refuses requests that are not of our own pages."""
 
         def prepare(self) -> None:
-            name = self.request.host_name.lower()
-            if name not in names and not (host not in LOCAL and is_address(name)):
+            headers = self.request.headers
+            if not guard.accepts(headers.get("Host"), headers.get("Origin")):
                 raise HTTPError(403)
 
-    class Page(LocalOnly):
+    class Page(Guarded):
         def get(self) -> None:
             self.set_header("Cache-Control", "no-store")
             self.write(hub.page)
 
-    class Tab(LocalOnly, WebSocketHandler):  # type: ignore[misc]
+    class Tab(Guarded, WebSocketHandler):  # type: ignore[misc]
         """One open page. It acknowledges each message, and gets the next only then."""
 
         def open(self, *args: str, **kwargs: str) -> None:

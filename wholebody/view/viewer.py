@@ -19,7 +19,7 @@ from wholebody.arrays import Array
 from wholebody.assessment import assess
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.errors import InputError
-from wholebody.files import check_writable, write
+from wholebody.files import checked_target, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
@@ -38,6 +38,7 @@ from wholebody.view.server import ANIMATION, CAMERA, Command
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
+SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
 CAMERA_POSTURES = 24  # number of postures of a motion that the camera takes into account
 
 
@@ -299,13 +300,13 @@ class Viewer:
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write the scene as one HTML file that opens in any browser without a network, FILE.glb as glTF.
 
-        HTML has the motion, glTF pieces and things at the posture, or at the motion's beginning. FILE.png is `picture`.
-        Returns the path; raises like `picture`.
+        HTML has the motion, glTF pieces and things at the posture, or at its beginning. FILE.png is `picture`, which
+        raises the same; other endings are refused. Returns the path.
         """
-        place, commands = checks.path(path, "path"), self._commands()
+        place, commands = checked_target(path, "save: path", "a scene", SAVED), self._commands()
+        gltf = place.suffix.lower() == ".glb"
         if place.suffix.lower() == ".png":
             return self.picture(place)
-        gltf = place.suffix.lower() == ".glb"
         made = posture_glb(self._composition.scene, self._seen[0]) if gltf else static_page(commands, self.title)
         return write(place, made)
 
@@ -329,11 +330,11 @@ class Viewer:
             The path.
 
         Raises:
-            InputError: nothing is shown yet, the size is out of range, or the file cannot be written.
+            InputError: nothing is shown yet, the size is out of range, or the file is no .png or cannot be written.
             MissingPackageError: there is no Chromium.
         """
         legend = checks.flag(legend, "legend")
-        place = check_writable(checks.path(path, "path"))
+        place = checked_target(path, "picture: path", "a picture", (".png",))
         wanted = [command for command in self._commands() if command.op != ANIMATION]
         return write(place, self._screenshots.picture(wanted, size, legend=legend))
 
@@ -359,8 +360,7 @@ class Viewer:
         wanted, told = self._commands(), checks.function(progress, "movie: progress")
         if self._motion is None:
             raise InputError("a movie needs a motion; call play() before movie()")
-        count, dt = self._motion
-        place = check_writable(check_movie(path))
+        (count, dt), place = self._motion, check_movie(path)
         times, fps = frame_times(place, count, dt, fps)
         drawn = counted(self._screenshots.pictures(wanted, size, times), len(times), told)
         return write(place, movie(place.suffix, drawn, fps))

@@ -119,3 +119,13 @@ def test_counts_times_and_intervals_are_reported() -> None:
 def test_what_was_never_wrong_may_be_so_in_the_next_case() -> None:
     rows = [Row("file", 0, k, "right", "", 0.0, "") for k in range(200)]
     assert "| 200 | 200 | 0 | 0 | 0 | 1.9 % |" in report(rows, FACTS)  # Wilson's interval for 200 of 200, as published
+
+
+@pytest.mark.parametrize("said", ["os.write(1, b'a line\\n')", "ctypes.CDLL(None).puts(b'a line')"])
+def test_what_prints_is_wrong(said: str, capfd: pytest.CaptureFixture[str]) -> None:
+    script = "import ctypes, os\nfrom wholebody.bench.attack.case import Verdict\n"
+    script += "{said}\nverdict = Verdict('right', 'all')\nprint(verdict)\n"
+    assert running.run(Written(script.format(said="pass"))).outcome == "right"
+    wrong = running.run(Written(script.format(said=said)))
+    assert (wrong.outcome, wrong.words) == ("wrong", "prints 1 lines, the first 'a line'")
+    assert "a line" not in capfd.readouterr().out

@@ -246,3 +246,30 @@ def test_programs_at_the_edge_of_sense(random_program, name):
 def test_unknown_solver_is_answered_with_the_names():
     with pytest.raises(UnknownNameError, match="osqp"):
         make_solver("oskp")
+
+
+PARTS = ("diagonal", "linear", "rows", "target", "weight", "elastic", "least", "elastic_weight", "lower", "upper")
+BAD = (np.nan, np.inf, -np.inf, 1e300, -1e300, 0.0, -1.0)
+
+
+@pytest.mark.parametrize("name", solver_names())
+def test_a_program_of_no_use_prints_nothing_and_is_answered_inside_its_box(random_program, name, capfd):
+    """Terms of somebody's own may be anything; the programs after such a one are solved as ever."""
+    rng = np.random.default_rng(11)
+    good, whole = random_program(rng, 12, 4, 9), random_program(rng, 12, 4, 9)
+    for hot in (True, False):
+        solver = make_solver(name, hot)
+        solver.solve(good, None)
+        for part, value in itertools.product(PARTS, BAD):
+            array = getattr(good, part).copy()
+            array.flat[1] = value
+            program = replace(good, **{part: array})
+            answer = solver.solve(program, None)
+            assert np.isfinite(answer.x).all(), (part, value)
+            box = np.minimum(program.lower, program.upper) - 1e-9, np.maximum(program.lower, program.upper) + 1e-9
+            bounded = np.isfinite(box[0]) & np.isfinite(box[1])
+            assert ((answer.x >= box[0]) & (answer.x <= box[1]))[bounded].all(), (part, value)
+        answer = solver.solve(whole, None)
+        assert answer.exact
+        assert whole.optimality(answer.x) < 1e-7
+    assert capfd.readouterr().out == ""

@@ -18,6 +18,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.arrays import Array
+from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
 from wholebody.scene import Scene
 
@@ -146,8 +147,7 @@ def _extent(geometry: Any) -> float:
     """Radius of a piece about its origin, metres; 0 for a half-space, whose distances need none."""
     if isinstance(geometry, coal.Halfspace):
         return 0.0
-    geometry.computeLocalAABB()
-    return float(geometry.aabb_radius)
+    return float(np.linalg.norm(box_corners(geometry), axis=1).max())
 
 
 class _Body:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import resource
+import sys
 import time
 import traceback
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -106,20 +109,50 @@ def write(case: Case) -> Written:
 
 
 def run(prepared: Written) -> Verdict:
-    """Run a case in a folder of its own, and return its verdict: "wrong" for an error that is none of ours."""
-    with Scratch() as folder:
-        put(prepared, folder)
-        began = time.process_time()
-        known: dict[str, object] = {"__name__": "__main__", "__file__": str(folder / SCRIPT)}
-        try:
-            exec(compile(prepared.script, SCRIPT, "exec"), known)
-        except WholebodyError as error:
-            return Verdict("refused", str(error)[:300], time.process_time() - began)
-        except Exception as error:
-            return Verdict("wrong", _said(error), time.process_time() - began)
+    """Run a case in a folder of its own, and return its verdict: "wrong" for an error that is none of ours.
+
+    "wrong" too where anything but the verdict reaches standard output, whoever writes it.
+    """
+    with Scratch() as folder, _printed(folder) as said:
+        verdict = _outcome(prepared, folder)
+    lines = [line for line in said if line != str(verdict)]
+    if lines and verdict.outcome != "wrong":
+        return Verdict("wrong", f"prints {len(lines)} lines, the first {lines[0][:200]!r}", verdict.seconds)
+    return verdict
+
+
+def _outcome(prepared: Written, folder: Path) -> Verdict:
+    put(prepared, folder)
+    began = time.process_time()
+    known: dict[str, object] = {"__name__": "__main__", "__file__": str(folder / SCRIPT)}
+    try:
+        exec(compile(prepared.script, SCRIPT, "exec"), known)
+    except WholebodyError as error:
+        return Verdict("refused", str(error)[:300], time.process_time() - began)
+    except Exception as error:
+        return Verdict("wrong", _said(error), time.process_time() - began)
     verdict = known["verdict"]
     assert isinstance(verdict, Verdict)
     return verdict
+
+
+@contextmanager
+def _printed(folder: Path) -> Iterator[list[str]]:
+    """The lines that this process writes to standard output meanwhile, those of compiled libraries included."""
+    lines: list[str] = []
+    sys.stdout.flush()
+    kept = os.dup(1)
+    with (folder / ".printed").open("w+b") as file:
+        os.dup2(file.fileno(), 1)
+        try:
+            yield lines
+        finally:
+            sys.stdout.flush()
+            ctypes.CDLL(None).fflush(None)
+            os.dup2(kept, 1)
+            os.close(kept)
+            file.seek(0)
+            lines += file.read().decode("utf-8", "replace").splitlines()
 
 
 def put(prepared: Written, folder: Path) -> None:

@@ -14,6 +14,7 @@ from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Stream
 from wholebody.bench.stability.verdict import Result
 from wholebody.files import Scratch
+from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.view import Viewer
@@ -150,19 +151,12 @@ def _camera(problem: Problem, shown: list[Array], way: Array) -> tuple[Array, Ar
         pin.updateGeometryPlacements(scene.model, state.data, scene.geometry, placed)
         for piece, place in zip(pieces, placed.oMg, strict=True):
             if piece.parentJoint:
-                points += [place.act(corner) for corner in _corners(piece)]
+                points += [place.act(corner) for corner in box_corners(piece.geometry)]
         points += [np.array(goal.target) for goal in problem.goals if isinstance(goal, Point)]
     cloud = np.array(points)
     target = (cloud.min(axis=0) + cloud.max(axis=0)) / 2.0
     radius = float(np.linalg.norm(cloud - target, axis=1).max()) * ROOM
     return target + radius / np.sin(np.radians(FIELD_OF_VIEW) / 2.0) * way / np.linalg.norm(way), target
-
-
-def _corners(piece: pin.GeometryObject) -> Array:
-    """Corners (8, 3) of a piece's box in its own axes [m]."""
-    piece.geometry.computeLocalAABB()
-    low, high = piece.geometry.aabb_local.min_, piece.geometry.aabb_local.max_
-    return np.array([np.where(sides, high, low) for sides in np.ndindex(2, 2, 2)])
 
 
 def _jpeg(png: bytes) -> bytes:

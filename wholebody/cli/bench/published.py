@@ -67,9 +67,11 @@ def judge(arguments: argparse.Namespace) -> None:
     from wholebody.bench.published.judging import as_json, judge
     from wholebody.bench.published.reading import dumped
     from wholebody.bench.published.words import COLUMNS, cells, left_out
+    from wholebody.files import checked_target
 
-    verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
+    checked_target(out, "--out", "a verdict", (".json",))
+    verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     write_text(out, dumped(as_json(verdict)))
     console = Console()
     console.width = max(console.width, WIDTH)

@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from wholebody.files import check_writable, write
+    from wholebody.files import checked_target, write
     from wholebody.motion.checking import DEPTH
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import NOTHING, put_on
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _many(arguments, depth)
     jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same
     if arguments.html is not None:
-        check_writable(arguments.html)
+        checked_target(arguments.html, "--html", "a page", (".htm", ".html"))
     (file,), worn = arguments.files, (*arguments.equipment, NOTHING)[0]
     scene = put_on(_scene(arguments), worn)
     clip = read_clip(file, scene.figure)

@@ -48,7 +48,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from wholebody.checks import whole
     from wholebody.errors import InputError
-    from wholebody.files import check_writable
+    from wholebody.files import checked_target
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed
@@ -58,9 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     out: Path | None = arguments.out
     whole(arguments.pictures, "--pictures", 1, 100)
     if out is not None:
-        check_writable(out)
-        if out.suffix.lower() not in (".html", ".mp4", ".gif", ".png"):
-            raise InputError(f"--out: {out.name} ends in none of .html, .mp4, .gif, .png; give one of them")
+        checked_target(out, "--out", "a clip's picture", (".htm", ".html", ".mp4", ".gif", ".png"))
     clip = clip_of(arguments)
     ghost = None if arguments.ghost is None else read_clip(arguments.ghost, clip.figure)
     if ghost is not None and len(ghost) != len(clip):
@@ -82,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
         if out is None:
             viewer.open()
             viewer.wait_until_closed()
-        elif out.suffix.lower() == ".html":
+        elif out.suffix.lower() in (".htm", ".html"):
             print(f"wrote {viewer.save(out)}")
         else:
             with bar(f"drawing {out.name}") as show:  # a share: a movie may have fewer pictures than the clip frames

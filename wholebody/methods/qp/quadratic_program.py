@@ -18,6 +18,9 @@ import numpy as np
 
 from wholebody.arrays import Array, Mask
 
+MOST = 1e30
+"""Sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite."""
+
 
 @dataclass(frozen=True)
 class QuadraticProgram:
@@ -57,6 +60,20 @@ class QuadraticProgram:
             and len(self.elastic_weight) == len(active.elastic) == k
         ):
             raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of other sizes")
+
+    @property
+    def is_computable(self) -> bool:
+        """Whether its numbers can be computed with: finite ones, also squared, of weights above 0, a box in order.
+
+        A term of somebody's own may be NaN, infinite or enormous at a posture.
+        """
+        with np.errstate(all="ignore"):
+            curvature = self.diagonal + self.weight @ self.rows**2 + self.elastic_weight @ self.elastic**2
+            targets = self.weight @ self.target**2 + self.elastic_weight @ self.least**2
+            sizes = curvature.sum() + targets + self.linear @ self.linear + self.lower @ self.lower
+            largest = sizes + self.upper @ self.upper
+            least = min(part.min(initial=np.inf) for part in (self.diagonal, self.weight, self.elastic_weight))
+            return bool(largest < MOST and least > 0.0 and (self.lower <= self.upper).all())
 
     @property
     def size(self) -> int:

@@ -51,14 +51,19 @@ class QPSolver(ABC):
                 and None stands for the rows violated at x = 0; but the first program of all is the solver's.
 
         Returns:
-            The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box.
+            The answer; `exact` is False where only an approximation was found. Never NaN, always inside the box. No
+            solver gets a program that is not computable: its answer is to stay, as far as the box has zero.
         """
+        if self.hot_start and self._begun:
+            solution = solve_from(program, violated_set(program) if guess is None else guess, WARM_CORRECTIONS)
+            if solution is not None:
+                return with_values(solution, by=ACTIVE_SET)
+        if not program.is_computable:
+            stay = np.clip(np.zeros(program.size), program.lower, program.upper)
+            return QPSolution(np.where(np.isfinite(stay), stay, 0.0), violated_set(program), False, 0, NOT_EXACT)
         if not (self.hot_start and self._begun):
             self._begun = True
             return self.solve_cold(program)
-        solution = solve_from(program, violated_set(program) if guess is None else guess, WARM_CORRECTIONS)
-        if solution is not None:
-            return with_values(solution, by=ACTIVE_SET)
         if len(program.target) + len(program.least) > LARGEST:
             return last_resort(program, np.zeros(program.size), 0)
         return self.solve_cold(program)

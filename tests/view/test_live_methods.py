@@ -1,0 +1,59 @@
+"""The page of a live drag without a browser: every method, configured ones, and assemblies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.methods import installed_methods
+from wholebody.tracking.live import LiveDrag
+from wholebody.view.live_page import LivePage
+
+pytest.importorskip("viser")
+
+
+def opened(drag: LiveDrag, folder: Path) -> LivePage:
+    return LivePage(drag, folder / "posture.toml", 8393)
+
+
+def problem() -> wb.Problem:
+    return wb.Problem(wb.Scene(wb.load("avatar")), constraints=[wb.Hold("left_foot")])
+
+
+@pytest.mark.parametrize(
+    "method", [*installed_methods(), wb.QP(solver="active_set"), wb.Newton(algebra="kkt")], ids=str
+)
+def test_the_page_opens_with_every_method_and_changes_to_every_other(method: str | wb.QP, tmp_path: Path) -> None:
+    drag = LiveDrag(problem(), method)
+    page = opened(drag, tmp_path)
+    try:
+        name = method if isinstance(method, str) else method.name
+        assert page._method.value == drag.chosen == name
+        assert page._method.options == tuple(drag.methods)
+        for other in page._method.options:
+            page._method.value = other
+            page._choose(SimpleNamespace())
+            assert drag.chosen == other
+        page._method.value = name
+        page._choose(SimpleNamespace())
+        assert drag.method == (method if not isinstance(method, str) else LiveDrag(problem(), method).method)
+    finally:
+        page.stop()
+
+
+def test_an_assembly_has_a_page(tmp_path: Path) -> None:
+    made = wb.Assembly().body("block", (0, 0, 1), shape=wb.Box((0.1, 0.1, 0.1)), color="red").body("lamp", (1, 0, 1))
+    drag = LiveDrag(made.add(wb.HalfSpace(), name="floor"))
+    page = opened(drag, tmp_path)
+    try:
+        drag.take("block")
+        for share in np.linspace(0.0, 1.0, 10)[1:]:
+            frame = page.follow(np.array((0.1 * share, 0.0, 1.0)))
+        assert frame.error < 1e-3
+        assert page._method.options == ("newton",)
+    finally:
+        page.stop()

@@ -1,0 +1,232 @@
+"""What is dragged by hand: a problem's figure, or the bodies of an assembly; where handles are, what follows them."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Collection, Mapping, Set
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.arrays import Array
+from wholebody.errors import InputError
+from wholebody.geometry.shapes import HalfSpace
+from wholebody.methods.base import Method
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.problem import Problem
+from wholebody.scene import Scene
+from wholebody.tasks import Hold, Point
+from wholebody.tracking.drag import Drag
+
+HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
+"""Frames of people with handles: hands, feet, pelvis, head."""
+
+
+class Handle(NamedTuple):
+    """Where a handle is: the joint of the scene's model that carries it, and its placement there."""
+
+    joint: int
+    local: pin.SE3
+
+
+class LiveSubject(Protocol):
+    """A problem or an assembly that is dragged."""
+
+    @property
+    def scene(self) -> Scene:
+        """A copy of its own; its things are moved."""
+
+    @property
+    def q(self) -> Array:
+        """(nq,) the posture of the scene at the beginning."""
+
+    @property
+    def handles(self) -> Mapping[str, Handle]:
+        """Name to place, of what can be dragged."""
+
+    @property
+    def held(self) -> Set[str]:
+        """Names of handles that are held at the beginning."""
+
+    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """What follows a handle from the posture q (nq,), while others are held where they are."""
+
+    def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
+        """Move a thing."""
+
+    def arrived(self) -> None:
+        """Note that what follows has made a frame."""
+
+    def remembered(self) -> Any:
+        """What `restore` goes back to."""
+
+    def restore(self, remembered: Any) -> None:
+        """Go back to where things and bodies were."""
+
+    def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
+        """The problem with the start q (nq,), goals, and holds.
+
+        Raises:
+            InputError: it is no problem.
+        """
+
+
+def things_of(scene: Scene) -> tuple[str, ...]:
+    """Names of the things that can be dragged: those that stand around and have an end."""
+    return tuple(
+        name
+        for name, thing in scene.objects.items()
+        if thing.segment is None and not isinstance(thing.shape, HalfSpace)
+    )
+
+
+def handle_frames(frames: Collection[str]) -> list[str]:
+    """Those of `HANDLES` that a figure has."""
+    return [name for name in HANDLES if name in frames]
+
+
+class LiveProblem:
+    """The figure of a problem. Its holds can be released; its goals and other constraints stay."""
+
+    def __init__(self, problem: Problem) -> None:
+        """Copy the scene.
+
+        Raises:
+            InputError: the problem's scene changed.
+        """
+        problem.check_fresh()
+        self.problem, self.scene = problem, copy.copy(problem.scene)
+        self.q: Array = np.array(problem.start)
+        figure = self.scene.figure
+        names = handle_frames({*figure.frames, *figure.segments})
+        names = names or list(dict.fromkeys([chain.tip for chain in figure.chains.values()] or figure.segments[-1:]))
+        frames = {name: figure.model.frames[figure.frame_id(name)] for name in names}
+        self.handles = {name: Handle(int(frame.parentJoint), frame.placement) for name, frame in frames.items()}
+        stated = (*problem.stated, *problem.bounds)
+        self._fixed: tuple[Any, ...] = tuple(term for term in stated if not _handle_of(term, self.handles))
+        self.held: Set[str] = {_handle_of(term, self.handles) for term in problem.constraints} - {""}
+
+    def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
+        """The problem with the start q (nq,), goals, and holds."""
+        holds = [Hold(name) for name in self.handles if name in held]
+        problem = self.problem
+        return Problem(
+            self.scene,
+            q,
+            goals=goals,  # type: ignore[arg-type]
+            constraints=[*self._fixed, *holds],
+            measures=problem.measures if problem.measures_given else None,
+            clearance=problem.clearance,
+            touching=problem.touching,
+            range_of_motion=problem.range_of_motion,
+            balance=problem.balance,
+        )
+
+    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """See `LiveSubject.drag`."""
+        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method)
+
+    def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
+        """See `LiveSubject.move`."""
+        self.scene.move(name, at=at, over=over)
+
+    def arrived(self) -> None:
+        """Nothing to note."""
+
+    def remembered(self) -> Any:
+        """The placements of the things."""
+        return {name: self.scene.objects[name].placement for name in things_of(self.scene)}
+
+    def restore(self, remembered: Any) -> None:
+        """Put the things back."""
+        for name, at in remembered.items():
+            self.scene.move(name, at=at)
+
+
+class LiveAssembly:
+    """The bodies of an assembly, and the hands, feet and so on of its figures. A body that is held is fixed."""
+
+    def __init__(self, assembly: Assembly) -> None:
+        """Copy the assembly.
+
+        Raises:
+            InputError: it has no bodies.
+        """
+        self._still = copy.copy(assembly)  # without holds
+        self._dragged: Assembly | None = None
+        self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
+        model, self.handles = self.scene.model, dict[str, Handle]()
+        figures = self._still.figures
+        for name in self._still.bodies:
+            if name.partition("/")[0] not in figures:
+                self.handles[name] = Handle(int(model.getJointId(name)), pin.SE3.Identity())
+        for name, figure in figures.items():
+            for frame in handle_frames({*figure.frames, *figure.segments}):
+                own = figure.model.frames[figure.frame_id(frame)]
+                joint = model.getJointId(f"{name}/{figure.model.names[own.parentJoint]}")
+                self.handles[f"{name}/{frame}"] = Handle(int(joint), own.placement)
+
+    def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
+        """See `LiveSubject.drag`; the method is Newton's, whatever is asked."""
+        made = self._dragged = copy.copy(self._still)
+        for name in held:
+            made.fixed("world", name)
+        made.point_goal(followed, place)
+        return Drag(made, goal=len(made.goals) - 1)
+
+    def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
+        """See `LiveSubject.move`."""
+        self._still.move(name, at=at)
+        if self._dragged is not None:
+            self._dragged.move(name, at=at, over=over)
+
+    def arrived(self) -> None:
+        """The bodies are where those are that are dragged."""
+        if self._dragged is not None:
+            self._still.place(self._dragged.variables())
+
+    def remembered(self) -> Any:
+        """The placements of the things, and of the bodies."""
+        things = {name: self.scene.objects[name].placement for name in things_of(self.scene)}
+        return things, self._still.variables()
+
+    def restore(self, remembered: Any) -> None:
+        """Put things and bodies back."""
+        things, variables = remembered
+        self._dragged = None
+        self._still.place(variables)
+        for name, at in things.items():
+            self._still.move(name, at=at)
+
+    def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
+        """No problem.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError("an assembly is no problem, so it has no task file; keep assembly.variables() instead")
+
+
+def live_subject(given: Problem | Assembly) -> LiveProblem | LiveAssembly:
+    """What a problem or an assembly is when it is dragged.
+
+    Raises:
+        InputError: it is neither, has no bodies, or its scene changed.
+    """
+    if isinstance(given, Assembly):
+        return LiveAssembly(given)
+    if isinstance(given, Problem):
+        return LiveProblem(given)
+    raise InputError(f"LiveDrag: {type(given).__name__} is not what can be dragged; give a wb.Problem or a wb.Assembly")
+
+
+def _handle_of(term: object, handles: Collection[str]) -> str:
+    """The handle that a hold holds: its frame, or a frame on the same segment of a foot or hand; "" if none."""
+    if not isinstance(term, Hold) or term.relative_to is not None:
+        return ""
+    if term.frame in handles:
+        return term.frame
+    side, _, part = term.frame.partition("_")
+    also = {"foot": "sole", "hand": "palm"}.get(part, "")
+    return f"{side}_{also}" if f"{side}_{also}" in handles else ""
