@@ -110,7 +110,7 @@ class World(NotCopyable):
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
-        self.engine = RigidBodies(scene) if self._bodies else None
+        self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
         self._coupling = Coupling(scene.model, self._loop.shown, spring)
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
