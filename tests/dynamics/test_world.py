@@ -9,6 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.dynamics.driven_impulses import contact_impulse
 from wholebody.dynamics.overlaps import overlaps
+from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.matter.materials import Surface
 
 DT = 1.0 / 60.0
@@ -164,3 +165,35 @@ def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
         wb.World(scene, spring=3.0)
     with pytest.raises(wb.InputError, match="tracked"):
         wb.World(scene).step("q")
+
+
+def test_a_world_begins_in_its_start_and_not_in_the_first_posture() -> None:
+    figure = wb.load("avatar")
+    first = figure.posture(figure.postures[0])
+    at = figure.placement(first, "head").translation
+    scene = wb.Scene(figure).add(wb.Box((0.2, 0.2, 0.2)), name="carton", at=at, body=wb.Body(mass=1.0))
+    with pytest.raises(wb.InputError, match="overlap by"):
+        RigidBodies(scene)
+    aside = first.copy()
+    aside[0] += 1.5  # the whole figure
+    world = wb.World(scene, aside)
+    assert world.engine is not None
+    head = world.engine.placement("head").translation
+    assert head == pytest.approx(figure.placement(world.q, "head").translation, abs=1e-9)
+    assert world.step(aside).deepest <= 1e-4
+    scene.move("carton", at=figure.placement(aside, "head").translation)
+    with pytest.raises(wb.InputError, match="overlap by"):
+        RigidBodies(scene, start=aside)
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_a_tower_that_touches_exactly_gains_no_more_than_its_work(count: int) -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(offset=-2.0), name="floor")
+    for k in range(count):
+        scene.add(wb.Box((0.2, 0.2, 0.2)), name=f"box {k}", at=(3.0, 0.0, -1.9 + 0.2 * k), body=wb.Body(mass=8.0))
+    engine = RigidBodies(scene)
+    energy = engine.energy()
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+        assert frame.energy - energy <= frame.work + 1e-9
+        energy = frame.energy

@@ -101,8 +101,8 @@ class World(NotCopyable):
             spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default.
 
         Raises:
-            InputError: no posture near the start is free, two things overlap of which one moves by itself, or a
-                value of the wrong kind, shape or range.
+            InputError: no posture near the start is free, a thing that moves by itself overlaps another thing at the
+                start, or the figure there, or a value of the wrong kind, shape or range.
             UnknownNameError: another overlap, or a joint names a thing that is not there.
         """
         self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
