@@ -7,12 +7,14 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.broad_phase import near_among
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts
@@ -53,7 +55,9 @@ class Scene(SceneContents):
         return State(self.model).update(q)
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
-        """Every pair nearer than `within` metres at the posture q, shape (nq,), nearest first.
+        """Every pair of the scene nearer than `within` metres at the posture q, shape (nq,), nearest first.
+
+        These are the pairs that a posture changes, `pair_table.pairs`; see `overlapping` for those of things too.
 
         Raises:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
@@ -65,7 +69,8 @@ class Scene(SceneContents):
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the least separating translation.
 
-        The deepest first; empty if nothing overlaps. See `wholebody.geometry.penetration`.
+        The deepest first; empty if nothing overlaps. The pairs are those of `overlapping`. See
+        `wholebody.geometry.penetration`.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
@@ -73,8 +78,45 @@ class Scene(SceneContents):
         from wholebody.geometry.penetration import object_penetrations
 
         with self.borrow() as workspace:
-            near = workspace.near(q, 0.0).nearest_first()
+            near = self.overlapping(q, workspace)
             return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
+
+    def overlapping(self, q: Array, workspace: Workspace | None = None) -> Contacts:
+        """Every pair of pieces that overlap at the posture q, shape (nq,), the deepest first.
+
+        Beside the pairs of the scene these are pairs of two things in the world, and of a thing and a part of the
+        figure that cannot move. Left out are two half-spaces, which have no end, and things that a joint of their
+        `wb.Body` holds together, which do not collide. `number` is -1 for pairs that the scene does not have.
+
+        Args:
+            q: the posture.
+            workspace: a workspace of the scene, whose placements count; the scene's present ones by default.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
+        """
+        if workspace is None:
+            with self.borrow() as borrowed_one:
+                return self.overlapping(q, borrowed_one)
+        near = workspace.near(q, 0.0)
+        pieces, group, held = self._standing()
+        standing = near_among(self.built.table, near.placements, pieces, group, 0.0, held)
+        together = (np.concatenate(parts) for parts in zip(near[:-1], standing[:-1], strict=True))
+        return Contacts(*together, near.placements).nearest_first()
+
+    def _standing(self) -> tuple[Indices, Indices, list[tuple[int, int]]]:
+        """Pieces that the world carries, a number of the owner of each (0 for the figure), and owners held together."""
+        built = self.built
+        number = {name: k + 1 for k, name in enumerate(built.pieces_of)}
+        pieces: Indices = np.flatnonzero(built.table.joint == 0).astype(np.intp)
+        group: Indices = np.array([number.get(built.owners[k], 0) for k in pieces], dtype=np.intp)
+        held = [
+            (min(number[name], number[joint.to]), max(number[name], number[joint.to]))
+            for name, thing in self.objects.items()
+            for joint in (() if thing.body is None else thing.body.joints)
+            if joint.to in number
+        ]
+        return pieces, group, held
 
     def sweep(
         self, q0: Array, q1: Array, tolerance: float = 1e-4, *, moves: Mapping[str, tuple[Any, Any]] | None = None

@@ -99,7 +99,8 @@ def object_penetrations(
     """Every two owners of pieces that overlap, those with the longest separation first.
 
     Args:
-        geometry: all pieces; its collision pairs say which of them can touch.
+        geometry: all pieces; its collision pairs say which pieces of two owners can touch, all of them where it has
+            no pair of the two.
         placements: (n, 4, 3) their placements, in the format of `Contacts.placements`.
         owners: the owner of each piece; the one that comes first in this list is the A of its pair.
         pairs: (k, 2) pieces that overlap.
@@ -112,7 +113,8 @@ def object_penetrations(
         if (owners[i], owners[j]) in touching:
             touching[owners[i], owners[j]].append((i, j))
     found = []
-    for (a, b), allowed in touching.items():
+    for (a, b), pairs_of_both in touching.items():
+        allowed = pairs_of_both or _all_pairs(owners, a, b)
         of_a, of_b = sorted({i for i, _ in allowed}), sorted({j for _, j in allowed})
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)
         for i, j in allowed:
@@ -125,3 +127,8 @@ def object_penetrations(
         if one is not None:
             found.append(one)
     return sorted(found, key=lambda one: -float(np.linalg.norm(one.separation)))
+
+
+def _all_pairs(owners: Sequence[str], a: str, b: str) -> list[tuple[int, int]]:
+    """All pairs of a piece of one owner and a piece of another."""
+    return [(i, j) for i, one in enumerate(owners) if one == a for j, other in enumerate(owners) if other == b]

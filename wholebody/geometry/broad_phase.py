@@ -1,0 +1,105 @@
+"""Pairs among many pieces that stand anywhere: boxes along the world's axes first, coal for those that overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import coal
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.geometry.proximity import Contacts, PairTable
+
+AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more memory, 50 bytes each
+
+
+def box_pairs(low: Array, high: Array) -> Indices:
+    """Pairs (k, 2), the lesser index first, of boxes along the axes that overlap or touch.
+
+    They are sorted along the axis on which they are spread most; what begins there before another one ends is compared
+    on the other two.
+
+    Args:
+        low: (n, 3) least corner of each box.
+        high: (n, 3) greatest corner.
+    """
+    if len(low) < 2:
+        return np.zeros((0, 2), dtype=np.intp)
+    axis = int(np.argmax(np.std(low + high, axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    low, high = low[order], high[order]
+    begins = np.arange(1, len(low) + 1)
+    counts = np.maximum(np.searchsorted(low[:, axis], high[:, axis], side="right") - begins, 0)
+    ends, found, done = np.cumsum(counts), [np.zeros((0, 2), dtype=np.intp)], 0
+    while done < len(counts):
+        before = int(ends[done - 1]) if done else 0
+        upto = max(int(np.searchsorted(ends, before + AT_ONCE, side="right")), done + 1)
+        some = counts[done:upto]
+        first = np.repeat(np.arange(done, upto), some)
+        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(some) - some, some)
+        both = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        found.append(np.sort(order[np.column_stack([first[both], second[both]])], axis=1))
+        done = upto
+    return np.concatenate(found)
+
+
+def near_among(
+    table: PairTable,
+    placements: Array,
+    pieces: Indices,
+    group: Indices,
+    within: float,
+    left_out: Collection[tuple[int, int]] = (),
+) -> Contacts:
+    """Pairs of some pieces that are nearer than a distance, the nearest first, whatever pairs the table has.
+
+    Of two half-spaces nothing is said: they have no end. `number` is -1 for all.
+
+    Args:
+        table: all pieces.
+        placements: (n, 4, 3) where they are; see `Contacts.placements`.
+        pieces: (m,) those that are looked at.
+        group: (m,) pieces of the same group make no pair.
+        within: metres.
+        left_out: pairs of groups that make no pair either, the lesser group first.
+    """
+    centre = placements[pieces, 3]
+    half = np.einsum("kji,kj->ki", np.abs(placements[pieces, :3]), table.half[pieces]) + 0.5 * within
+    pairs = box_pairs(centre - half, centre + half)
+    groups = np.sort(group[pairs], axis=1)
+    kept = groups[:, 0] != groups[:, 1]
+    for one, other in left_out:
+        kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
+    kept &= _near_planes(table, placements, pieces[pairs], within)
+    chosen = pieces[pairs[kept]]
+    rows = [_measured(table, placements, int(first), int(second)) for first, second in chosen]
+    found = np.array(rows, dtype=float).reshape(-1, 10)
+    near = np.flatnonzero(found[:, 0] < within)
+    found, chosen = found[near], chosen[near]
+    number = np.full(len(near), -1, dtype=np.intp)
+    parts = (np.ascontiguousarray(found[:, k : k + 3]) for k in (1, 4, 7))
+    return Contacts(chosen, np.ascontiguousarray(found[:, 0]), *parts, number, placements).nearest_first()
+
+
+def _near_planes(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
+    """Whether the pieces of pairs (k, 2) can be near, judged by balls around them where one is a half-space."""
+    endless = np.isinf(table.reach[pairs])
+    kept = ~endless.all(axis=1)
+    for row in np.flatnonzero(kept & endless.any(axis=1)).tolist():
+        plane, other = pairs[row] if endless[row, 0] else pairs[row, ::-1]
+        normal = table.swept[plane].faces[0, :3] @ placements[plane, :3]
+        height = normal @ (placements[other, 3] - placements[plane, 3]) - table.swept[plane].faces[0, 3]
+        kept[row] = height - table.reach[other] < within
+    return np.asarray(kept)
+
+
+def _measured(table: PairTable, placements: Array, first: int, second: int) -> list[float]:
+    """Distance, normal, and nearest points of two pieces, by coal from its own first guess."""
+    shapes = [table.geometry.geometryObjects[k].geometry for k in (first, second)]
+    places = [coal.Transform3s(placements[k, :3].T, placements[k, 3]) for k in (first, second)]
+    result = coal.DistanceResult()
+    distance = coal.distance(shapes[0], places[0], shapes[1], places[1], coal.DistanceRequest(), result)
+    normal = np.array(result.normal)
+    if not np.linalg.norm(normal) > 0.5:  # coal has none where two centres meet: any parts them as well
+        normal = np.array([0.0, 0.0, 1.0])
+    return [distance, *normal, *result.getNearestPoint1(), *result.getNearestPoint2()]
