@@ -11,7 +11,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
-from wholebody.arrays import Array, Indices
+from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.broad_phase import near_among
@@ -99,24 +99,21 @@ class Scene(SceneContents):
             with self.borrow() as borrowed_one:
                 return self.overlapping(q, borrowed_one)
         near = workspace.near(q, 0.0)
-        pieces, group, held = self._standing()
-        standing = near_among(self.built.table, near.placements, pieces, group, 0.0, held)
+        pieces, group = self.built.standing
+        standing = near_among(self.built.table, near.placements, pieces, group, 0.0, self._held())
         together = (np.concatenate(parts) for parts in zip(near[:-1], standing[:-1], strict=True))
         return Contacts(*together, near.placements).nearest_first()
 
-    def _standing(self) -> tuple[Indices, Indices, list[tuple[int, int]]]:
-        """Pieces that the world carries, a number of the owner of each (0 for the figure), and owners held together."""
-        built = self.built
-        number = {name: k + 1 for k, name in enumerate(built.pieces_of)}
-        pieces: Indices = np.flatnonzero(built.table.joint == 0).astype(np.intp)
-        group: Indices = np.array([number.get(built.owners[k], 0) for k in pieces], dtype=np.intp)
-        held = [
+    def _held(self) -> list[tuple[int, int]]:
+        """Pairs of things that joints hold together, as numbers of `SceneGeometry.standing`."""
+        number = self.built.number_of
+        return [
             (min(number[name], number[joint.to]), max(number[name], number[joint.to]))
             for name, thing in self.objects.items()
-            for joint in (() if thing.body is None else thing.body.joints)
+            if thing.body is not None
+            for joint in thing.body.joints
             if joint.to in number
         ]
-        return pieces, group, held
 
     def sweep(
         self, q0: Array, q1: Array, tolerance: float = 1e-4, *, moves: Mapping[str, tuple[Any, Any]] | None = None

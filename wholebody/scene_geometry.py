@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Indices
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
@@ -81,6 +82,8 @@ class SceneGeometry:
         rows: builds contact rows.
         owners: name of the segment or object that each piece is part of.
         pieces_of: object to its pieces: index, and placement in the object.
+        number_of: object to a number from 1 on.
+        standing: pieces (m,) that the world carries, and the number of the object of each (m,); 0 for the figure's.
         lock: held while pieces are placed, and while more than one placement is copied.
         moves: how often a thing was placed.
     """
@@ -94,6 +97,9 @@ class SceneGeometry:
     ) -> None:
         self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
         self.table = PairTable(model, geometry)
+        self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
+        standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
+        self.standing = standing, np.array([self.number_of.get(owners[k], 0) for k in standing], dtype=np.intp)
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve
         self.lock = Lock()

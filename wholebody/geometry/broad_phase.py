@@ -25,7 +25,7 @@ def box_pairs(low: Array, high: Array) -> Indices:
     """
     if len(low) < 2:
         return np.zeros((0, 2), dtype=np.intp)
-    axis = int(np.argmax(np.std(low + high, axis=0)))
+    axis = int(np.argmax(np.ptp(low + high, axis=0)))
     order = np.argsort(low[:, axis], kind="stable")
     low, high = low[order], high[order]
     begins = np.arange(1, len(low) + 1)
@@ -70,7 +70,7 @@ def near_among(
     kept = groups[:, 0] != groups[:, 1]
     for one, other in left_out:
         kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
-    kept &= _near_planes(table, placements, pieces[pairs], within)
+    kept[kept] = _may_be_near(table, placements, pieces[pairs[kept]], within)
     chosen = pieces[pairs[kept]]
     rows = [_measured(table, placements, int(first), int(second)) for first, second in chosen]
     found = np.array(rows, dtype=float).reshape(-1, 10)
@@ -81,15 +81,25 @@ def near_among(
     return Contacts(chosen, np.ascontiguousarray(found[:, 0]), *parts, number, placements).nearest_first()
 
 
-def _near_planes(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
-    """Whether the pieces of pairs (k, 2) can be near, judged by balls around them where one is a half-space."""
+def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
+    """Whether the pieces of pairs (k, 2) can be near: along no axis of either's box, nor a plane's normal, are they not.
+
+    The boxes are those about the pieces along their own axes. Two half-spaces are not near.
+    """
+    axes, half = placements[pairs, :3], table.half[pairs]
+    apart = placements[pairs[:, 1], 3] - placements[pairs[:, 0], 3]
+    turned = np.abs(np.einsum("kij,klj->kil", axes[:, 0], axes[:, 1]))
+    gap = np.abs(np.einsum("ksij,kj->ksi", axes, apart)) - half
+    gap[:, 0] -= np.einsum("kil,kl->ki", turned, half[:, 1])
+    gap[:, 1] -= np.einsum("kil,ki->kl", turned, half[:, 0])
     endless = np.isinf(table.reach[pairs])
-    kept = ~endless.all(axis=1)
-    for row in np.flatnonzero(kept & endless.any(axis=1)).tolist():
-        plane, other = pairs[row] if endless[row, 0] else pairs[row, ::-1]
+    kept = (gap < within).all(axis=(1, 2)) & ~endless.all(axis=1)
+    for plane in np.unique(pairs[endless]).tolist():
+        rows = np.flatnonzero((pairs == plane).any(axis=1) & kept)
+        other = np.where(pairs[rows, 0] == plane, pairs[rows, 1], pairs[rows, 0])
         normal = table.swept[plane].faces[0, :3] @ placements[plane, :3]
-        height = normal @ (placements[other, 3] - placements[plane, 3]) - table.swept[plane].faces[0, 3]
-        kept[row] = height - table.reach[other] < within
+        height = (placements[other, 3] - placements[plane, 3]) @ normal - table.swept[plane].faces[0, 3]
+        kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
     return np.asarray(kept)
 
 
