@@ -133,16 +133,16 @@ class Pieces:
             local.append([*at.rotation.T, at.translation])
         self.body: Indices = np.array(body, dtype=np.intp)
         self.local = np.array(local, dtype=float).reshape(-1, 4, 3)
-        geometry = geometry_model(pieces)
-        first, second = np.triu_indices(len(pieces), 1)
-        a, b = self.body[first], self.body[second]
-        kept = (a != b) & (self.dynamic[a] | self.dynamic[b])
+        free = self.dynamic[self.body]  # each with what does not move by itself, and with those after it
+        first, second = np.repeat(np.flatnonzero(free), len(pieces)), np.tile(np.arange(len(pieces)), int(free.sum()))
+        pairs = np.sort(np.column_stack([first, second])[~free[second] | (first < second)], axis=1).astype(np.intp)
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        a, b = self.body[pairs].T
+        kept = a != b
         for names in held_together(scene):
             one, other = (self.index[name] for name in names)
             kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))
-        for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
-            geometry.addCollisionPair(pin.CollisionPair(i, j))
-        self.table = PairTable(pin.Model(), geometry)
+        self.table = PairTable(pin.Model(), geometry_model(pieces, pairs[kept]), pairs[kept])
         surfaces = self._surfaces(made_of)
         self.restitution, self.friction = surfaces[:, 0].copy(), surfaces[:, 1].copy()
         self._add_swept_points()
