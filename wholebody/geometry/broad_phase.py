@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
-import coal
 import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.geometry.single_pairs import measured
 
 AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more memory, 50 bytes each
 
@@ -72,8 +72,9 @@ def near_among(
         kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
     kept[kept] = _may_be_near(table, placements, pieces[pairs[kept]], within)
     chosen = pieces[pairs[kept]]
-    rows = [_measured(table, placements, int(first), int(second)) for first, second in chosen]
-    found = np.array(rows, dtype=float).reshape(-1, 10)
+    found = measured(table.geometry, placements, chosen)
+    # coal has no normal where two centres meet: any parts them as well
+    found[~(np.linalg.norm(found[:, 1:4], axis=1) > 0.5), 1:4] = (0.0, 0.0, 1.0)
     near = np.flatnonzero(found[:, 0] < within)
     found, chosen = found[near], chosen[near]
     number = np.full(len(near), -1, dtype=np.intp)
@@ -102,14 +103,3 @@ def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: fl
         kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
     return np.asarray(kept)
 
-
-def _measured(table: PairTable, placements: Array, first: int, second: int) -> list[float]:
-    """Distance, normal, and nearest points of two pieces, by coal from its own first guess."""
-    shapes = [table.geometry.geometryObjects[k].geometry for k in (first, second)]
-    places = [coal.Transform3s(placements[k, :3].T, placements[k, 3]) for k in (first, second)]
-    result = coal.DistanceResult()
-    distance = coal.distance(shapes[0], places[0], shapes[1], places[1], coal.DistanceRequest(), result)
-    normal = np.array(result.normal)
-    if not np.linalg.norm(normal) > 0.5:  # coal has none where two centres meet: any parts them as well
-        normal = np.array([0.0, 0.0, 1.0])
-    return [distance, *normal, *result.getNearestPoint1(), *result.getNearestPoint2()]

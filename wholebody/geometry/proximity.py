@@ -17,6 +17,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
+from wholebody.geometry.single_pairs import KEPT, measured, pair_data
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
@@ -198,7 +199,7 @@ class Proximity:
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
         self.asked = 0
-        self.results = pin.GeometryData(self.geometry)
+        self.results = pair_data(self.geometry, len(table.pairs))
         self._guesses = Guesses(self.results)
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
@@ -225,8 +226,13 @@ class Proximity:
     def _lay_views(self) -> None:
         for k in range(self.geometry.ngeoms):  # anywhere apart: views are laid over results that were computed
             self.results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        pin.computeDistances(self.geometry, self.results)
-        self._distances = result_view(self.results.distanceResults)
+        self._kept = len(self.table.pairs) <= KEPT
+        if self._kept:
+            pin.computeDistances(self.geometry, self.results)
+            self._distances = result_view(self.results.distanceResults)
+        else:  # memory that is never written takes none
+            pin.updateGeometryPlacements(self.table.model, self.table.model.createData(), self.geometry, self.results)
+            self._distances = np.zeros((len(self.table.pairs), RESULT_DOUBLES))
         self._placements = placement_view(self.results.oMg)
         self.reset()
 
@@ -279,6 +285,10 @@ class Proximity:
             )  # fmt: skip
             self._count = count
             self.asked += count
+            if not self._kept:
+                numbers = self._index[:count]
+                fields(self._distances)[numbers] = measured(self.geometry, placements, table.pairs[numbers])
+                return numbers
             if self._singly:
                 for number in self._index[:count].tolist():
                     pin.computeDistance(self.geometry, results, number)
