@@ -27,7 +27,7 @@ from wholebody.dynamics.joints import CLOSED, Joints
 from wholebody.dynamics.loops import compiled_kernel
 from wholebody.dynamics.passing import StepStart, check_passing
 from wholebody.dynamics.pieces import Pieces
-from wholebody.dynamics.sleeping import TOUCHING, Sleepers
+from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
 from wholebody.errors import InputError
 from wholebody.geometry.placement import FARTHEST
@@ -65,9 +65,7 @@ class RigidBodies:
         time: seconds since the start.
     """
 
-    def __init__(
-        self, scene: Scene, gravity: tuple[float, float, float] = GRAVITY, start: ArrayLike | None = None
-    ) -> None:
+    def __init__(self, scene: Scene, gravity: ArrayLike = GRAVITY, start: ArrayLike | None = None) -> None:
         """Put all bodies where the scene has them, and the figure into a posture.
 
         Args:
@@ -76,16 +74,14 @@ class RigidBodies:
             start: (nq,) posture of the figure; its first one by default.
 
         Raises:
-            InputError: nothing in the scene has a body, two things overlap, or a thing and the figure, of which one
-                moves by itself, two materials do not know each other, a thing has a joint to itself, gravity is out
-                of range, or start is no posture of the figure.
+            InputError: nothing in the scene has a body, a thing that moves by itself overlaps something, two materials
+                do not know each other, a thing has a joint to itself, or gravity or start is no such value.
             UnknownNameError: a joint names a thing that is not there.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
         self.gravity = _bounded(gravity, STRONGEST_GRAVITY, "gravity")
-        figure = scene.figure
-        first = figure.posture(figure.postures[0]) if start is None else checks.posture(start, figure.model.nq, "start")
-        pieces = Pieces(scene, first)
+        first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
+        pieces = Pieces(scene, checks.posture(first, scene.model.nq, "start"))
         if not pieces.dynamic.any():
             raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
         compiled_kernel()
@@ -214,10 +210,12 @@ class RigidBodies:
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
         state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
-        for number in given:
+        ended = state.copies()
+        for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
-        self._give(given, dt)
+            state.give(number, before, after, dt)
+        self._sleepers.wake_where_put(self._finder, ended)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
         record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
         self._pushed = 0.0
@@ -233,17 +231,6 @@ class RigidBodies:
         self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
-
-    def _give(self, given: Mapping[int, tuple[pin.SE3, pin.SE3]], dt: float) -> None:
-        """Let bodies move from one placement to another within a frame; sleepers wake where they came or left."""
-        state = self.state
-        position, rotation = state.position.copy(), state.rotation.copy()
-        for number, (before, after) in given.items():
-            state.give(number, before, after, dt)
-        came = (state.position != position).any(axis=1) | (state.rotation != rotation).any(axis=(1, 2))
-        if came.any() and self._sleepers.count:
-            margin = np.full(len(self.names), 0.5 * TOUCHING)
-            self._sleepers.wake(self._finder.near(state.position, state.rotation, margin, came), came)
 
     # ---- a step
 

@@ -7,6 +7,7 @@ import numpy as np
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.dynamics import contact_kernel
 from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.geometry.proximity import Contacts
 
 STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
@@ -96,6 +97,14 @@ class Sleepers:
         self._slow_for[waking] = 0.0
         self._forget()
         return True
+
+    def wake_where_put(self, finder: ContactFinder, before: tuple[Array, Array, Array]) -> None:
+        """Wake what is touched by bodies that were put elsewhere than before (`BodiesState.copies`), or left by them."""
+        state = self._state
+        put = (state.position != before[0]).any(axis=1) | (state.rotation != before[1]).any(axis=(1, 2))
+        if put.any() and self.count:
+            margin = np.full(len(put), 0.5 * TOUCHING)
+            self.wake(finder.near(state.position, state.rotation, margin, put), put)
 
     def _forget(self) -> None:
         """Forget what touched bodies that are awake."""

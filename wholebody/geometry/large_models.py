@@ -61,7 +61,8 @@ def _one_by_one(pieces: Sequence[pin.GeometryObject], pairs: Indices) -> pin.Geo
 def _places(count: int, given: Indices | None) -> pin.GeometryModel | None:
     """A model of empty entries; None if this Pinocchio serialises its models in another way.
 
-    With pairs it has these, and no table; otherwise it has a table of no pairs. Each further piece adds the same text to a model's text, and each further pair its two numbers; only counts change.
+    With pairs it has these, and no table; otherwise it has a table of no pairs. Each further piece adds the same text
+    to a model's text, and each further pair its two numbers; only counts change.
     """
     one, two, joined = (_tokens(count, paired) for count, paired in ((1, False), (2, False), (2, True)))
     pairs = np.zeros((0, 2), dtype=np.intp) if given is None else given

@@ -223,7 +223,7 @@ class _Postures:
         for k in range(geometry.ngeoms):  # anywhere apart: views are checked by results that were computed
             self._results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
         checked = {k * (len(table.pairs) - 1) // 6 for k in (0, 2, 3, 6)}
-        for number in sorted(checked) if 0 < len(table.pairs) and self._kept else ():
+        for number in sorted(checked) if self._kept and len(table.pairs) else ():
             pin.computeDistance(geometry, self._results, number)
         self._view, self._placed = distance_view(self._results.distanceResults), placement_view(self._results.oMg)
         self.guesses = Guesses(self._results)
