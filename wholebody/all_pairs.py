@@ -101,7 +101,9 @@ class AllPairs:
         self._placed = np.array([[*at.rotation.T, at.translation] for at in oMg]) if view is None else view.copy()
         first, second = table.pairs.T
         centre = self._placed[:, 3]
-        self.distance = np.linalg.norm(centre[second] - centre[first], axis=1) - table.reach[first] - table.reach[second]
+        self.distance = (
+            np.linalg.norm(centre[second] - centre[first], axis=1) - table.reach[first] - table.reach[second]
+        )
         self._asked = np.zeros(len(first), dtype=bool)
         self._rows = np.zeros((len(first), RESULT_FIELDS))  # memory that is never written takes none
         self.ask(float(np.sort(self.distance)[min(FIRST_ASKED, len(first) - 1)]))

@@ -372,12 +372,9 @@ class RigidBodies:
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> tuple[float, float]:
-        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements.
+        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
 
-        Bodies that are lifted pay for it with their kinetic energy.
-
-        Returns:
-            The least distance then, and the energy that they could not pay, joules.
+        Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
         """
         state = self.state
         before, position = self.energy(), state.position.copy()

@@ -19,8 +19,8 @@ MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap a
 class Sleepers:
     """Which bodies sleep. A body sleeps and wakes together with all that touch each other.
 
-    Of what touches a sleeper, and does not sleep, its placement is kept: when it is elsewhere by `MOVED`, however slowly
-    or suddenly it came there, the sleeper wakes. What came to touch a sleeper later has moved, and wakes it too.
+    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `MOVED`, however slowly
+    or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it too.
     """
 
     def __init__(self, state: BodiesState, together: Indices) -> None:
@@ -99,7 +99,7 @@ class Sleepers:
         return True
 
     def wake_where_put(self, finder: ContactFinder, before: tuple[Array, Array, Array]) -> None:
-        """Wake what is touched by bodies that were put elsewhere than before (`BodiesState.copies`), or left by them."""
+        """Wake what is touched or was left by bodies that were put elsewhere than in `before`, of `state.copies`."""
         state = self._state
         put = (state.position != before[0]).any(axis=1) | (state.rotation != before[1]).any(axis=(1, 2))
         if put.any() and self.count:

@@ -83,7 +83,7 @@ def near_among(
 
 
 def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
-    """Whether the pieces of pairs (k, 2) can be near: along no axis of either's box, nor a plane's normal, are they not.
+    """Whether the pieces of pairs (k, 2) can be near, along the axes of both of their boxes, or a plane's normal.
 
     The boxes are those about the pieces along their own axes. Two half-spaces are not near.
     """
@@ -102,4 +102,3 @@ def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: fl
         height = (placements[other, 3] - placements[plane, 3]) @ normal - table.swept[plane].faces[0, 3]
         kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
     return np.asarray(kept)
-

@@ -84,8 +84,17 @@ def written_sleeper(rng: np.random.Generator) -> Written:
     """Write a body that sleeps on a thing, and how that moves."""
     edge = float(rng.uniform(0.05, 0.3))
     half = 0.5 * edge
-    shapes = (f"wb.Box(({edge}, {edge}, {edge}))", f"wb.Box(({edge}, {2 * edge}, {edge}))", f"wb.Cylinder({half}, {edge})")
-    supports = ("wb.Box((1.0, 1.0, 0.2))", "wb.HalfSpace(offset=0.1)", "wb.Cylinder(0.5, 0.2)", "wb.Box((0.6, 2.0, 0.2))")
+    shapes = (
+        f"wb.Box(({edge}, {edge}, {edge}))",
+        f"wb.Box(({edge}, {2 * edge}, {edge}))",
+        f"wb.Cylinder({half}, {edge})",
+    )
+    supports = (
+        "wb.Box((1.0, 1.0, 0.2))",
+        "wb.HalfSpace(offset=0.1)",
+        "wb.Cylinder(0.5, 0.2)",
+        "wb.Box((0.6, 2.0, 0.2))",
+    )
     way = str(rng.choice(["creeps", "jumps", "leaves", "turns"]))
     at = np.array([3.0, 0.0, -0.1])
     direction = rng.normal(size=3) if rng.random() < 0.5 else np.array([0.0, 0.0, float(rng.choice([-1.0, 1.0]))])
@@ -121,7 +130,7 @@ def sleeper_verdict(scene: wb.Scene, moves: list[tuple[float, ...]], over: bool)
         return Verdict("gave up", f"the body does not sleep after {FALLS_ASLEEP} frames")
     since = 0
     for number, at in enumerate([*moves, *[moves[-1]] * GETS_OUT]):
-        if number < len(moves) and at != moves[max(0, number - 1)] or number == 0:
+        if number == 0 or (number < len(moves) and at != moves[number - 1]):
             scene.move("support", at=at, over=world.dt if over else None)
             since = 0
         since += 1
@@ -153,16 +162,12 @@ def _size(made: wb.Shape) -> float:
 def _apart(scene: wb.Scene, one: str, other: str) -> float:
     """Least distance of two things by coal, negative where they overlap."""
     first, second = (
-        [(thing.placement * piece.placement, piece.geometry) for piece in thing.shape.pieces()]
+        [
+            (piece.geometry, coal.Transform3s(at.rotation, at.translation))
+            for piece in thing.shape.pieces()
+            for at in [thing.placement * piece.placement]
+        ]
         for thing in (scene.objects[one], scene.objects[other])
     )
-    return min(
-        float(
-            coal.distance(
-                shape_a, coal.Transform3s(a.rotation, a.translation), shape_b,
-                coal.Transform3s(b.rotation, b.translation), coal.DistanceRequest(), coal.DistanceResult(),
-            )
-        )  # fmt: skip
-        for a, shape_a in first
-        for b, shape_b in second
-    )  # fmt: skip
+    request = coal.DistanceRequest()
+    return min(float(coal.distance(*a, *b, request, coal.DistanceResult())) for a in first for b in second)
