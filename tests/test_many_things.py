@@ -111,4 +111,4 @@ def test_a_scene_of_three_thousand_things_is_as_one_of_few() -> None:
     for copied in (copy.copy(scene), pickle.loads(pickle.dumps(scene))):
         assert copied.contacts(q, 0.05).distance == pytest.approx(contacts.distance, abs=2e-6)
     scene.move("thing 5", at=(0.0, 0.0, 1.0))
-    assert "thing 5" in {one.b for one in scene.penetration(q)}
+    assert "thing 5" in {scene.piece_owner[piece] for piece in scene.overlapping(q).pair.ravel().tolist()}

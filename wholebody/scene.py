@@ -79,7 +79,9 @@ class Scene(SceneContents):
 
         with self.borrow() as workspace:
             near = self.overlapping(q, workspace)
-            return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
+            return object_penetrations(
+                workspace.geometry, near.placements, workspace.owners, near.pair, workspace.table.pairs
+            )
 
     def overlapping(self, q: Array, workspace: Workspace | None = None) -> Contacts:
         """Every pair of pieces that overlap at the posture q, shape (nq,), the deepest first.
