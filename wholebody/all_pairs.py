@@ -17,7 +17,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_FIELDS, distance_view, placement_view, read_result
-from wholebody.geometry.single_pairs import KEPT, measured, pair_data
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.pool import Pool
 from wholebody.scene_geometry import SceneGeometry
 
@@ -48,7 +48,7 @@ class AllPairs:
         self._kept = len(built.table.pairs) <= KEPT
         self._results = pair_data(built.geometry, len(built.table.pairs))
         self._asked, self._rows = np.zeros(0, dtype=bool), np.zeros((0, RESULT_FIELDS))
-        self._placed = np.zeros((0, 4, 3))
+        self._placed, self._single = np.zeros((0, 4, 3)), SinglePairs(built.geometry)
         self._guesses = Guesses(self._results)
         self._views: tuple[Array | None, Array | None] | None = None  # laid over results once they are computed
         self.distance, self.least = np.zeros(0), float("inf")
@@ -89,7 +89,7 @@ class AllPairs:
             return
         while len(number := np.flatnonzero(~self._asked & (self.distance < within))):
             number = number[:ASKED_AT_ONCE]
-            self._rows[number] = measured(self._built.geometry, self._placed, self._built.table.pairs[number])
+            self._rows[number] = self._single.measured(self._placed, self._built.table.pairs[number])
             self.distance[number], self._asked[number] = self._rows[number, 0], True
         if np.isnan(self.distance).any():
             raise InputError(NOT_A_NUMBER)

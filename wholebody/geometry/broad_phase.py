@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.arrays import Array, Indices, Mask
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.geometry.single_pairs import measured
+from wholebody.geometry.single_pairs import SinglePairs
 
 AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more memory, 50 bytes each
 
@@ -72,14 +72,14 @@ def near_among(
         kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
     kept[kept] = _may_be_near(table, placements, pieces[pairs[kept]], within)
     chosen = pieces[pairs[kept]]
-    found = measured(table.geometry, placements, chosen)
+    found = SinglePairs(table.geometry).measured(placements, chosen)
     # coal has no normal where two centres meet: any parts them as well
     found[~(np.linalg.norm(found[:, 1:4], axis=1) > 0.5), 1:4] = (0.0, 0.0, 1.0)
     near = np.flatnonzero(found[:, 0] < within)
     found, chosen = found[near], chosen[near]
     number = np.full(len(near), -1, dtype=np.intp)
-    parts = (np.ascontiguousarray(found[:, k : k + 3]) for k in (1, 4, 7))
-    return Contacts(chosen, np.ascontiguousarray(found[:, 0]), *parts, number, placements).nearest_first()
+    distance, normal, point_a, point_b = (np.ascontiguousarray(part) for part in np.split(found, (1, 4, 7), axis=1))
+    return Contacts(chosen, distance[:, 0], normal, point_a, point_b, number, placements).nearest_first()
 
 
 def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:

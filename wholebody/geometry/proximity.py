@@ -17,7 +17,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
-from wholebody.geometry.single_pairs import KEPT, measured, pair_data
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
@@ -226,7 +226,7 @@ class Proximity:
     def _lay_views(self) -> None:
         for k in range(self.geometry.ngeoms):  # anywhere apart: views are laid over results that were computed
             self.results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        self._kept = len(self.table.pairs) <= KEPT
+        self._kept, self._single = len(self.table.pairs) <= KEPT, SinglePairs(self.geometry)
         if self._kept:
             pin.computeDistances(self.geometry, self.results)
             self._distances = result_view(self.results.distanceResults)
@@ -287,7 +287,8 @@ class Proximity:
             self.asked += count
             if not self._kept:
                 numbers = self._index[:count]
-                fields(self._distances)[numbers] = measured(self.geometry, placements, table.pairs[numbers])
+                assert self._distances is not None
+                fields(self._distances)[numbers] = self._single.measured(placements, table.pairs[numbers])
                 return numbers
             if self._singly:
                 for number in self._index[:count].tolist():

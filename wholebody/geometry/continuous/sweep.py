@@ -23,7 +23,7 @@ from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
 from wholebody.geometry.proximity import SINGLY
-from wholebody.geometry.single_pairs import KEPT, measured, pair_data
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points
 
 TOLERANCE = 1e-4
@@ -83,7 +83,7 @@ class Sweep:
         few = len(self._pairs) < SINGLY  # otherwise no table over all pairs of pieces is made
         self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
         self._place(pin.neutral(model), np.zeros(model.nv))
-        self._kept = len(self._pairs) <= KEPT
+        self._kept, self._single = len(self._pairs) <= KEPT, SinglePairs(geometry)
         if self._kept:
             pin.computeDistances(geometry, self._results)
         self._view = distance_view(self._results.distanceResults)
@@ -244,7 +244,7 @@ class Sweep:
             for piece in np.unique(pairs).tolist():
                 at = self._results.oMg[piece]
                 placed[piece, :3], placed[piece, 3] = at.rotation.T, at.translation
-            return measured(self.geometry, placed, pairs)
+            return self._single.measured(placed, pairs)
         if len(self._active):
             first, second = self._pairs[index, 0], self._pairs[index, 1]
             self._active[:] = False
