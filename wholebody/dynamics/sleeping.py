@@ -81,9 +81,9 @@ class Sleepers:
             came: (n,) bodies that were put where they are; none by default.
         """
         state, asleep = self._state, self._asleep()
-        if not asleep.any():
-            return False
         active = state.moving | state.given if came is None else state.moving | state.given | came
+        if not (asleep.any() and active.any()):
+            return False
         both = self._touching(near)
         both = np.concatenate([both, both[:, ::-1]])
         both = both[asleep[both[:, 0]] & active[both[:, 1]]]
