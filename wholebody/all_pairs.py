@@ -16,11 +16,16 @@ from wholebody.arrays import Array, Indices
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import RESULT_FIELDS, distance_view, placement_view, read_result
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.pool import Pool
 from wholebody.scene_geometry import SceneGeometry
 
 PATCH = 1e-4  # m: beyond the nearest points up to which corners of a contact patch count
+
+FIRST_ASKED = 100  # pairs of a scene of very many that are asked for first, to bound the least distance
+ASKED_AT_ONCE = 100_000  # pairs
+NOT_A_NUMBER = "a distance is not a number; an object's placement or shape is broken"
 
 Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...]]
 
@@ -30,7 +35,9 @@ class AllPairs:
 
     Attributes:
         state: the kinematic state of the last posture.
-        distance: (pairs,) signed distance of every pair there, metres.
+        distance: (pairs,) signed distance of every pair there, metres. In a scene of more than `KEPT` pairs a lower
+            bound, by the balls around the pieces, of those that no question was about: they do not overlap, and are
+            farther apart than the nearest pair and than what `nearer` and `ask` were asked.
         least: the least of them; inf without pairs.
     """
 
@@ -38,7 +45,10 @@ class AllPairs:
         """Allocate."""
         self._built = built
         self.state = State(built.model)
-        self._results = pin.GeometryData(built.geometry)
+        self._kept = len(built.table.pairs) <= KEPT
+        self._results = pair_data(built.geometry, len(built.table.pairs))
+        self._asked, self._rows = np.zeros(0, dtype=bool), np.zeros((0, RESULT_FIELDS))
+        self._placed, self._single = np.zeros((0, 4, 3)), SinglePairs(built.geometry)
         self._guesses = Guesses(self._results)
         self._views: tuple[Array | None, Array | None] | None = None  # laid over results once they are computed
         self.distance, self.least = np.zeros(0), float("inf")
@@ -53,6 +63,9 @@ class AllPairs:
         self.state.update(q)
         with built.lock:  # not while a thing is moved, one piece after the other
             pin.updateGeometryPlacements(built.model, self.state.data, built.geometry, results)
+        if not self._kept:
+            self._bound()
+            return
         self._guesses.reset()  # the judgement of a posture does not depend on the one before
         pin.computeDistances(built.geometry, results)
         if self._views is None:
@@ -64,10 +77,46 @@ class AllPairs:
             self.distance = np.array([result.min_distance for result in results.distanceResults], dtype=float)
         self.least = float(self.distance.min(initial=np.inf))
         if np.isnan(self.least):
-            raise InputError("a distance is not a number; an object's placement or shape is broken")
+            raise InputError(NOT_A_NUMBER)
+
+    def ask(self, within: Array | float) -> None:
+        """Let `distance` be exact for all pairs that are nearer than `within` metres, (pairs,) or one for all.
+
+        Raises:
+            InputError: a distance is not a number.
+        """
+        if self._kept:
+            return
+        while len(number := np.flatnonzero(~self._asked & (self.distance < within))):
+            number = number[:ASKED_AT_ONCE]
+            self._rows[number] = self._single.measured(self._placed, self._built.table.pairs[number])
+            self.distance[number], self._asked[number] = self._rows[number, 0], True
+        if np.isnan(self.distance).any():
+            raise InputError(NOT_A_NUMBER)
+
+    def _bound(self) -> None:
+        """Bound all distances from below, and ask for those that can be the least."""
+        table, view = self._built.table, placement_view(self._results.oMg)
+        oMg = self._results.oMg
+        self._placed = np.array([[*at.rotation.T, at.translation] for at in oMg]) if view is None else view.copy()
+        first, second = table.pairs.T
+        centre = self._placed[:, 3]
+        self.distance = (
+            np.linalg.norm(centre[second] - centre[first], axis=1) - table.reach[first] - table.reach[second]
+        )
+        self._asked = np.zeros(len(first), dtype=bool)
+        self._rows = np.zeros((len(first), RESULT_FIELDS))  # memory that is never written takes none
+        self.ask(float(np.sort(self.distance)[min(FIRST_ASKED, len(first) - 1)]))
+        self.ask(max(0.0, float(self.distance[self._asked].min(initial=np.inf))))  # what overlaps is counted
+        self.least = float(self.distance.min(initial=np.inf))
 
     def nearer(self, within: Array) -> NearPairs:
         """What there is to know of pairs nearer than `within` (pairs,), metres; it outlives the next `move`."""
+        self.ask(within)
+        if not self._kept:
+            number = np.flatnonzero(self.distance < within)
+            pair = self._built.table.pairs[number]
+            return NearPairs(self._built, number, pair, self._rows[number], self._placed[pair])
         number = np.flatnonzero(self.distance < within)
         results, (near, placed) = self._results, self._views or (None, None)
         found = near[number] if near is not None else [read_result(results.distanceResults[k]) for k in number.tolist()]

@@ -142,6 +142,7 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     pairs.move(q)
     state = pairs.state
     distance, angle, each = goal_errors(problem, state)
+    pairs.ask(problem.clearances)
     violation = float((problem.clearances - pairs.distance).max(initial=0.0))
     missed = largest_violation(problem, state)
     fits = all(left <= MET for left in (distance, angle, violation, missed))

@@ -15,6 +15,7 @@ import pinocchio as pin
 from wholebody.arrays import Array, Indices
 from wholebody.checks import known, numbers
 from wholebody.errors import InputError
+from wholebody.geometry.large_models import add_pairs
 from wholebody.scene_geometry import SceneGeometry
 
 PER_THING = 7
@@ -142,9 +143,12 @@ class MovingScene:
             name for name, pieces in self.built.pieces_of.items()
             if self.built.geometry.geometryObjects[pieces[0][0]].parentJoint == 0
         ]  # fmt: skip
-        for number, first in enumerate(in_world):
-            for second in in_world[number + 1 :]:
-                if first in self.joints or second in self.joints:
-                    for i, _ in self.built.pieces_of[first]:
-                        for j, _ in self.built.pieces_of[second]:
-                            self.geometry.addCollisionPair(pin.CollisionPair(min(i, j), max(i, j)))
+        pairs = [
+            sorted((i, j))
+            for number, first in enumerate(in_world)
+            for second in in_world[number + 1 :]
+            if first in self.joints or second in self.joints
+            for i, _ in self.built.pieces_of[first]
+            for j, _ in self.built.pieces_of[second]
+        ]
+        add_pairs(self.geometry, np.array(pairs, dtype=np.intp).reshape(-1, 2))

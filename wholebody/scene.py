@@ -7,12 +7,14 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.broad_phase import near_among
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
 from wholebody.geometry.proximity import Contacts
@@ -53,7 +55,9 @@ class Scene(SceneContents):
         return State(self.model).update(q)
 
     def contacts(self, q: Array, within: float = 0.05) -> Contacts:
-        """Every pair nearer than `within` metres at the posture q, shape (nq,), nearest first.
+        """Every pair of the scene nearer than `within` metres at the posture q, shape (nq,), nearest first.
+
+        These are the pairs that a posture changes, `pair_table.pairs`; see `overlapping` for those of things too.
 
         Raises:
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
@@ -65,7 +69,8 @@ class Scene(SceneContents):
     def penetration(self, q: Array) -> list[ObjectPenetration]:
         """Depth of overlap of owners (segments, objects) at q (nq,): PD_g and the least separating translation.
 
-        The deepest first; empty if nothing overlaps. See `wholebody.geometry.penetration`.
+        The deepest first; empty if nothing overlaps. The pairs are those of `overlapping`. See
+        `wholebody.geometry.penetration`.
 
         Raises:
             InputError: q has the wrong shape or is not finite.
@@ -73,8 +78,44 @@ class Scene(SceneContents):
         from wholebody.geometry.penetration import object_penetrations
 
         with self.borrow() as workspace:
-            near = workspace.near(q, 0.0).nearest_first()
-            return object_penetrations(workspace.geometry, near.placements, workspace.owners, near.pair)
+            near = self.overlapping(q, workspace)
+            return object_penetrations(
+                workspace.geometry, near.placements, workspace.owners, near.pair, workspace.table.pairs
+            )
+
+    def overlapping(self, q: Array, workspace: Workspace | None = None) -> Contacts:
+        """Every pair of pieces that overlap at the posture q, shape (nq,), the deepest first.
+
+        Beside the pairs of the scene these are pairs of two things in the world, and of a thing and a part of the
+        figure that cannot move. Left out are two half-spaces, which have no end, and things that a joint of their
+        `wb.Body` holds together, which do not collide. `number` is -1 for pairs that the scene does not have.
+
+        Args:
+            q: the posture.
+            workspace: a workspace of the scene, whose placements count; the scene's present ones by default.
+
+        Raises:
+            InputError: q has the wrong shape or is not finite.
+        """
+        if workspace is None:
+            with self.borrow() as borrowed_one:
+                return self.overlapping(q, borrowed_one)
+        near = workspace.near(q, 0.0)
+        pieces, group = self.built.standing
+        standing = near_among(self.built.table, near.placements, pieces, group, 0.0, self._held())
+        together = (np.concatenate(parts) for parts in zip(near[:-1], standing[:-1], strict=True))
+        return Contacts(*together, near.placements).nearest_first()
+
+    def _held(self) -> list[tuple[int, int]]:
+        """Pairs of things that joints hold together, as numbers of `SceneGeometry.standing`."""
+        number = self.built.number_of
+        return [
+            (min(number[name], number[joint.to]), max(number[name], number[joint.to]))
+            for name, thing in self.objects.items()
+            if thing.body is not None
+            for joint in thing.body.joints
+            if joint.to in number
+        ]
 
     def sweep(
         self, q0: Array, q1: Array, tolerance: float = 1e-4, *, moves: Mapping[str, tuple[Any, Any]] | None = None

@@ -82,7 +82,11 @@ class SceneContents(checks.FixedAttributes):
 
     @property
     def geometry(self) -> pin.GeometryModel:
-        """Pinocchio's geometry model: pieces of the figure, of carried things, of things around; all pairs."""
+        """Pinocchio's geometry model: pieces of the figure, of carried things, of things around; all pairs.
+
+        Of more than 2,000 pieces it has no table of pair numbers, which takes gigabytes: do not call
+        `addCollisionPair`, `findCollisionPair` or `existCollisionPair` on it then.
+        """
         return self._build().geometry
 
     @property

@@ -11,6 +11,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from wholebody.arrays import Indices
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model
@@ -81,6 +82,8 @@ class SceneGeometry:
         rows: builds contact rows.
         owners: name of the segment or object that each piece is part of.
         pieces_of: object to its pieces: index, and placement in the object.
+        number_of: object to a number from 1 on.
+        standing: pieces (m,) that the world carries, and the number of the object of each (m,); 0 for the figure's.
         lock: held while pieces are placed, and while more than one placement is copied.
         moves: how often a thing was placed.
     """
@@ -91,9 +94,13 @@ class SceneGeometry:
         geometry: pin.GeometryModel,
         owners: tuple[str, ...],
         pieces_of: dict[str, list[tuple[int, pin.SE3]]],
+        pairs: Indices | None = None,
     ) -> None:
         self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
-        self.table = PairTable(model, geometry)
+        self.table = PairTable(model, geometry, pairs)
+        self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
+        standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
+        self.standing = standing, np.array([self.number_of.get(owners[k], 0) for k in standing], dtype=np.intp)
         self.rows = ContactRowBuilder(self.table)
         compiled_kernel()  # of `far_moved`: compile now, not during a solve
         self.lock = Lock()
@@ -159,7 +166,9 @@ class SceneGeometry:
     def copied(self) -> SceneGeometry:
         """A copy with placements of its own."""
         with self.lock:
-            return SceneGeometry(self.model, self.geometry.copy(), self.owners, dict(self.pieces_of))
+            return SceneGeometry(
+                self.model, self.geometry.copy(), self.owners, dict(self.pieces_of), self.table.pairs
+            )  # fmt: skip
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the arguments that it is made from."""
@@ -168,6 +177,7 @@ class SceneGeometry:
             "geometry": self.geometry,
             "owners": self.owners,
             "pieces_of": self.pieces_of,
+            "pairs": self.table.pairs,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -195,22 +205,43 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
             pieces.append(pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry))
             owners.append(thing.name)
 
-    geometry = geometry_model(pieces)
-    for pair in figure.geometry.collisionPairs:
-        geometry.addCollisionPair(pin.CollisionPair(pair.first, pair.second))
-    joints = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=int)
+    joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
-    excluded.update(_leaning(figure, geometry, body, joints, owners, carried))
-    for second in range(body, geometry.ngeoms):
-        for first in np.flatnonzero(joints[:second] != joints[second]).tolist():
-            if (owners[first], owners[second]) not in excluded:
-                geometry.addCollisionPair(pin.CollisionPair(first, second))
-    return SceneGeometry(model, geometry, tuple(owners), pieces_of)
+    excluded.update(_leaning(figure, pieces, body, joints, owners, carried))
+    pairs = np.concatenate([_own_pairs(figure), _pairs_of_things(body, joints, owners, excluded)])
+    return SceneGeometry(model, geometry_model(pieces, pairs), tuple(owners), pieces_of, pairs)
+
+
+def _own_pairs(figure: Figure) -> Indices:
+    """(k, 2) the figure's own pairs."""
+    listed = [[pair.first, pair.second] for pair in figure.geometry.collisionPairs]
+    return np.array(listed, dtype=np.intp).reshape(-1, 2)
+
+
+def _pairs_of_things(
+    body: int, joints: NDArray[np.int_], owners: list[str], excluded: Mapping[tuple[str, str], str]
+) -> Indices:
+    """(k, 2) pairs of a thing's piece, from `body` on, and an earlier one that another joint carries."""
+    moving = int(np.flatnonzero(joints > 0).max(initial=-1)) + 1  # what stands in the world comes last, and meets these
+    found = [np.zeros((0, 2), dtype=np.intp)]
+    earlier = np.arange(moving)
+    for joint in np.unique(joints[body:]).tolist():
+        seconds = np.flatnonzero(joints == joint)
+        seconds = seconds[seconds >= body]
+        firsts = earlier[joints[:moving] != joint] if moving else earlier
+        pairs = np.column_stack([np.tile(firsts, len(seconds)), np.repeat(seconds, len(firsts))])
+        found.append(pairs[pairs[:, 0] < pairs[:, 1]])
+    pairs = np.concatenate(found)
+    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    if excluded:
+        kept = [(owners[first], owners[second]) not in excluded for first, second in pairs.tolist()]
+        pairs = pairs[np.array(kept, dtype=bool)] if len(pairs) else pairs
+    return pairs
 
 
 def _leaning(
     figure: Figure,
-    geometry: pin.GeometryModel,
+    pieces: list[pin.GeometryObject],
     body: int,
     joints: NDArray[np.int_],
     owners: list[str],
@@ -219,15 +250,15 @@ def _leaning(
     """Pairs (segment, carried thing) that are not tested, with the reason."""
     if not carried:
         return {}
-    names = [piece.name for piece in figure.geometry.geometryObjects]
+    count = len(figure.geometry.geometryObjects)
     segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
     tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
-    joint_of = dict(zip(segments, joints[: len(names)], strict=True))
-    probe = geometry.copy()
-    probe.removeAllCollisionPairs()
-    for second in range(body, geometry.ngeoms):
+    joint_of = dict(zip(segments, joints[:count], strict=True))
+    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
+    probe = geometry_model(pieces[: held[-1] + 1])
+    for second in held:
         for first in range(body):
-            if owners[second] in carried and joints[first] != joints[second]:
+            if joints[first] != joints[second]:
                 probe.addCollisionPair(pin.CollisionPair(first, second))
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()

@@ -47,7 +47,7 @@ def test_a_frame_of_tumbling_boxes_takes_few_steps() -> None:
 
 def way_between(scene: wb.Scene, steps: dict[str, tuple[pin.SE3, float]], margin: float = 1e-3) -> PassingCheck:
     """What is known of the way on which bodies take steps, each given with the most that a point of it moves."""
-    pieces = Pieces(scene)
+    pieces = Pieces(scene, scene.figure.neutral)
     state, finder = BodiesState(scene, pieces), ContactFinder(pieces)
     count = len(pieces.names)
     margins, travel = np.full(count, margin), np.zeros(count)

@@ -9,6 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.dynamics.driven_impulses import contact_impulse
 from wholebody.dynamics.overlaps import overlaps
+from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.matter.materials import Surface
 
 DT = 1.0 / 60.0
@@ -164,3 +165,95 @@ def test_wrong_worlds_are_one_sentence(planar_arm) -> None:
         wb.World(scene, spring=3.0)
     with pytest.raises(wb.InputError, match="tracked"):
         wb.World(scene).step("q")
+
+
+def test_a_world_begins_in_its_start_and_not_in_the_first_posture() -> None:
+    figure = wb.load("avatar")
+    first = figure.posture(figure.postures[0])
+    at = figure.placement(first, "head").translation
+    scene = wb.Scene(figure).add(wb.Box((0.2, 0.2, 0.2)), name="carton", at=at, body=wb.Body(mass=1.0))
+    with pytest.raises(wb.InputError, match="overlap by"):
+        RigidBodies(scene)
+    aside = first.copy()
+    aside[0] += 1.5  # the whole figure
+    world = wb.World(scene, aside)
+    assert world.engine is not None
+    head = world.engine.placement("head").translation
+    assert head == pytest.approx(figure.placement(world.q, "head").translation, abs=1e-9)
+    assert world.step(aside).deepest <= 1e-4
+    scene.move("carton", at=figure.placement(aside, "head").translation)
+    with pytest.raises(wb.InputError, match="overlap by"):
+        RigidBodies(scene, start=aside)
+
+
+@pytest.mark.parametrize("count", [1, 10])
+def test_a_tower_that_touches_exactly_gains_no_more_than_its_work(count: int) -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(offset=-2.0), name="floor")
+    for k in range(count):
+        scene.add(wb.Box((0.2, 0.2, 0.2)), name=f"box {k}", at=(3.0, 0.0, -1.9 + 0.2 * k), body=wb.Body(mass=8.0))
+    engine = RigidBodies(scene)
+    energy = engine.energy()
+    for _ in range(60):
+        frame = engine.advance(1 / 60)
+        assert frame.energy - energy <= frame.work + 1e-9
+        energy = frame.energy
+
+
+def squeezed(planar_arm) -> tuple[wb.World, wb.Scene]:
+    """A ball on a table between two fixed things."""
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    scene.add(wb.Box((3.0, 3.0, 0.1)), name="table", at=(2.0, 0.0, -1.05))
+    scene.add(wb.Sphere(0.1), name="ball", at=(2.0, 0.0, -0.8999), body=wb.Body(mass=1.0))
+    scene.add(wb.Box((0.2, 0.4, 0.4)), name="wall", at=(2.2001, 0.0, -0.7999))
+    scene.add(wb.Box((0.2, 0.4, 0.4)), name="press", at=(1.7999, 0.0, -0.7999))
+    return wb.World(scene, np.zeros(3)), scene
+
+
+def test_a_ball_that_is_squeezed_is_told(planar_arm) -> None:
+    world, scene = squeezed(planar_arm)
+    for k in range(4):
+        press = 1.7999 + 0.01 * (k + 1)
+        scene.move("press", at=(press, 0.0, -0.7999), over=world.dt)
+        made = world.step()
+    x = made.placements["ball"].translation[0]
+    deepest = max(x + 0.1 - 2.1001, press + 0.1 - (x - 0.1))
+    assert deepest > 0.015
+    assert made.deepest == pytest.approx(deepest, abs=1e-4)
+    pairs = {frozenset((one.first, one.second)) for one in made.overlaps}
+    assert pairs & {frozenset(("ball", "wall")), frozenset(("ball", "press"))}
+    told = {frozenset((one.first, one.second)): one.depth for one in made.collisions}
+    assert max(told.values()) == pytest.approx(deepest, abs=1e-4)
+    assert "overlap by" in made.note
+    found = scene.penetration(made.q)
+    assert max(np.linalg.norm(one.separation) for one in found) == pytest.approx(deepest, abs=1e-4)
+    for one in made.overlaps:  # only the ball may move
+        assert one.moves_first.any() == (one.first == "ball")
+        assert one.moves_second.any() == (one.second == "ball")
+
+
+@pytest.mark.parametrize("depth", [0.002, 0.05])
+def test_two_fixed_things_that_the_user_puts_into_each_other_are_told(planar_arm, depth: float) -> None:
+    world, scene = squeezed(planar_arm)
+    scene.move("wall", at=(2.0, 0.0, 0.5))
+    scene.move("press", at=(1.8 + depth, 0.0, 0.5))
+    made = world.step()
+    assert made.deepest == pytest.approx(depth, abs=1e-4)
+    assert {frozenset((one.first, one.second)) for one in made.overlaps} == {frozenset(("wall", "press"))}
+    assert [{one.first, one.second} for one in made.collisions] == [{"wall", "press"}]
+    assert not any(one.moves_first.any() or one.moves_second.any() for one in made.overlaps)
+    assert [{one.a, one.b} for one in scene.penetration(made.q)] == [{"wall", "press"}]
+    made = world.step()  # it stays, and nobody moved
+    assert made.deepest == pytest.approx(depth, abs=1e-4)
+    assert not made.collisions
+
+
+def test_things_that_a_joint_holds_together_and_half_spaces_are_no_overlap(planar_arm) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
+    scene.add(wb.HalfSpace((0.0, 0.0, 1.0), -2.0), name="floor").add(wb.HalfSpace((0.0, -1.0, 0.0), -3.0), name="wall")
+    scene.add(wb.Box((0.2, 0.2, 0.2)), name="post", at=(2.0, 0.0, 0.0))
+    hinge = wb.Hinge(at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), to="post")
+    scene.add(wb.Box((0.5, 0.1, 0.5)), name="door", at=(2.1, 0.0, 0.0), body=wb.Body(mass=5.0, joints=[hinge]))
+    made = wb.World(scene, np.zeros(3)).step()
+    assert made.deepest == 0.0
+    assert made.overlaps == made.collisions == ()
+    assert scene.penetration(np.zeros(3)) == []

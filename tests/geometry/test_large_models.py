@@ -39,7 +39,7 @@ def test_a_model_made_at_once_is_the_model_made_one_by_one(count: int) -> None:
 
 
 def test_a_pinocchio_that_writes_otherwise_is_served_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(large_models, "_tokens", lambda count: ["no", "archive"] * (count + 1))
+    monkeypatch.setattr(large_models, "_tokens", lambda count, paired: ["no", "archive"] * (count + 1))
     made = geometry_model(pieces(large_models.MANY + 1))
     assert made.ngeoms == large_models.MANY + 1 == len(made.geometryObjects)
 

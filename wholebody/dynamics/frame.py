@@ -46,8 +46,10 @@ class EngineFrame(NamedTuple):
         contacts: contact points that bore a force in the last step.
         deepest: greatest depth of pieces in each other after any step, metres; 0 if none were.
         energy: kinetic and potential energy of the bodies that move by themselves, joules.
-        work: energy that they were given, joules: by what is moved, during the frame, and by pushes since the one
-            before. The energy grows by no more.
+        work: energy that they were given, joules: by what is moved, during the frame, by pushes since the one before,
+            and by lifting where pieces that touched were parted. The energy grows by no more. It may fall, also where
+            the restitution is 1: a contact that is no impact (slower than 0.02 m/s, or of a step that could not end at
+            each of its impacts) gives nothing back.
         signorini: largest residual of the programs, m/s; see `solve_kernel.residuals`.
         coulomb: likewise.
         steps: how many steps were made, those made again included.

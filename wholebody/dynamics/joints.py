@@ -89,9 +89,8 @@ class Joints:
         return found
 
     def together(self) -> Indices:
-        """(k, 2) bodies that joints hold together, both of which move by themselves."""
-        both = self._pieces.dynamic[self.bodies].all(axis=1) & ~self._world
-        return self.bodies[both]
+        """(k, 2) bodies that joints hold together, one of which moves by itself at least."""
+        return self.bodies[~self._world]
 
     def gaps(self, state: BodiesState) -> Array:
         """(j, 3) point of B seen from that of A, metres."""

@@ -39,9 +39,9 @@ def overlaps(scene: Scene, q: Array) -> tuple[Overlap, ...]:
     """Every two objects that overlap at a posture q (nq,), the deepest first.
 
     The figure with what it carries is one object; overlap of its own parts is not among these. It may move, and so may
-    things with a `wb.Body`; all others are fixed.
+    things with a `wb.Body`; all others are fixed. See `Scene.overlapping` for the pairs that are looked at.
     """
-    near, owners, objects = scene.contacts(q, 0.0), scene.piece_owner, scene.objects
+    near, owners, objects = scene.overlapping(q), scene.piece_owner, scene.objects
     figure = scene.figure.name
 
     def whole(owner: str) -> str:

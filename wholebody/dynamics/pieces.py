@@ -56,7 +56,7 @@ class Pieces:
         mass: (n,) kg; infinite where nothing is known.
         centre: (n, 3) centre of mass in the body's axes.
         inertia: (n, 3, 3) about it, along the body's axes; identity where nothing is known.
-        placement: name to the body's placement in the scene; of segments in the figure's first posture.
+        placement: name to the body's placement in the scene; of segments in the figure's posture.
         body: (pieces,) the body of each piece.
         local: (pieces, 4, 3) placement of each piece in its body.
         table: pieces and pairs.
@@ -67,8 +67,8 @@ class Pieces:
         notes: what was assumed about masses.
     """
 
-    def __init__(self, scene: Scene) -> None:
-        """Gather bodies, pieces and pairs.
+    def __init__(self, scene: Scene, q: Array) -> None:
+        """Gather bodies, pieces and pairs; the figure is in the posture q (nq,).
 
         Raises:
             InputError: two materials can meet of which neither knows the other, or a thing has a joint to itself.
@@ -88,7 +88,7 @@ class Pieces:
         self.centre = np.zeros((len(self.names), 3))
         self.inertia = np.tile(np.eye(3), (len(self.names), 1, 1))
         self.placement: dict[str, pin.SE3] = {thing.name: thing.placement for thing in (*free, *fixed)}
-        self.placement.update(segment_placements(scene, figure.posture(figure.postures[0])))
+        self.placement.update(segment_placements(scene, q))
         self.notes: tuple[str, ...] = ()
         for number, thing in enumerate(free):
             known = mass_properties(thing.shape, thing.body, thing.name)  # type: ignore[arg-type]
@@ -133,16 +133,16 @@ class Pieces:
             local.append([*at.rotation.T, at.translation])
         self.body: Indices = np.array(body, dtype=np.intp)
         self.local = np.array(local, dtype=float).reshape(-1, 4, 3)
-        geometry = geometry_model(pieces)
-        first, second = np.triu_indices(len(pieces), 1)
-        a, b = self.body[first], self.body[second]
-        kept = (a != b) & (self.dynamic[a] | self.dynamic[b])
+        free = self.dynamic[self.body]  # each with what does not move by itself, and with those after it
+        first, second = np.repeat(np.flatnonzero(free), len(pieces)), np.tile(np.arange(len(pieces)), int(free.sum()))
+        pairs = np.sort(np.column_stack([first, second])[~free[second] | (first < second)], axis=1).astype(np.intp)
+        pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
+        a, b = self.body[pairs].T
+        kept = a != b
         for names in held_together(scene):
             one, other = (self.index[name] for name in names)
             kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))
-        for i, j in zip(first[kept].tolist(), second[kept].tolist(), strict=True):
-            geometry.addCollisionPair(pin.CollisionPair(i, j))
-        self.table = PairTable(pin.Model(), geometry)
+        self.table = PairTable(pin.Model(), geometry_model(pieces, pairs[kept]), pairs[kept])
         surfaces = self._surfaces(made_of)
         self.restitution, self.friction = surfaces[:, 0].copy(), surfaces[:, 1].copy()
         self._add_swept_points()

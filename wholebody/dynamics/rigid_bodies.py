@@ -14,6 +14,7 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from wholebody import checks
 from wholebody.arrays import Array, Mask
@@ -64,21 +65,23 @@ class RigidBodies:
         time: seconds since the start.
     """
 
-    def __init__(self, scene: Scene, gravity: tuple[float, float, float] = GRAVITY) -> None:
-        """Put all bodies where the scene has them; the figure stands in its first posture.
+    def __init__(self, scene: Scene, gravity: ArrayLike = GRAVITY, start: ArrayLike | None = None) -> None:
+        """Put all bodies where the scene has them, and the figure into a posture.
 
         Args:
             scene: figure and things; at least one has a `wb.Body`.
             gravity: (3,) m/s2, each entry within 1000.
+            start: (nq,) posture of the figure; its first one by default.
 
         Raises:
-            InputError: nothing in the scene has a body, two things overlap of which one moves, two materials do not
-                know each other, a thing has a joint to itself, or gravity is out of range.
+            InputError: nothing in the scene has a body, a thing that moves by itself overlaps something, two materials
+                do not know each other, a thing has a joint to itself, or gravity or start is no such value.
             UnknownNameError: a joint names a thing that is not there.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
         self.gravity = _bounded(gravity, STRONGEST_GRAVITY, "gravity")
-        pieces = Pieces(scene)
+        first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
+        pieces = Pieces(scene, checks.posture(first, scene.model.nq, "start"))
         if not pieces.dynamic.any():
             raise InputError("nothing in the scene moves by itself; add a thing with body=wb.Body(density=700)")
         compiled_kernel()
@@ -207,10 +210,12 @@ class RigidBodies:
         """
         dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
         state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
+        ended = state.copies()
         for number, (before, after) in given.items():
             if self._pieces.dynamic[number]:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
+        self._sleepers.wake_where_put(self._finder, ended)
         count = int(np.ceil(dt / SUBSTEP - 1e-9))
         record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
         self._pushed = 0.0
@@ -287,7 +292,8 @@ class RigidBodies:
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
         if least < LEAST_GAP:
-            least = self._separate(least)
+            least, lifted = self._separate(least)
+            record.work += lifted
         record.deepest = max(record.deepest, -least)
 
     @staticmethod
@@ -365,10 +371,10 @@ class RigidBodies:
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
         return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
-    def _separate(self, least: float) -> float:
+    def _separate(self, least: float) -> tuple[float, float]:
         """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
 
-        Bodies that are lifted pay for it with their kinetic energy.
+        Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
         """
         state = self.state
         before, position = self.energy(), state.position.copy()
@@ -381,7 +387,7 @@ class RigidBodies:
         gain = self.energy() - before
         if gain > 0.0:
             state.slow(state.moving & (state.position != position).any(axis=1), gain)
-        return least
+        return least, max(0.0, self.energy() - before)
 
 
 def _bounded(value: object, most: float, what: str) -> Array:

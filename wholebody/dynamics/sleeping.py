@@ -1,32 +1,43 @@
-"""Bodies that lie still sleep: they are left out of programs until something touches them."""
+"""Bodies that lie still sleep: they are left out of programs until something touches them, or what they touch moves."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Indices
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.dynamics import contact_kernel
 from wholebody.dynamics.bodies_state import BodiesState
+from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.geometry.proximity import Contacts
 
 STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
 SLEEP_AFTER = 0.5  # s that all bodies of an island are so slow before they sleep
 TOUCHING = 1e-3  # m: nearer bodies wake each other
+MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap at which bodies rest, so none gets inside
 
 
 class Sleepers:
-    """Which bodies sleep. A body sleeps and wakes together with all that touch each other."""
+    """Which bodies sleep. A body sleeps and wakes together with all that touch each other.
+
+    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `MOVED`, however slowly
+    or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it too.
+    """
 
     def __init__(self, state: BodiesState, together: Indices) -> None:
         """Let all be awake; `together` (k, 2) are bodies that joints hold together."""
         self._state, self._together = state, together
         self._slow_for = np.zeros(len(state.position))
         self._island = np.arange(len(state.position))
+        self._touched: Indices = np.zeros((0, 2), dtype=np.intp)  # a sleeper, and what touches it
+        self._position, self._rotation = np.zeros((0, 3)), np.zeros((0, 3, 3))  # of the latter, when the former slept
 
     @property
     def count(self) -> int:
         """How many bodies sleep."""
-        return int((self._state.pieces.dynamic & ~self._state.moving).sum())
+        return int(self._asleep().sum())
+
+    def _asleep(self) -> Mask:
+        return self._state.pieces.dynamic & ~self._state.moving
 
     def _touching(self, near: Contacts) -> Indices:
         """Bodies (k, 2) that touch, or that a joint holds together."""
@@ -51,21 +62,75 @@ class Sleepers:
         state.moving &= ~falling_asleep
         state.velocity[falling_asleep] = state.spin[falling_asleep] = 0.0
         self._island[falling_asleep] = island[falling_asleep]
+        self._remember(body, falling_asleep)
 
-    def wake(self, near: Contacts) -> bool:
-        """Wake what is touched by a body that moves; whether anything woke."""
-        state, woke = self._state, False
-        asleep = state.pieces.dynamic & ~state.moving
-        if not asleep.any():
+    def _remember(self, body: Indices, falling_asleep: Mask) -> None:
+        """Keep where everything is that touches bodies which fall asleep; `body` (k, 2) touch each other."""
+        state = self._state
+        both = np.concatenate([body, body[:, ::-1]])
+        both = np.unique(both[falling_asleep[both[:, 0]] & ~self._asleep()[both[:, 1]]], axis=0)
+        self._touched = np.concatenate([self._touched, both])
+        self._position = np.concatenate([self._position, state.position[both[:, 1]]])
+        self._rotation = np.concatenate([self._rotation, state.rotation[both[:, 1]]])
+
+    def wake(self, near: Contacts, came: Mask | None = None) -> bool:
+        """Wake what is touched by a body that moves; whether anything woke.
+
+        Args:
+            near: pairs, those of bodies that move and of what they touch among them.
+            came: (n,) bodies that were put where they are; none by default.
+        """
+        state, asleep = self._state, self._asleep()
+        active = state.moving | state.given if came is None else state.moving | state.given | came
+        if not (asleep.any() and active.any()):
             return False
-        body = self._touching(near)
-        speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.lever
-        pushing = (speed > STILL) & (state.moving | state.given)
-        for one, other in ((0, 1), (1, 0)):
-            touched = body[pushing[body[:, one]] & asleep[body[:, other]], other]
-            if len(touched):
-                woken = asleep & np.isin(self._island, self._island[touched])
-                state.moving |= woken
-                self._slow_for[woken] = 0.0
-                woke = True
-        return woke
+        both = self._touching(near)
+        both = np.concatenate([both, both[:, ::-1]])
+        both = both[asleep[both[:, 0]] & active[both[:, 1]]]
+        known = np.isin(self._keys(both), self._keys(self._touched))
+        woken = [both[~known | (self._speeds(both) > STILL), 0], self._touched[self._moved() > MOVED, 0]]
+        touched = np.concatenate(woken)
+        if not len(touched):
+            return False
+        waking = asleep & np.isin(self._island, self._island[touched])
+        state.moving |= waking
+        self._slow_for[waking] = 0.0
+        self._forget()
+        return True
+
+    def wake_where_put(self, finder: ContactFinder, before: tuple[Array, Array, Array]) -> None:
+        """Wake what is touched or was left by bodies that were put elsewhere than in `before`, of `state.copies`."""
+        state = self._state
+        put = (state.position != before[0]).any(axis=1) | (state.rotation != before[1]).any(axis=(1, 2))
+        if put.any() and self.count:
+            margin = np.full(len(put), 0.5 * TOUCHING)
+            self.wake(finder.near(state.position, state.rotation, margin, put), put)
+
+    def _forget(self) -> None:
+        """Forget what touched bodies that are awake."""
+        kept = self._asleep()[self._touched[:, 0]]
+        if not kept.all():
+            self._touched, self._position, self._rotation = (
+                self._touched[kept], self._position[kept], self._rotation[kept]
+            )  # fmt: skip
+
+    def _keys(self, both: Indices) -> Indices:
+        return both[:, 0] * len(self._slow_for) + both[:, 1]
+
+    def _speeds(self, both: Indices) -> Array:
+        """Greatest speed (k,), within the first body of each pair, that the second one has as a rigid body, m/s."""
+        state, own, other = self._state, both[:, 0], both[:, 1]
+        arm = state.position[own] - state.position[other]
+        at_centre = state.velocity[other] + np.cross(state.spin[other], arm)
+        spin = np.linalg.norm(state.spin[other], axis=1)
+        return np.linalg.norm(at_centre, axis=1) + spin * state.pieces.lever[own]
+
+    def _moved(self) -> Array:
+        """Most by which what touches each sleeper (k,) is elsewhere, within the sleeper, than when that fell asleep."""
+        state, own, other = self._state, self._touched[:, 0], self._touched[:, 1]
+        turn = state.rotation[other] @ self._rotation.transpose(0, 2, 1)
+        arm = state.position[own] - self._position
+        at_centre = state.position[other] + np.einsum("kij,kj->ki", turn, arm) - state.position[own]
+        # the chord of a turn over a lever is the spectral norm of what it changes, Frobenius's over the root of two
+        turned = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
+        return np.linalg.norm(at_centre, axis=1) + turned * state.pieces.lever[own]

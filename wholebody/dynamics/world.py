@@ -8,7 +8,7 @@ themselves go on, while the figure moves from the posture before to the one that
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import NamedTuple
 
 import numpy as np
@@ -25,6 +25,7 @@ from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import INSIDE
+from wholebody.geometry.proximity import Contacts
 from wholebody.matter.materials import Surface, surface
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
 from wholebody.moving_things import Collision
@@ -45,9 +46,12 @@ class WorldFrame(NamedTuple):
         impulses: thing to the impulse (3,) that the figure gave it, N s.
         loop: how the figure's overlap was removed, and in what time.
         engine: what the things did; None if none moves by itself.
-        collisions: what could not be avoided, such as a thing that the user moved too fast; empty if nothing.
-        overlaps: objects that overlap at the end by more than 0.1 mm, with what would part them; empty if nothing.
-        deepest: greatest depth of any pair at the end, metres; 0 if there is none.
+        collisions: what could not be avoided, such as a thing that the user moved too fast, or one that moves by itself
+            and is squeezed between two others; empty if nothing.
+        overlaps: every two objects of which pieces overlap at the end, with what would part them, two fixed things
+            too; empty if none do by more than 0.1 mm.
+        deepest: greatest depth of any pair at the end, metres, also of two things; 0 if there is none. See
+            `Scene.overlapping` for the pairs.
         seconds: wall time, without drawing.
         note: "" or a report of unusual events.
     """
@@ -101,8 +105,8 @@ class World(NotCopyable):
             spring: between tracker and figure, K 1000, R 40 and 0.4 kg by default.
 
         Raises:
-            InputError: no posture near the start is free, two things overlap of which one moves by itself, or a
-                value of the wrong kind, shape or range.
+            InputError: no posture near the start is free, a thing that moves by itself overlaps another thing at the
+                start, or the figure there, or a value of the wrong kind, shape or range.
             UnknownNameError: another overlap, or a joint names a thing that is not there.
         """
         self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
@@ -110,7 +114,7 @@ class World(NotCopyable):
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)
-        self.engine = RigidBodies(scene) if self._bodies else None
+        self.engine = RigidBodies(scene, start=self._loop.shown) if self._bodies else None
         self._coupling = Coupling(scene.model, self._loop.shown, spring)
         self._tracked: Array = self._loop.shown
         self._workspace, self.time = scene.workspace(), 0.0
@@ -165,12 +169,16 @@ class World(NotCopyable):
         self.time += self.dt
         for name in self._placed:
             self._placed[name] = self.scene.objects[name].placement
-        deepest = self._deepest(frame.q)
+        self._workspace.refresh()
+        near = self.scene.overlapping(frame.q, self._workspace)
+        deepest = max(0.0, -float(near.distance.min(initial=0.0)))
         found = overlaps(self.scene, frame.q) if deepest > INSIDE else ()
-        note = "; ".join(part for part in (note and f"{note}; the one before counts", frame.note) if part)
+        squeezed = self._squeezed(near, {*self._bodies, *moved})
+        note = f"{note}; the one before counts" if note else ""
+        note = "; ".join(part for part in (note, frame.note, *map(str, squeezed)) if part)
         return WorldFrame(
             self.time, frame.q, wanted, {name: self._placed[name] for name in self._bodies}, impulses, frame,
-            engine, frame.collisions, found, deepest, time.perf_counter() - began, note,
+            engine, (*frame.collisions, *squeezed), found, deepest, time.perf_counter() - began, note,
         )  # fmt: skip
 
     def _segments(self, q: Array) -> dict[str, pin.SE3]:
@@ -202,9 +210,15 @@ class World(NotCopyable):
                 moved[name] = (thing.placement if thing.motion is None else before, thing.placement)
         return moved
 
-    def _deepest(self, q: Array) -> float:
-        self._workspace.refresh()
-        return max(0.0, -float(self._workspace.near(q, 0.0).distance.min(initial=0.0)))
+    def _squeezed(self, near: Contacts, moving: Collection[str]) -> tuple[Collision, ...]:
+        """Things in each other, of which one moves by itself or was moved, the deepest first; `near` has pairs."""
+        owners, standing = self._workspace.owners, set(self._placed)
+        deepest: dict[tuple[str, str], float] = {}
+        for row in np.flatnonzero(near.distance < -INSIDE).tolist():
+            both = owners[near.pair[row, 0]], owners[near.pair[row, 1]]
+            if standing.issuperset(both) and not set(moving).isdisjoint(both):
+                deepest.setdefault(both, -float(near.distance[row]))
+        return tuple(Collision(*both, depth, True) for both, depth in deepest.items())
 
     def _check_fresh(self) -> None:
         if self.scene.revision != self._revision:

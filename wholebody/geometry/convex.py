@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Callable
 from functools import lru_cache
 from importlib.util import find_spec
@@ -15,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.arrays import Array
 from wholebody.errors import InputError, MissingPackageError
 from wholebody.geometry.components import Component, enclosed_volume, split_components
+from wholebody.geometry.convexity import is_convex, passes_through_itself
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
@@ -45,7 +47,8 @@ def convex_pieces(
 ) -> ConvexPieces:
     """Split a triangle mesh into convex pieces.
 
-    The mesh is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
+    A mesh whose triangles cover its convex hull, in whatever order and orientation and however often, is that hull.
+    Another one is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
     another closed part (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
     and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part with holes
     in its surface has no inside, so its hull is used. A flat part is thickened to twice `SMALLEST`. `notes` reports
@@ -157,6 +160,11 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     before = after = 0.0
     from wholebody.runner import Child
 
+    if is_convex(cloud, triangles):
+        try:
+            return ConvexPieces((hull_piece(cloud[np.unique(triangles)], what),), 0.0, ())
+        except InputError:
+            pass  # too thin for a hull: its parts are thickened
     child = Child()  # begins to run at the first part that needs it
     try:
         for number, part in enumerate(split_components(cloud, triangles)):
@@ -212,6 +220,12 @@ _MEND = "repair the mesh where it passes through itself, or place its hull with 
 MOST_SECONDS = 40.0
 """Limit of CoACD for one part, seconds of the processor; the largest of real robots took a fraction of it."""
 
+CROSSING_SECONDS = 1.0
+"""The same for a part that passes through itself, of which CoACD often finds no end: for each ..."""
+
+CROSSING_TRIANGLES = 100
+"""... so many triangles that it has, or a part of them."""
+
 
 def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
@@ -220,13 +234,16 @@ def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[A
 
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
     faces = part.faces.astype(np.int32)
+    seconds = MOST_SECONDS
+    if passes_through_itself(part.vertices, part.faces):
+        seconds = min(seconds, CROSSING_SECONDS * math.ceil(len(faces) / CROSSING_TRIANGLES))
     try:
-        asked = (run_coacd, MOST_SECONDS, np.asarray(part.vertices), faces, threshold)
-        parts = child.call(limited, *asked, seconds=BY_THE_CLOCK * MOST_SECONDS)
+        asked = (run_coacd, seconds, np.asarray(part.vertices), faces, threshold)
+        parts = child.call(limited, *asked, seconds=BY_THE_CLOCK * seconds)
     except EndedError as error:
         if error.overtime:
             raise InputError(
-                f"{name}: CoACD found no convex pieces in {MOST_SECONDS:g} s of the processor; {_MEND}"
+                f"{name}: CoACD found no convex pieces in {seconds:g} s of the processor; {_MEND}"
             ) from None
         raise InputError(f"{name}: CoACD cannot cut it into convex pieces; {_MEND}") from None
     return [np.asarray(corners, dtype=float) for corners in parts]

@@ -1,66 +1,108 @@
 """Geometry models of thousands of pieces.
 
 Pinocchio keeps an n x n table of pair numbers and copies it whenever a piece is added: 1000 pieces take 0.6 s, 5000
-more than a minute. A model of n empty entries can be read from text at once and filled afterwards: under a second for
-5000.
+more than a minute. A model of n empty entries with its pairs can be read from text at once, and its pieces be filled in
+afterwards. The table alone takes 1.6 GB for 20,000 pieces, so models of more than `TABLED` have none.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
 import pinocchio as pin
 
+from wholebody.arrays import Indices
+
 MANY = 300  # number of pieces from which entries are made at once; as many are added one by one in 20 ms
+TABLED = 2000  # number of pieces up to which a model has Pinocchio's table of pair numbers, of 16 MB then
 
 
-def geometry_model(pieces: Sequence[pin.GeometryObject]) -> pin.GeometryModel:
-    """Pinocchio's geometry model of these pieces, in this order, without pairs.
+def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None = None) -> pin.GeometryModel:
+    """Pinocchio's geometry model of these pieces, in this order.
+
+    If its pairs are given, a model of more than `TABLED` pieces has no table of pair numbers. What reads or writes that
+    table cannot be called on it: `addCollisionPair`, `findCollisionPair`, `existCollisionPair`; see `add_pairs`.
 
     Args:
         pieces: each with a name of its own.
+        pairs: (k, 2) pairs of pieces, the lesser index first, each pair once; none by default.
     """
+    tabled = pairs is None or len(pieces) <= TABLED
+    pairs = np.zeros((0, 2), dtype=np.intp) if pairs is None else pairs
     if len(pieces) < MANY:
-        return _one_by_one(pieces)
-    geometry = _places(len(pieces))
+        return _one_by_one(pieces, pairs)
+    geometry = _places(len(pieces), None if tabled else pairs)
     if geometry is None:
-        return _one_by_one(pieces)
+        return _one_by_one(pieces, pairs)
     for index, piece in enumerate(pieces):
         geometry.geometryObjects[index] = piece
+    if tabled:
+        add_pairs(geometry, pairs)
     return geometry
 
 
-def _one_by_one(pieces: Sequence[pin.GeometryObject]) -> pin.GeometryModel:
+def add_pairs(geometry: pin.GeometryModel, pairs: Indices) -> None:
+    """Add pairs (k, 2) that a model does not have, the lesser index first."""
+    tabled = geometry.collisionPairMapping.size == geometry.ngeoms**2
+    add = geometry.addCollisionPair if tabled else geometry.collisionPairs.append
+    for first, second in pairs.tolist():
+        add(pin.CollisionPair(first, second))
+
+
+def _one_by_one(pieces: Sequence[pin.GeometryObject], pairs: Indices) -> pin.GeometryModel:
     geometry = pin.GeometryModel()
     for piece in pieces:
         geometry.addGeometryObject(piece)
+    add_pairs(geometry, pairs)
     return geometry
 
 
-def _places(count: int) -> pin.GeometryModel | None:
+def _places(count: int, given: Indices | None) -> pin.GeometryModel | None:
     """A model of empty entries; None if this Pinocchio serialises its models in another way.
 
-    Each further piece adds the same text to a model's text; only two counts change.
+    With pairs it has these, and no table; otherwise it has a table of no pairs. Each further piece adds the same text
+    to a model's text, and each further pair its two numbers; only counts change.
     """
-    one, two = _tokens(1), _tokens(2)
+    one, two, joined = (_tokens(count, paired) for count, paired in ((1, False), (2, False), (2, True)))
+    pairs = np.zeros((0, 2), dtype=np.intp) if given is None else given
     added = len(two) - len(one)
     common = 0
     while common < len(one) and one[-1 - common] == two[-1 - common]:
         common += 1
     at = len(one) - common
     head = [str(count) if (a, b) == ("1", "2") else a for a, b in zip(one[:at], two[:at], strict=True)]
-    body = " ".join([*head, *two[at : at + added] * (count - 1), *one[at:]])
+    entry = [_ZEROS.get(word, word) for word in two[at : at + added]]  # short numbers are read faster
+    words = [*head, *entry * (count - 1), *one[at:]]
+    if len(pairs):  # their number, then what stands before the first of them
+        number = next((k for k, (a, b) in enumerate(zip(two, joined, strict=False)) if a != b), len(two))
+        before = len(joined) - len(two) - 2
+        rest = len(two) - number - 1  # words after the number of pairs in a model without pairs
+        where = len(words) - rest
+        words[where - 1] = str(len(pairs))
+        words[where + 1 : where + 1] = [*joined[number + 2 : number + 2 + before], *map(str, pairs.ravel().tolist())]
+    table = f"{count} {count}{' -1' * count**2}" if given is None else "0 0"
     geometry = pin.GeometryModel()
     try:
-        geometry.loadFromString(f"{body} {count} {count}{' -1' * count**2}\n")
+        geometry.loadFromString(f"{' '.join(words)} {table}\n")
     except Exception:  # boost's own, of several kinds
         return None
-    whole = geometry.ngeoms == len(geometry.geometryObjects) == count
-    return geometry if whole and geometry.collisionPairMapping.shape == (count, count) else None
+    whole = geometry.ngeoms == len(geometry.geometryObjects) == count and len(geometry.collisionPairs) == len(pairs)
+    if not whole or any(
+        (geometry.collisionPairs[k].first, geometry.collisionPairs[k].second) != tuple(pairs[k].tolist())
+        for k in (0, len(pairs) // 2, len(pairs) - 1)
+        if len(pairs)
+    ):
+        return None
+    return geometry if geometry.collisionPairMapping.size == (count**2 if given is None else 0) else None
 
 
-def _tokens(count: int) -> list[str]:
-    """Words of the text of a model with empty entries, without the table at its end."""
+_ZEROS = {"0.00000000000000000e+00": "0", "1.00000000000000000e+00": "1"}
+
+
+def _tokens(count: int, paired: bool) -> list[str]:
+    """Words of the text of a model with empty entries, the first two paired or not, without the table at its end."""
     empty = [pin.GeometryObject("ab"[k], 0, 0, pin.SE3.Identity(), None) for k in range(count)]
-    words: list[str] = _one_by_one(empty).saveToString().rstrip("\n").split(" ")
+    pairs = np.array([[0, 1]] if paired else [], dtype=np.intp).reshape(-1, 2)
+    words: list[str] = _one_by_one(empty, pairs).saveToString().rstrip("\n").split(" ")
     return words[: -2 - count**2]

@@ -94,25 +94,35 @@ def object_penetration(
 
 
 def object_penetrations(
-    geometry: pin.GeometryModel, placements: Array, owners: Sequence[str], pairs: NDArray[np.intp]
+    geometry: pin.GeometryModel,
+    placements: Array,
+    owners: Sequence[str],
+    pairs: NDArray[np.intp],
+    tested: NDArray[np.intp] | None = None,
 ) -> list[ObjectPenetration]:
     """Every two owners of pieces that overlap, those with the longest separation first.
 
     Args:
-        geometry: all pieces; its collision pairs say which of them can touch.
+        geometry: all pieces.
         placements: (n, 4, 3) their placements, in the format of `Contacts.placements`.
         owners: the owner of each piece; the one that comes first in this list is the A of its pair.
         pairs: (k, 2) pieces that overlap.
+        tested: (m, 2) pairs of pieces that can touch, the geometry's by default; all of two owners where it has none.
     """
+    if tested is None:
+        listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
+        tested = np.array(listed, dtype=np.intp).reshape(-1, 2)
     first = {owner: k for k, owner in reversed(list(enumerate(owners)))}
     asked = {tuple(sorted((owners[i], owners[j]), key=first.__getitem__)) for i, j in np.asarray(pairs).reshape(-1, 2)}
     touching: dict[tuple[str, ...], list[tuple[int, int]]] = {names: [] for names in asked}
-    for pair in geometry.collisionPairs:
-        i, j = sorted((pair.first, pair.second), key=lambda k: first[owners[k]])
-        if (owners[i], owners[j]) in touching:
-            touching[owners[i], owners[j]].append((i, j))
+    number = np.array([first[owner] for owner in owners], dtype=np.intp)
+    ordered = np.where(number[tested[:, :1]] <= number[tested[:, 1:]], tested, tested[:, ::-1])
+    keys = np.array([first[a] * len(owners) + first[b] for a, b in touching], dtype=np.intp)
+    for i, j in ordered[np.isin(number[ordered[:, 0]] * len(owners) + number[ordered[:, 1]], keys)].tolist():
+        touching[owners[i], owners[j]].append((i, j))
     found = []
-    for (a, b), allowed in touching.items():
+    for (a, b), pairs_of_both in touching.items():
+        allowed = pairs_of_both or _all_pairs(owners, a, b)
         of_a, of_b = sorted({i for i, _ in allowed}), sorted({j for _, j in allowed})
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)
         for i, j in allowed:
@@ -125,3 +135,8 @@ def object_penetrations(
         if one is not None:
             found.append(one)
     return sorted(found, key=lambda one: -float(np.linalg.norm(one.separation)))
+
+
+def _all_pairs(owners: Sequence[str], a: str, b: str) -> list[tuple[int, int]]:
+    """All pairs of a piece of one owner and a piece of another."""
+    return [(i, j) for i, one in enumerate(owners) if one == a for j, other in enumerate(owners) if other == b]

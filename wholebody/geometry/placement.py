@@ -42,7 +42,8 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
     values = array(at, what, "(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3")
     if values.shape == (3,):
-        return _rigid(np.eye(3), values, what)
+        _check_values(values, what)
+        return pin.SE3(np.eye(3), values.copy())
     if values.shape == (7,):
         norm = float(np.linalg.norm(values[3:]))
         if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:
@@ -70,10 +71,8 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
 
 def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what: str) -> pin.SE3:
     """Check both parts, and round the rotation to the nearest orthonormal matrix (polar decomposition)."""
-    if not (np.isfinite(rotation).all() and np.isfinite(translation).all()):
-        raise InputError(f"{what}: not every value is finite; give finite numbers")
-    if max(np.abs(translation).max(), np.abs(rotation).max()) > FARTHEST:
-        raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")
+    _check_values(translation, what)
+    _check_values(rotation, what)
     error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
     if error > ROUNDING:
         raise InputError(
@@ -84,3 +83,10 @@ def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what
     if np.linalg.det(nearest) < 0:
         raise InputError(f"{what}: the rotation is a reflection (determinant -1); give a right-handed rotation")
     return pin.SE3(rotation.copy() if error < 1e-14 else nearest, translation.copy())
+
+
+def _check_values(values: NDArray[np.float64], what: str) -> None:
+    if not np.isfinite(values).all():
+        raise InputError(f"{what}: not every value is finite; give finite numbers")
+    if np.abs(values).max() > FARTHEST:
+        raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")

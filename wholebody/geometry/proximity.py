@@ -17,6 +17,7 @@ from wholebody.arrays import Array, Indices
 from wholebody.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
@@ -100,6 +101,15 @@ class _ContactBuffer:
         return known
 
 
+def _half_boxes(swept: list[SweptPoints], reach: Array) -> Array:
+    """The `half_box` (n, 3) of every piece; that of a ball is its radius."""
+    found = np.repeat(np.minimum(reach, ENDLESS)[:, None], 3, axis=1)
+    for k, piece in enumerate(swept):
+        if len(piece.points) > 1:
+            found[k] = half_box(piece)
+    return found
+
+
 def half_box(swept: SweptPoints) -> Array:
     """Half the size (3,) of a box about a piece's origin, along the piece's axes, that holds the piece."""
     if not len(swept.points):
@@ -125,20 +135,26 @@ class PairTable:
         points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
     """
 
-    def __init__(self, model: pin.Model, geometry: pin.GeometryModel) -> None:
+    def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
         """Read the pieces and pairs.
+
+        Args:
+            model: Pinocchio's model.
+            geometry: the geometry model.
+            pairs: its pairs (pairs, 2), where they are known: to read a hundred thousand of them takes half a second.
 
         Raises:
             InputError: a geometry that is not a convex piece.
         """
         self.model, self.geometry = model, geometry
         self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
-        self.pairs: Indices = np.array(
-            [[pair.first, pair.second] for pair in geometry.collisionPairs], dtype=np.intp
-        ).reshape(-1, 2)
+        if pairs is None:
+            listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
+            pairs = np.array(listed, dtype=np.intp).reshape(-1, 2)
+        self.pairs: Indices = pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
-        self.half = np.array([half_box(swept) for swept in self.swept]).reshape(-1, 3)
+        self.half = _half_boxes(self.swept, self.reach)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
         radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
@@ -183,7 +199,7 @@ class Proximity:
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
         self.asked = 0
-        self.results = pin.GeometryData(self.geometry)
+        self.results = pair_data(self.geometry, len(table.pairs))
         self._guesses = Guesses(self.results)
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
@@ -210,8 +226,13 @@ class Proximity:
     def _lay_views(self) -> None:
         for k in range(self.geometry.ngeoms):  # anywhere apart: views are laid over results that were computed
             self.results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        pin.computeDistances(self.geometry, self.results)
-        self._distances = result_view(self.results.distanceResults)
+        self._kept, self._single = len(self.table.pairs) <= KEPT, SinglePairs(self.geometry)
+        if self._kept:
+            pin.computeDistances(self.geometry, self.results)
+            self._distances = result_view(self.results.distanceResults)
+        else:  # memory that is never written takes none
+            pin.updateGeometryPlacements(self.table.model, self.table.model.createData(), self.geometry, self.results)
+            self._distances = np.zeros((len(self.table.pairs), RESULT_DOUBLES))
         self._placements = placement_view(self.results.oMg)
         self.reset()
 
@@ -264,6 +285,11 @@ class Proximity:
             )  # fmt: skip
             self._count = count
             self.asked += count
+            if not self._kept:
+                numbers = self._index[:count]
+                assert self._distances is not None
+                fields(self._distances)[numbers] = self._single.measured(placements, table.pairs[numbers])
+                return numbers
             if self._singly:
                 for number in self._index[:count].tolist():
                     pin.computeDistance(self.geometry, results, number)

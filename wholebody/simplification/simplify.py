@@ -195,12 +195,13 @@ def _scene(
     """A scene of these pieces and pairs, in their original order."""
     place = {old: new for new, old in enumerate(kept)}
     chosen = [(coarse or {}).get(old, geometry.geometryObjects[old]) for old in kept]
-    made = geometry_model([pin.GeometryObject(piece) for piece in chosen])
-    for first, second in whole.pair_table.pairs[numbers].tolist():
-        made.addCollisionPair(pin.CollisionPair(place[first], place[second]))
+    both = [(place[first], place[second]) for first, second in whole.pair_table.pairs[numbers].tolist()]
+    pairs = np.array(both, dtype=np.intp).reshape(-1, 2)
+    made = geometry_model([pin.GeometryObject(piece) for piece in chosen], pairs)
     owners = tuple(whole.piece_owner[old] for old in kept)
     objects = [thing for name, thing in whole.objects.items() if name in set(owners)]
-    built = SceneGeometry(figure.model, made, owners, _places_in_things(objects, owners, geometry, kept, chosen))
+    places = _places_in_things(objects, owners, geometry, kept, chosen)
+    built = SceneGeometry(figure.model, made, owners, places, pairs)
     return Scene.of_parts(figure, objects, built)
 
 

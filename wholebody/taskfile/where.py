@@ -32,7 +32,7 @@ class Where:
     def at(self, key: str) -> Where:
         """The place of a key in this table, or of an entry (such as "[0]") in this key."""
         dot = "." if self.key and not key.startswith("[") else ""
-        return replace(self, key=f"{self.key}{dot}{key}")
+        return Where(self.file, self.text, self.table, self.number, f"{self.key}{dot}{key}")
 
     def in_table(self, table: str, number: int = 0) -> Where:
         """The place of a table in this file."""

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import json
 import struct
 import warnings
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -19,6 +21,7 @@ from scipy.interpolate import CubicSpline
 import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.files import joint_profile
+from wholebody.tracking.tracks import MOST_FRAMES
 
 CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
 """Radians and metres by which a file may change a value; near a gimbal lock three angles lose digits of a rotation."""
@@ -466,3 +469,18 @@ def test_an_unknown_ending_is_answered_with_all_that_can_be_read(human: Figure, 
     (tmp_path / "walk.mocap").write_text("HIERARCHY\n")
     with pytest.raises(wb.FileFormatError, match=r"as \.mocap; give one of \.bvh, \.csv, \.npz, \.txt$"):
         wb.read_clip(tmp_path / "walk.mocap", human)
+
+
+@pytest.mark.parametrize("dtype", ["int8", "float64"])
+def test_an_archive_of_too_many_frames_is_refused_by_its_header(tmp_path: Path, dtype: str) -> None:
+    """Zeros take no room in an archive: nothing of them is read."""
+    figure = wb.load("hand")
+    frames = MOST_FRAMES + 1
+    header = io.BytesIO()
+    np.lib.format.write_array_header_1_0(
+        header, {"descr": np.dtype(dtype).str, "fortran_order": False, "shape": (frames, figure.model.nq)}
+    )
+    with zipfile.ZipFile(tmp_path / "long.npz", "w") as archive:
+        archive.writestr("q.npy", header.getvalue() + b"too few numbers")
+    with pytest.raises(wb.FileFormatError, match=rf"q has {frames} frames; give 1 to {MOST_FRAMES}"):
+        wb.read_clip(tmp_path / "long.npz", figure)

@@ -21,6 +21,8 @@ ATTACKED = {
     "solve": "solves, judged by coal over all pairs and by Pinocchio",
     "stream": "streams of moving goals and things, every step and the way between two",
     "sweep": "sweeps against a fine subdivision",
+    "pairs": "things in each other, against every two pieces",
+    "sleeper": "sleeping bodies whose support creeps, turns, jumps or leaves",
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
     "own term": "solves and steps with terms of one's own that are not finite, or answer something odd",

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack import arguments, files, own_terms, solves, streams, sweeps
+from wholebody.bench.attack import arguments, files, own_terms, solves, streams, sweeps, worlds
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
 from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
@@ -93,7 +93,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 WRITERS = {
     "argument": arguments.written, "file": files.written, "solve": solves.written, "stream": streams.written,
-    "sweep": sweeps.written, "own term": own_terms.written,
+    "sweep": sweeps.written, "own term": own_terms.written, "pairs": worlds.written_pairs, "sleeper": worlds.written_sleeper,
 }  # fmt: skip
 
 

@@ -23,6 +23,7 @@ from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result
 from wholebody.geometry.proximity import SINGLY
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points
 
 TOLERANCE = 1e-4
@@ -70,19 +71,21 @@ class Sweep:
             InputError: a geometry that is not a convex piece, or a joint whose motion cannot be bounded.
         """
         self.model, self.geometry = model, geometry
-        self._data, self._results = model.createData(), pin.GeometryData(geometry)
+        self._data, self._results = model.createData(), pair_data(geometry, len(geometry.collisionPairs))
         self._swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         joint = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         reach = np.array([swept.reach for swept in self._swept], dtype=float)
         self._bounds = MotionBounds(model, joint, reach)
         pairs = [[pair.first, pair.second] for pair in geometry.collisionPairs]
         self._pairs: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
-        self._number = {(int(i), int(j)): k for k, (i, j) in enumerate(self._pairs)}
+        self._number: dict[tuple[int, int], int] = {}  # made when it is first needed
         self._reach = reach[self._pairs].sum(axis=1)
         few = len(self._pairs) < SINGLY  # otherwise no table over all pairs of pieces is made
         self._active = np.zeros((geometry.ngeoms,) * 2 if few else (0, 0), dtype=bool, order="F")
         self._place(pin.neutral(model), np.zeros(model.nv))
-        pin.computeDistances(geometry, self._results)
+        self._kept, self._single = len(self._pairs) <= KEPT, SinglePairs(geometry)
+        if self._kept:
+            pin.computeDistances(geometry, self._results)
         self._view = distance_view(self._results.distanceResults)
         self._guesses = Guesses(self._results)
 
@@ -166,6 +169,8 @@ class Sweep:
 
     def _indices(self, pairs: Indices) -> Indices:
         try:
+            if not self._number:
+                self._number.update({(i, j): k for k, (i, j) in enumerate(self._pairs.tolist())})
             return np.array([self._number[int(i), int(j)] for i, j in np.asarray(pairs).reshape(-1, 2)], dtype=np.intp)
         except KeyError as missing:
             raise InputError(f"sweep: pieces {missing.args[0]} are not a collision pair; add the pair first") from None
@@ -233,6 +238,13 @@ class Sweep:
 
     def _query(self, index: Indices) -> Array:
         """Query coal for these pairs: rows of distance, normal and the two nearest points."""
+        if not self._kept:
+            pairs = self._pairs[index]
+            placed = np.zeros((self.geometry.ngeoms, 4, 3))
+            for piece in np.unique(pairs).tolist():
+                at = self._results.oMg[piece]
+                placed[piece, :3], placed[piece, 3] = at.rotation.T, at.translation
+            return self._single.measured(placed, pairs)
         if len(self._active):
             first, second = self._pairs[index, 0], self._pairs[index, 1]
             self._active[:] = False

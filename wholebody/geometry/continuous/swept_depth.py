@@ -19,6 +19,7 @@ from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result
 from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
+from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 
 FINEST = 2.0**-12
 """Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
@@ -217,10 +218,12 @@ class _Postures:
 
     def __init__(self, table: PairTable, geometry: pin.GeometryModel) -> None:
         self._table, self._geometry = table, geometry
-        self.data, self._results = table.model.createData(), pin.GeometryData(geometry)
+        self.data, self._results = table.model.createData(), pair_data(geometry, len(table.pairs))
+        self._kept, self._single = len(table.pairs) <= KEPT, SinglePairs(geometry)
         for k in range(geometry.ngeoms):  # anywhere apart: views are checked by results that were computed
             self._results.oMg[k] = pin.SE3(np.eye(3), np.array([AWAY * k, 0.0, 0.0]))
-        for number in sorted({k * (len(table.pairs) - 1) // 6 for k in (0, 2, 3, 6)} if len(table.pairs) else ()):
+        checked = {k * (len(table.pairs) - 1) // 6 for k in (0, 2, 3, 6)}
+        for number in sorted(checked) if self._kept and len(table.pairs) else ():
             pin.computeDistance(geometry, self._results, number)
         self._view, self._placed = distance_view(self._results.distanceResults), placement_view(self._results.oMg)
         self.guesses = Guesses(self._results)
@@ -238,6 +241,8 @@ class _Postures:
 
     def measured(self, numbers: Indices) -> Array:
         """Distances and normals (k, 4) of pairs, by coal."""
+        if not self._kept:
+            return self._single.measured(self.places, self._table.pairs[numbers])[:, :4]
         geometry, results = self._geometry, self._results
         listed = numbers.tolist()
         for number in listed:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import io
+import math
 import tokenize
 import zipfile
 import zlib
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +18,7 @@ from wholebody.figures.figure import Figure
 from wholebody.files import LARGEST, read_bytes
 from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
+from wholebody.tracking.tracks import MOST_FRAMES
 
 VERSION = 1
 """Of the layout of the arrays."""
@@ -72,7 +75,8 @@ def read(path: Path, figure: Figure) -> Frames:
             "the clip was made with"
         )
     name = str(arrays["name"])
-    return Frames(q.astype(np.float64), float(dt), name if name.strip() and name.isprintable() else path.stem)
+    name = name if name.strip() and name.isprintable() else path.stem
+    return Frames(q.astype(np.float64, copy=False), float(dt), name)
 
 
 def check_joints(path: Path, joints: list[str], figure: Figure) -> None:
@@ -95,7 +99,8 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
     """All arrays of an npz file, without those of Python objects.
 
     Raises:
-        FileFormatError: it is no npz file, it is damaged, or it is too large when unpacked.
+        FileFormatError: it is no npz file, it is damaged, or an array is too large, which its header says before it
+            is read.
     """
     data = read_bytes(path, "clip")
     arrays: dict[str, NDArray[np.generic]] = {}
@@ -104,15 +109,37 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
             if sum(entry.file_size for entry in archive.infolist()) > LARGEST:
                 raise FileFormatError(f"{path.name}: is larger than {LARGEST / 1e6:g} MB when unpacked")
             for entry in archive.infolist():
-                content = np.load(io.BytesIO(archive.read(entry)), allow_pickle=False)
-                if isinstance(content, np.ndarray):
-                    arrays[entry.filename.removesuffix(".npy")] = content
+                name = entry.filename.removesuffix(".npy")
+                with archive.open(entry) as file:
+                    _check_size(file, f"{path.name}: {one_line(name, 30)}")
+                with archive.open(entry) as file:
+                    content = np.lib.format.read_array(file, allow_pickle=False)
+                arrays[name] = content
     except FileFormatError:
         raise
     except BROKEN as error:
         why = one_line(f"{type(error).__name__}: {error}")
         raise FileFormatError(f"{path.name}: is no npz file, or it is cut off or damaged ({why})") from None
     return arrays
+
+
+def _check_size(file: IO[bytes], what: str) -> None:
+    """Check what the header of an array says of its size.
+
+    Raises:
+        FileFormatError: more frames than a clip has, or more numbers than can be read as such.
+        ValueError: it is no header.
+    """
+    version = np.lib.format.read_magic(file)
+    read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape = read(file)[0]
+    if shape and shape[0] > MOST_FRAMES:
+        raise FileFormatError(f"{what} has {shape[0]} frames; give 1 to {MOST_FRAMES}, or cut the clip into parts")
+    size = 8 * math.prod(shape)  # as float64
+    if size > LARGEST:
+        raise FileFormatError(
+            f"{what} has shape {shape}, {size / 1e6:.0f} MB; give at most {LARGEST / 1e6:g} MB, or cut it into parts"
+        )
 
 
 def _listed(arrays: dict[str, NDArray[np.generic]]) -> str:

@@ -1,0 +1,114 @@
+"""Scenes of very many things: what they take, and that no answer differs from that of few."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody import all_pairs
+from wholebody.all_pairs import AllPairs
+from wholebody.geometry import proximity, single_pairs
+from wholebody.geometry.continuous import sweep, swept_depth
+from wholebody.geometry.large_models import TABLED, geometry_model
+from wholebody.motion.checking import check
+
+MODULES = (all_pairs, proximity, single_pairs, sweep, swept_depth)
+
+
+def crowd(count: int, spread: float = 1.2) -> wb.Scene:
+    """An avatar among balls, boxes and a floor, some of them in it."""
+    rng = np.random.default_rng(count)
+    scene = wb.Scene(wb.load("avatar")).add(wb.HalfSpace(), name="floor")
+    for k in range(count):
+        shape = wb.Sphere(0.02) if k % 2 else wb.Box((0.03, 0.02, 0.05))
+        scene.add(shape, name=f"thing {k}", at=rng.uniform(-spread, spread, 3) + (0.0, 0.0, 1.0))
+    return scene
+
+
+@pytest.fixture
+def no_pair_data(monkeypatch: pytest.MonkeyPatch) -> None:
+    for module in MODULES:
+        monkeypatch.setattr(module, "KEPT", 0)
+
+
+def answers(scene: wb.Scene) -> dict[str, object]:
+    """What a scene says of a motion and of its ends."""
+    figure = scene.figure
+    q = figure.posture(figure.postures[0])
+    end = q.copy()
+    end[0] += 0.3
+    pairs = AllPairs(scene.built)
+    pairs.move(q)
+    near = pairs.nearer(np.full(len(scene.pair_table.pairs), 0.1))
+    contacts = scene.contacts(q, 0.1)
+    found = scene.sweep(q, end)
+    problem = wb.Problem(scene, goals=[wb.Point("right_palm", figure.placement(q, "right_palm").translation)])
+    return {
+        "least": pairs.least,
+        "near": (near.number, near.found[:, 0]),
+        "contacts": (contacts.number, contacts.distance),
+        "sweep": None if found is None else found.fraction,
+        "overlapping": int((pairs.distance < 0.0).sum()),
+        "violation": wb.assess(problem, q).penetration,
+        "dip": check(wb.Clip(figure, np.array([q, end]), 0.1), scene).between[0],
+    }
+
+
+def test_no_answer_depends_on_whether_data_are_kept_for_each_pair(request: pytest.FixtureRequest) -> None:
+    kept = answers(crowd(120))
+    request.getfixturevalue("no_pair_data")
+    scene = crowd(120)
+    assert len(scene.workspace().proximity.results.distanceResults) == 0
+    single = answers(scene)
+    for name, value in kept.items():
+        if isinstance(value, tuple):
+            assert (value[0] == single[name][0]).all(), name
+            assert single[name][1] == pytest.approx(value[1], abs=2e-6), name
+        else:
+            assert single[name] == pytest.approx(value, abs=1e-5), name
+
+
+def test_solves_without_pair_data_are_free_and_repeatable(no_pair_data: None) -> None:
+    scene = crowd(60, spread=2.5)
+    target = scene.figure.placement(scene.figure.posture(scene.figure.postures[0]), "right_palm").translation
+    problem = wb.Problem(scene, goals=[wb.Point("right_palm", target + (0.1, 0.0, 0.1))], clearance=0.001)
+    one, other = wb.solve(problem), wb.solve(problem)
+    assert (one.q == other.q).all()
+    assert one.status in ("solved", "stalled", "unreachable")
+    assert one.assessment.penetration <= 1e-5 or one.status != "solved"
+
+
+def test_the_pairs_of_a_large_model_are_those_of_a_small_one() -> None:
+    count = TABLED + 10
+    pieces = [pin.GeometryObject(f"p{k}", 0, 0, pin.SE3(np.eye(3), np.ones(3) * k), None) for k in range(count)]
+    pairs = np.array([[0, 1], [5, 900], [7, count - 1]])
+    made = geometry_model(pieces, pairs)
+    assert [(pair.first, pair.second) for pair in made.collisionPairs] == [tuple(pair) for pair in pairs.tolist()]
+    assert made.ngeoms == count
+    assert made.collisionPairMapping.size == 0
+    assert made.geometryObjects[9].name == "p9"
+    again = pickle.loads(pickle.dumps(made))
+    assert len(again.collisionPairs) == 3
+    assert again.ngeoms == count
+
+
+def test_a_scene_of_three_thousand_things_is_as_one_of_few() -> None:
+    scene = crowd(3000, spread=3.0)
+    q = scene.figure.posture(scene.figure.postures[0])
+    assert scene.geometry.collisionPairMapping.size == 0
+    contacts = scene.contacts(q, 0.05)
+    body = len(scene.figure.geometry.geometryObjects)
+    few = wb.Scene(scene.figure)
+    near = {scene.piece_owner[piece] for piece in contacts.pair.ravel().tolist() if piece >= body}
+    for name in sorted(near):
+        few.add(scene.objects[name].shape, name=name, at=scene.objects[name].placement)
+    assert np.sort(contacts.distance) == pytest.approx(np.sort(few.contacts(q, 0.05).distance), abs=2e-6)
+    for copied in (copy.copy(scene), pickle.loads(pickle.dumps(scene))):
+        assert copied.contacts(q, 0.05).distance == pytest.approx(contacts.distance, abs=2e-6)
+    scene.move("thing 5", at=(0.0, 0.0, 1.0))
+    assert "thing 5" in {scene.piece_owner[piece] for piece in scene.overlapping(q).pair.ravel().tolist()}

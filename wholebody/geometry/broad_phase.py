@@ -1,0 +1,104 @@
+"""Pairs among many pieces that stand anywhere: boxes along the world's axes first, coal for those that overlap."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from wholebody.arrays import Array, Indices, Mask
+from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.geometry.single_pairs import SinglePairs
+
+AT_ONCE = 1_000_000  # pairs of boxes that are compared in one go; more = more memory, 50 bytes each
+
+
+def box_pairs(low: Array, high: Array) -> Indices:
+    """Pairs (k, 2), the lesser index first, of boxes along the axes that overlap or touch.
+
+    They are sorted along the axis on which they are spread most; what begins there before another one ends is compared
+    on the other two.
+
+    Args:
+        low: (n, 3) least corner of each box.
+        high: (n, 3) greatest corner.
+    """
+    if len(low) < 2:
+        return np.zeros((0, 2), dtype=np.intp)
+    axis = int(np.argmax(np.ptp(low + high, axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    low, high = low[order], high[order]
+    begins = np.arange(1, len(low) + 1)
+    counts = np.maximum(np.searchsorted(low[:, axis], high[:, axis], side="right") - begins, 0)
+    ends, found, done = np.cumsum(counts), [np.zeros((0, 2), dtype=np.intp)], 0
+    while done < len(counts):
+        before = int(ends[done - 1]) if done else 0
+        upto = max(int(np.searchsorted(ends, before + AT_ONCE, side="right")), done + 1)
+        some = counts[done:upto]
+        first = np.repeat(np.arange(done, upto), some)
+        second = first + 1 + np.arange(len(first)) - np.repeat(np.cumsum(some) - some, some)
+        both = ((low[first] <= high[second]) & (low[second] <= high[first])).all(axis=1)
+        found.append(np.sort(order[np.column_stack([first[both], second[both]])], axis=1))
+        done = upto
+    return np.concatenate(found)
+
+
+def near_among(
+    table: PairTable,
+    placements: Array,
+    pieces: Indices,
+    group: Indices,
+    within: float,
+    left_out: Collection[tuple[int, int]] = (),
+) -> Contacts:
+    """Pairs of some pieces that are nearer than a distance, the nearest first, whatever pairs the table has.
+
+    Of two half-spaces nothing is said: they have no end. `number` is -1 for all.
+
+    Args:
+        table: all pieces.
+        placements: (n, 4, 3) where they are; see `Contacts.placements`.
+        pieces: (m,) those that are looked at.
+        group: (m,) pieces of the same group make no pair.
+        within: metres.
+        left_out: pairs of groups that make no pair either, the lesser group first.
+    """
+    centre = placements[pieces, 3]
+    half = np.einsum("kji,kj->ki", np.abs(placements[pieces, :3]), table.half[pieces]) + 0.5 * within
+    pairs = box_pairs(centre - half, centre + half)
+    groups = np.sort(group[pairs], axis=1)
+    kept = groups[:, 0] != groups[:, 1]
+    for one, other in left_out:
+        kept &= (groups[:, 0] != one) | (groups[:, 1] != other)
+    kept[kept] = _may_be_near(table, placements, pieces[pairs[kept]], within)
+    chosen = pieces[pairs[kept]]
+    found = SinglePairs(table.geometry).measured(placements, chosen)
+    # coal has no normal where two centres meet: any parts them as well
+    found[~(np.linalg.norm(found[:, 1:4], axis=1) > 0.5), 1:4] = (0.0, 0.0, 1.0)
+    near = np.flatnonzero(found[:, 0] < within)
+    found, chosen = found[near], chosen[near]
+    number = np.full(len(near), -1, dtype=np.intp)
+    distance, normal, point_a, point_b = (np.ascontiguousarray(part) for part in np.split(found, (1, 4, 7), axis=1))
+    return Contacts(chosen, distance[:, 0], normal, point_a, point_b, number, placements).nearest_first()
+
+
+def _may_be_near(table: PairTable, placements: Array, pairs: Indices, within: float) -> Mask:
+    """Whether the pieces of pairs (k, 2) can be near, along the axes of both of their boxes, or a plane's normal.
+
+    The boxes are those about the pieces along their own axes. Two half-spaces are not near.
+    """
+    axes, half = placements[pairs, :3], table.half[pairs]
+    apart = placements[pairs[:, 1], 3] - placements[pairs[:, 0], 3]
+    turned = np.abs(np.einsum("kij,klj->kil", axes[:, 0], axes[:, 1]))
+    gap = np.abs(np.einsum("ksij,kj->ksi", axes, apart)) - half
+    gap[:, 0] -= np.einsum("kil,kl->ki", turned, half[:, 1])
+    gap[:, 1] -= np.einsum("kil,ki->kl", turned, half[:, 0])
+    endless = np.isinf(table.reach[pairs])
+    kept = (gap < within).all(axis=(1, 2)) & ~endless.all(axis=1)
+    for plane in np.unique(pairs[endless]).tolist():
+        rows = np.flatnonzero((pairs == plane).any(axis=1) & kept)
+        other = np.where(pairs[rows, 0] == plane, pairs[rows, 1], pairs[rows, 0])
+        normal = table.swept[plane].faces[0, :3] @ placements[plane, :3]
+        height = (placements[other, 3] - placements[plane, 3]) @ normal - table.swept[plane].faces[0, 3]
+        kept[rows] = height - (np.abs(placements[other, :3] @ normal) * table.half[other]).sum(axis=1) < within
+    return np.asarray(kept)
