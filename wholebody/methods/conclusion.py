@@ -90,6 +90,7 @@ def concluded(
     if why and ending.caveat and not judgement.holds(enough):
         why += f"; {ending.caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
+    note = f"; {problem.left_out}" if problem.left_out else ""
     return Solution(
         q=ending.q,
         status=status,
@@ -98,7 +99,7 @@ def concluded(
         assessment=judgement,
         trace=ending.trace,
         method=method,
-        message=said + judgement.in_the_way + _way_out(problem, judgement) + ending.remark,
+        message=said + judgement.in_the_way + _way_out(problem, judgement) + ending.remark + note,
         programs=ending.programs,
     )
 

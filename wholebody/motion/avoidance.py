@@ -15,16 +15,20 @@ from wholebody.arrays import Array
 from wholebody.checks import a, flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.control import ctrl_c_ends_all
-from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input, has_setting
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
+from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
+from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.motion.smoothing import smoothed
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
+from wholebody.tasks.base import Bound, filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
 FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
@@ -65,6 +69,10 @@ class AvoidanceReport:
         loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
         beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
             held at there, metres; 0 where nothing does.
+        jerk: largest root mean square jerk over half a second, in parts of the original's; see `wb.MotionBounds`.
+        speed: largest speed of a joint, in parts of the original's nearby; see `wb.MotionBounds`.
+        deviation: largest change of a posture that was free, radians or metres.
+        smoothed: windows of frames that were too rough and were made smooth after the method.
     """
 
     solved: bool
@@ -82,6 +90,10 @@ class AvoidanceReport:
     after: ClipCheck
     loads: LoadChange | None = None
     beside: float = 0.0
+    jerk: float = 1.0
+    speed: float = 1.0
+    deviation: float = 0.0
+    smoothed: int = 0
 
     def __str__(self) -> str:
         """Three lines: what is left, before and after, and what it took."""
@@ -157,9 +169,13 @@ def avoid(
     constraints: Iterable[Given] = (),
     hold_feet: bool = True,
     dynamics: bool | Strength = False,
+    keep_ends: bool = False,
     progress: Progress | None = None,
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
+
+    Jerk, speed and the deviation of postures that were free are bounded, by `wb.MotionBounds()` unless `constraints` has
+    one of its own. What a method leaves beyond these bounds is made smooth by the program of the method "trajectory".
 
     Args:
         clip: the original postures; they may collide and be beyond limits.
@@ -174,6 +190,7 @@ def avoid(
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
             zero moment point farther outside than it was. Contacts come first; the report says what is left. The method
             "trajectory" can do this.
+        keep_ends: keep the first and the last posture as they are where they are free.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
     Returns:
@@ -198,17 +215,66 @@ def avoid(
         chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
     strong = chosen.dynamics
     stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
+    flag(keep_ends, "avoid: keep_ends")
+    was = check(clip, scene, depth=COLLISION)
+    asked, given = _bounds(clip, given, was, frame_terms(scene, clip.q, clip.dt, given, chosen.clearance), keep_ends)
     terms = frame_terms(scene, clip.q, clip.dt, given, chosen.clearance)
+    watch = Watch(progress)
+    told = None if progress is None else lambda now: watch.tell(now.share, now.note)
     began = time.perf_counter()
     with ctrl_c_ends_all():
-        result = chosen.avoid(clip, scene, given, progress)
+        result = chosen.avoid(clip, scene, given, told)
+        smooth = 0
+        if result.times is None and strong is None and not watch.ended:
+            result, smooth = _smoothed(clip, result, terms, asked, chosen.clearance, watch)
     seconds = time.perf_counter() - began
     found = clip.with_q(result.q)
     change = None
     if strong is not None:
         old, new = (Clip(scene.figure, each.q, each.dt, each.name) for each in (clip, found))
         change = load_change(old, new, result.times, stands, strong, terms)
-    return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds, change))
+    report = _report(was, found, terms, result, chosen.name, asked, change)
+    return Avoided(found, replace(report, seconds=seconds, smoothed=smooth))
+
+
+def _bounds(
+    clip: Clip, given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool
+) -> tuple[MotionBounds, tuple[Given, ...]]:
+    """The bounds on jerk, speed and deviation, resolved for a clip, and the terms with them in place of others.
+
+    Raises:
+        InputError: two are given.
+    """
+    stated = [term for term in given if isinstance(term, MotionBounds)]
+    if len(stated) > 1:
+        raise InputError("avoid: constraints has two wb.MotionBounds; give one")
+    asked = replace(stated[0] if stated else MotionBounds(), **({"keep_ends": True} if keep_ends else {}))
+    limits, state = terms.scene.figure.limits, terms.scene.state(clip.q[0])
+    values = clip.q[:, limits.idx_q]
+    beyond = np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0)
+    free = (was.depth <= DEPTH) & (beyond <= ROUNDING)
+    if terms.given or terms.holds:
+        free &= [terms.worst(frame, state.update(q)).by <= HELD for frame, q in enumerate(clip.q)]
+    passed = np.zeros(len(clip), dtype=bool)
+    for gap in np.flatnonzero(was.between > was.tolerance):
+        passed[gap : gap + 2] = True
+    for gap, pair in enumerate(pairwise(clip.q)):
+        if any(isinstance(term, Bound) for term in terms.given) and terms.past_speed(gap, *pair, state) > 0.0:
+            passed[gap : gap + 2] = True
+    asked = asked.resolved(free, passed)
+    return asked, (*(term for term in given if not isinstance(term, MotionBounds)), asked)
+
+
+def _smoothed(
+    clip: Clip, result: MethodResult, terms: FrameTerms, asked: MotionBounds, clearance: float, watch: Watch
+) -> tuple[MethodResult, int]:
+    """What a method made, smooth where it is beyond the bounds, and how many windows were made smooth."""
+    beyond = excess(clip, clip.with_q(result.q), asked).beyond
+    if not beyond.any():
+        return result, 0
+    with terms.scene.borrow() as workspace:
+        found = smoothed(result.q, beyond, terms, clearance, workspace, watch)
+    return result._replace(q=found.q, programs=result.programs + found.programs), found.windows
 
 
 def _strength(dynamics: object) -> Strength | None:
@@ -219,13 +285,14 @@ def _strength(dynamics: object) -> Strength | None:
 
 
 def _report(
-    before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float,
+    was: ClipCheck, after: Clip, terms: FrameTerms, result: MethodResult, method: str, asked: MotionBounds,
     loads: LoadChange | None,
 ) -> AvoidanceReport:  # fmt: skip
-    scene = terms.scene
-    was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
+    scene, before = terms.scene, was.clip
+    now = check(after, scene, depth=COLLISION)
     times = before.times if result.times is None else result.times
     timed = terms if result.times is None else terms.at(times)
+    seen = excess(before.with_q(timed.q), after, filled(asked, largest=timed.largest))
     state = scene.state(after.q[0])
     misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
     past = [timed.past_speed(frame, q, following, state) for frame, (q, following) in enumerate(pairwise(after.q))]
@@ -251,7 +318,9 @@ def _report(
         left.append(
             f"a speed that was given is exceeded by {faster:.1%} of it, at {past.index(faster) * after.dt:.2f} s"
         )
-    solved = now.free and faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    left += seen.said
+    held = faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    solved = now.free and held and not seen.said
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")
     if not (solved or left):
@@ -272,8 +341,8 @@ def _report(
         message += f"; {loads}"
     changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
-        after.duration, times, was, now, loads, terms.beside,
+        solved, message, method, 0.0, result.posture_solves, result.programs, changed, missed, result.stretch,
+        after.duration, times, was, now, loads, terms.beside, seen.jerk, seen.speed, seen.deviation,
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ class Fade:
                     deepest = run.first + int(np.argmax(depths[run.first : run.end]))
                     freed, spent = freed_posture(terms, deepest, q[deepest], self.clearance)
                     solves, programs = solves + 1, programs + spent
-                    _fade(workspace.model, q, run, deepest, freed, fade)
+                    _fade(terms, q, run, deepest, freed, fade)
                 q = np.array([scene.figure.clamp(posture) for posture in q])
             left = runs(faults(workspace, terms, q, self.clearance)[1])
         return MethodResult(q, solves, programs, f"{self.rounds} rounds did not free it" if left else "")
@@ -110,9 +110,12 @@ def freed_posture(terms: FrameTerms, frame: int, q: Array, clearance: float) -> 
     return solution.q, sum(solution.programs.values())
 
 
-def _fade(model: pin.Model, q: Array, run: Window, deepest: int, freed: Array, fade: int) -> None:
+def _fade(terms: FrameTerms, q: Array, run: Window, deepest: int, freed: Array, fade: int) -> None:
     """Add the change of the deepest frame to the frames of its collision, and a share of it to those around."""
+    model = terms.scene.model
     change = np.asarray(pin.difference(model, q[deepest], freed))
     for frame in range(max(0, run.first - fade), min(len(q), run.end + fade)):
+        if terms.kept(frame):
+            continue
         away = max(run.first - frame, frame - run.end + 1, 0) / (fade + 1)
         q[frame] = pin.integrate(model, q[frame], (1.0 - away) ** 2 * (1.0 + 2.0 * away) * change)
