@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.load_change import LoadChange, standing_frames
+from wholebody.motion.load_change import LoadChange
+from wholebody.motion.trajectory.loads import standing_frames
 
 WHEEL = """<robot name="wheel"><link name="base"/>
 <link name="wheel"><inertial><mass value="2"/>

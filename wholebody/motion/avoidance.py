@@ -23,9 +23,10 @@ from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
 from wholebody.motion.motion_bounds import MotionBounds, excess
 from wholebody.motion.smoothing import smoothed
-from wholebody.motion.soles import standing_feet, usual_feet
+from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
+from wholebody.motion.torques import torques
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
 from wholebody.tasks.base import Bound, filled
@@ -174,8 +175,8 @@ def avoid(
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
 
-    Jerk, speed and the deviation of postures that were free are bounded, by `wb.MotionBounds()` unless `constraints` has
-    one of its own. What a method leaves beyond these bounds is made smooth by the program of the method "trajectory".
+    Jerk, speed and the deviation of postures that were free are bounded, by `wb.MotionBounds()` unless `constraints`
+    has one of its own. What a method leaves beyond these bounds is made smooth by the program of "trajectory".
 
     Args:
         clip: the original postures; they may collide and be beyond limits.
@@ -214,7 +215,8 @@ def avoid(
             raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
         chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
     strong = chosen.dynamics
-    stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
+    feet = usual_feet(scene.figure, given)
+    loads = None if strong is None else torques(_carried(clip, scene), feet=feet, strength=strong)
     flag(keep_ends, "avoid: keep_ends")
     was = check(clip, scene, depth=COLLISION)
     asked, given = _bounds(clip, given, was, frame_terms(scene, clip.q, clip.dt, given, chosen.clearance), keep_ends)
@@ -230,11 +232,16 @@ def avoid(
     seconds = time.perf_counter() - began
     found = clip.with_q(result.q)
     change = None
-    if strong is not None:
-        old, new = (Clip(scene.figure, each.q, each.dt, each.name) for each in (clip, found))
-        change = load_change(old, new, result.times, stands, strong, terms)
+    if strong is not None and loads is not None:
+        places = None if result.times is None else result.times / clip.dt
+        change = load_change(loads, _carried(found, scene), places, strong, feet)
     report = _report(was, found, terms, result, chosen.name, asked, change)
     return Avoided(found, replace(report, seconds=seconds, smoothed=smooth))
+
+
+def _carried(clip: Clip, scene: Scene) -> Clip:
+    """A clip of the scene's figure, with what it carries."""
+    return Clip(scene.figure, clip.q, clip.dt, clip.name)
 
 
 def _bounds(

@@ -70,6 +70,7 @@ class FrameTerms:
     largest: Array | None = None
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
+    _left_out: dict[str, set[int]] = field(default_factory=dict, init=False, repr=False)
     _state: State = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -110,6 +111,20 @@ class FrameTerms:
                 found.append(replace(foot, at=pin.SE3(at.rotation, at.translation + shift)))
             self._feet[frame] = tuple(found)
         return self._feet[frame]
+
+    def leave_out(self, frame: int, said: str) -> None:
+        """Keep what a problem of a frame says of a default that makes no sense there; see `Problem.left_out`."""
+        if said:
+            self._left_out.setdefault(said, set()).add(frame)
+
+    @property
+    def left_out(self) -> str:
+        """Which defaults were left out in postures that were solved for, and in which frames; "" where none was."""
+        found = []
+        for said, frames in self._left_out.items():
+            more = f" and {len(frames) - 1} others" if len(frames) > 1 else ""
+            found.append(f"{said} (frame {min(frames)}{more})")
+        return "; ".join(found)
 
     def shift(self, frame: int, joint: int) -> Array:
         """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""
@@ -249,6 +264,11 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
     return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
+
+
+def said(terms: FrameTerms, *parts: str) -> str:
+    """The message of a method: what did not succeed, and which defaults were left out; "" where there is neither."""
+    return "; ".join(part for part in (*parts, terms.left_out) if part)
 
 
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:
