@@ -276,11 +276,7 @@ def _smoothed(
     clip: Clip, result: MethodResult, terms: FrameTerms, asked: MotionBounds, clearance: float, watch: Watch
 ) -> tuple[MethodResult, int]:
     """What a method made, smooth where it is beyond the bounds, and how many windows were made smooth."""
-    beyond = excess(clip, clip.with_q(result.q), asked).beyond
-    if not beyond.any():
-        return result, 0
-    with terms.scene.borrow() as workspace:
-        found = smoothed(result.q, beyond, terms, clearance, workspace, watch)
+    found = smoothed(clip, result.q, asked, terms, clearance, watch)
     return result._replace(q=found.q, programs=result.programs + found.programs), found.windows
 
 

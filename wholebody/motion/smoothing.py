@@ -14,14 +14,20 @@ import numpy as np
 
 from wholebody.arrays import Array, Mask
 from wholebody.motion.avoider import Watch
+from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.motion_bounds import MotionBounds, excess
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.window_run import ClipRun, WindowSettings
 from wholebody.motion.windows import windows
-from wholebody.workspace import Workspace
 
 MARGIN = 0.5  # s, before and after changed frames: in which others may change; that of the method "trajectory"
+TIMES = (
+    None,
+    0.2,
+    0.4,
+)  # s: smoothness; that of the method "trajectory", and longer where its jerk is beyond the bound
 ITERATIONS = 40  # most steps of one run of a window; that of the method "trajectory"
 
 
@@ -40,34 +46,42 @@ class Smoothed(NamedTuple):
 
 
 def smoothed(
-    q: Array, beyond: Mask, terms: FrameTerms, clearance: float, workspace: Workspace, watch: Watch
+    clip: Clip, q: Array, asked: MotionBounds, terms: FrameTerms, clearance: float, watch: Watch
 ) -> Smoothed:  # fmt: skip
-    """Make postures smooth around frames.
+    """Make postures smooth where they are beyond bounds on jerk, speed and deviation.
 
     Args:
-        q: (n, nq) postures; they stay as they are.
-        beyond: (n,) frames that are too rough.
-        terms: original postures, and what is held.
+        clip: the original.
+        q: (n, nq) postures made of it; they stay as they are.
+        asked: bounds, resolved for the clip.
+        terms: of the original: what is held.
         clearance: least distance of every pair, metres.
-        workspace: of this run alone.
         watch: is told of every window.
     """
-    q = np.array(q)
-    depths, _, gaps = faults(workspace, terms, terms.q, clearance)
-    run = ClipRun(WindowSettings(clearance, None, ITERATIONS), terms, workspace, banded_solver(None)[1], terms.q)
-    changed: Mask = beyond | (q != terms.q).any(axis=1)
-    count = 0
-    for window in windows(changed, max(3, round(MARGIN / terms.dt))):
-        if not beyond[window.first : window.end].any():
-            continue
-        begun = q[window.first : window.end]
-        found = run.window(window, depths, gaps, _teller(watch, f"frames {window.first} to {window.end - 1}"), begun)
-        if watch.ended:
-            break
-        if not found.missed:
-            q[window.first : window.end] = found.q
-            count += 1
-    return Smoothed(q, run.programs, count)
+    q, programs, count = np.array(q), 0, 0
+    beyond = excess(clip, clip.with_q(q), asked).beyond
+    if not beyond.any():
+        return Smoothed(q, 0, 0)
+    margin = max(3, round(MARGIN / terms.dt))
+    with terms.scene.borrow() as workspace:
+        depths, _, gaps = faults(workspace, terms, terms.q, clearance)
+        for time in TIMES:
+            settings = WindowSettings(clearance, time, ITERATIONS)
+            run = ClipRun(settings, terms, workspace, banded_solver(None)[1], terms.q)
+            changed: Mask = beyond | (q != terms.q).any(axis=1)
+            for window in windows(changed, margin):
+                frames = slice(window.first, window.end)
+                if not beyond[frames].any() or watch.ended:
+                    continue
+                told = _teller(watch, f"frames {window.first} to {window.end - 1}")
+                found = run.window(window, depths, gaps, told, q[frames])
+                if not found.missed and not watch.ended:
+                    q[frames], count = found.q, count + 1
+            programs += run.programs
+            beyond = excess(clip, clip.with_q(q), asked).beyond
+            if not beyond.any() or watch.ended:
+                break
+    return Smoothed(q, programs, count)
 
 
 def _teller(watch: Watch, note: str) -> Callable[[float], bool]:

@@ -27,8 +27,10 @@ from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
-CORRECTIONS = 3  # of the loads of rows; more = fewer loads beyond their bounds, longer where they cannot keep to them
-WORTH = 0.9  # of what loads are beyond their bounds: a correction that leaves more is the last
+CORRECTIONS = 6  # of the loads of rows; more = fewer loads beyond their bounds, longer where they cannot keep to them
+CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
+# rows, as filters change less of it
+WORTH = 0.9  # of what loads are beyond their bounds: a correction that leaves more gets no farther
 MEASURED = 1.5e-3  # m: as far a load may be beyond its bound, see `loads.LENGTH`; `avoid` allows 2e-3
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
@@ -141,35 +143,32 @@ class Trajectory:
         """
         if loads is None:
             return q, 0
-        found, least, programs = q, np.inf, 0
-        depths, wrong, gaps = faults(workspace, terms, reference, self.clearance)
-        for number in range(CORRECTIONS + 1):
-            if number:
-                _, wrong, gaps_left = faults(workspace, terms, q, self.clearance)
-                if wrong.any() or gaps_left:
-                    break
-            corrected = loads.corrected(q)
-            worst = corrected.of(q).worst()
-            if worst.max(initial=0.0) >= WORTH * least:
-                break
-            found, least = q, float(worst.max(initial=0.0))
+        depths, _, gaps = faults(workspace, terms, reference, self.clearance)
+        corrected = loads.corrected(q)
+        worst, programs, times = corrected.of(q).worst(), 0, list(CORRECTING)
+        margin = max(3, round(self.margin / terms.dt))
+        for _ in range(CORRECTIONS):
             beyond = worst > MEASURED
-            if not beyond.any() or number == CORRECTIONS:
+            if not beyond.any() or not times or watch.ended:
                 break
-            _, solve = banded_solver(self.solver)
-            run = ClipRun(settings, terms, workspace, solve, reference, self.stretch, corrected)
+            smoother = settings._replace(time=times[0])
+            run = ClipRun(smoother, terms, workspace, banded_solver(self.solver)[1], reference, self.stretch, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
-            q = np.array(q)
-            for window in windows(changed, max(3, round(self.margin / terms.dt))):
+            other = np.array(q)
+            for window in windows(changed, margin):
                 if beyond[window.first : window.end].any():
                     told = self._teller(watch, 1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
-                    q[window.first : window.end] = run.window(
-                        window, depths, gaps, told, q[window.first : window.end]
-                    ).q
+                    freed = run.window(window, depths, gaps, told, q[window.first : window.end])
+                    other[window.first : window.end] = freed.q
             programs += run.programs
-            if watch.ended:
-                break
-        return found, programs
+            _, wrong, dipping = faults(workspace, terms, other, self.clearance)
+            again = loads.corrected(other)
+            now = again.of(other).worst()
+            if wrong.any() or dipping or now.max() > WORTH * worst.max():
+                times.pop(0)
+            else:
+                q, corrected, worst = other, again, now
+        return q, programs
 
     def _freed(
         self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch,
