@@ -255,7 +255,8 @@ def _bounds(
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
         raise InputError("avoid: constraints has two wb.MotionBounds; give one")
-    asked = replace(stated[0] if stated else MotionBounds(), **({"keep_ends": True} if keep_ends else {}))
+    asked = stated[0] if stated else MotionBounds()
+    asked = replace(asked, keep_ends=True) if keep_ends else asked
     limits, state = terms.scene.figure.limits, terms.scene.state(clip.q[0])
     values = clip.q[:, limits.idx_q]
     beyond = np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0)

@@ -24,7 +24,7 @@ SPAN = 0.5
 """Seconds over which jerk and speed are compared: a tenth of it would compare single frames, and the whole clip would
 hide a jump of one frame among many calm ones."""
 
-TURN, TIME = 1.0, 0.6
+TURN, TIME = 1.0, 0.5
 """Radians and seconds of a plain movement of one joint. Where the original is calmer than it, the new motion may be as
 fast as this movement, which has the least jerk of all of its size and duration (Flash and Hogan 1985, Journal of
 Neuroscience 5(7): 1688)."""
@@ -45,7 +45,7 @@ class MotionBounds:
 
     `wb.avoid` asks for `MotionBounds()` where none is given. Jerk and speed are those of the joints, and apart from
     them of a free root. They are compared with the original within 0.25 s on both sides, and with a movement of one
-    joint by 1 rad in 0.6 s where the original is calmer than this.
+    joint by 1 rad in 0.5 s where the original is calmer than this.
 
     Attributes:
         jerk: largest root mean square jerk over half a second, in parts of the original's there or in the whole clip,
@@ -137,8 +137,8 @@ def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
         at = int(np.argmax(np.where(far, away - largest, -np.inf)))
         kept = "is to stay" if largest[at] == 0.0 else f"may move by {largest[at]:g}"
         said.append(f"the posture at {at * dt:.2f} s, which was free and {kept}, moved by {away[at]:.3g} rad or m")
-    worst = (float(ratio.max(initial=0.0)) for ratio in (jerk, speed))
-    return Excess(*worst, float(away[free].max(initial=0.0)), beyond, tuple(said))
+    rough_most, fast_most = (float(ratio.max(initial=0.0)) for ratio in (jerk, speed))
+    return Excess(rough_most, fast_most, float(away[free].max(initial=0.0)), beyond, tuple(said))
 
 
 def _beyond(ratio: Array, most: float | None) -> Mask:

@@ -48,10 +48,12 @@ class Defects(NamedTuple):
     Attributes:
         torque: (n, nv) N m.
         place: (n, 2) of the zero moment point, metres.
+        pressed: (n,) whether the measurement says where the zero moment point is; see `LIGHT`.
     """
 
     torque: Array
     place: Array
+    pressed: Mask
 
 
 class LoadBounds(NamedTuple):
@@ -140,15 +142,22 @@ class ClipLoads:
             low = LENGTH * (needed - bounds.lower) / -bounds.lower
         torque = np.concatenate([high, low])
         torque[np.isnan(torque)] = np.inf
-        leaning = self.leaning(stand, loads)
+        leaning = self.leaning(stand, loads, None if defects is None else bool(defects.pressed[frame]))
         if not len(leaning):
             return torque, leaning
         moved = 0.0 if defects is None else stand.normals @ defects.place[frame]
         return torque, leaning + moved + bounds.outside[frame]
 
-    def leaning(self, stand: Stand, loads: Loads) -> Array:
-        """(e,) distances of the zero moment point from the edges of the support; none where it says little."""
-        if not len(stand.normals) or loads.wrench[2] < LIGHT * self.dynamics.weight:
+    def leaning(self, stand: Stand, loads: Loads, pressed: bool | None = None) -> Array:
+        """(e,) distances of the zero moment point from the edges of the support; none where it says little.
+
+        Args:
+            stand: where the frame stands.
+            loads: of the frame.
+            pressed: whether it says much; None to see that from the loads.
+        """
+        pressed = loads.wrench[2] >= LIGHT * self.dynamics.weight if pressed is None else pressed
+        if not len(stand.normals) or not pressed:
             return np.zeros(0)
         return stand.margins(zero_moment_point(loads.wrench, stand.height))
 
@@ -178,7 +187,7 @@ class ClipLoads:
         own, clip = self.of(q), Clip(self.figure, q, self.dt)
         steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
         torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))
-        heavy = LIGHT * self.dynamics.weight
+        pressed: Mask = np.zeros(len(q), dtype=bool)
         for frame in range(1, len(q) - 1):
             here = self.dynamics.stand(steady[frame], [bool(mark[frame]) for mark in marks.values()])
             told, seen = (
@@ -186,11 +195,12 @@ class ClipLoads:
                 for postures, stand in ((own.base, self.stands[frame]), (steady, here))
             )
             torque[frame] = seen.torque - told.torque
-            if min(told.wrench[2], seen.wrench[2]) >= heavy and len(self.stands[frame].normals):
+            pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and told.wrench[2] > 0.0
+            if pressed[frame] and len(self.stands[frame].normals):
                 height = self.stands[frame].height
                 place[frame] = zero_moment_point(seen.wrench, height) - zero_moment_point(told.wrench, height)
         clip = Clip(self.figure, self._original, self.dt)
-        return ClipLoads(clip, self.dynamics, self.stands, self.bounds, self._changed, Defects(torque, place))
+        return ClipLoads(clip, self.dynamics, self.stands, self.bounds, self._changed, Defects(torque, place, pressed))
 
     def worst(self) -> Array:
         """(n,) by how much loads are beyond their bounds, metres, see `LENGTH`; 0 where they are not."""

@@ -103,9 +103,14 @@ class Trajectory:
                 )
             run = ClipRun(settings, terms, workspace, solve, clip.q, self.stretch, loads)
             q, missed = self._freed(run, terms, workspace, clip.q, watch)
-            q, used = self._measured(settings, terms, workspace, clip.q, q, loads, watch)
             new = None if watch.ended else self._timing(q, terms, workspace.state, solve, loads)
             if new is None:
+
+                def again_with(loads: ClipLoads, time: float) -> ClipRun:
+                    smoother = settings._replace(time=time)
+                    return ClipRun(smoother, terms, workspace, solve, clip.q, self.stretch, loads)
+
+                q, used = self._measured(again_with, terms, workspace, clip.q, q, loads, watch)
                 return MethodResult(q, run.posture_solves, run.programs + used, _said(watch, terms, missed))
             # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
             slower = terms.at(new.times)
@@ -114,15 +119,20 @@ class Trajectory:
             again = ClipRun(settings, slower, workspace, solve, passed, 1.0, loads)
             beyond = None if loads is None else loads.beyond()
             q, left = self._freed(again, slower, workspace, passed, watch, beyond)
-            q, more = self._measured(settings, slower, workspace, passed, q, loads, watch)
+
+            def slower_with(loads: ClipLoads, time: float) -> ClipRun:
+                smoother = settings._replace(time=time)
+                return ClipRun(smoother, slower, workspace, solve, passed, 1.0, loads)
+
+            q, used = self._measured(slower_with, slower, workspace, passed, q, loads, watch)
         return MethodResult(
-            q, run.posture_solves + again.posture_solves, run.programs + used + again.programs + more,
+            q, run.posture_solves + again.posture_solves, run.programs + again.programs + used,
             _said(watch, terms, [*missed, *left, slower.left_out]), times=new.times, stretch=new.largest,
         )  # fmt: skip
 
     def _measured(
-        self, settings: WindowSettings, terms: FrameTerms, workspace: Workspace, reference: Array, q: Array,
-        loads: ClipLoads | None, watch: Watch,
+        self, run_with: Callable[[ClipLoads, float], ClipRun], terms: FrameTerms, workspace: Workspace,
+        reference: Array, q: Array, loads: ClipLoads | None, watch: Watch,
     ) -> tuple[Array, int]:  # fmt: skip
         """Postures whose loads keep to their bounds as `wb.torques` measures them, as far as a few corrections get.
 
@@ -130,7 +140,7 @@ class Trajectory:
         what is beyond its bounds are computed again.
 
         Args:
-            settings: of windows.
+            run_with: makes a run with loads and a smoothness, seconds.
             terms: of the reference.
             workspace: of this run alone.
             reference: (n, nq) postures that deviations are from.
@@ -151,8 +161,7 @@ class Trajectory:
             beyond = worst > MEASURED
             if not beyond.any() or not times or watch.ended:
                 break
-            smoother = settings._replace(time=times[0])
-            run = ClipRun(smoother, terms, workspace, banded_solver(self.solver)[1], reference, self.stretch, corrected)
+            run = run_with(corrected, times[0])
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in windows(changed, margin):
