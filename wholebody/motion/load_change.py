@@ -52,16 +52,14 @@ class LoadChange:
     def farther(self) -> Array:
         """(m,) by how much farther the zero moment point is outside of the support than it was before, metres.
 
-        A frame between two of those before is compared with the worse of both. It is 0 where other feet stand than in
-        either: the support is another one there.
+        A frame between two of those before is compared with the worse of both, and a foot stands there before if it
+        stands in both. It is 0 where other feet stand than before: the support is another one.
         """
-        old, new, last = self.before, self.after, len(self.before.outside) - 1
-        worst = np.full(len(new.outside), -np.inf)
-        for near in (np.floor, np.ceil):
-            frames = np.clip(near(self.times).astype(int), 0, last)
-            same = (old.stands[frames] == new.stands).all(axis=1)
-            worst = np.where(same, np.maximum(worst, old.outside[frames]), worst)
-        found: Array = np.where(np.isfinite(worst), np.maximum(new.outside - worst, 0.0), 0.0)
+        old, last = self.before, len(self.before.outside) - 1
+        first, second = (np.clip(near(self.times).astype(int), 0, last) for near in (np.floor, np.ceil))
+        same = ((old.stands[first] & old.stands[second]) == self.after.stands).all(axis=1)
+        past = self.after.outside - np.maximum(old.outside[first], old.outside[second])
+        found: Array = np.where(same, np.maximum(past, 0.0), 0.0)
         return found
 
     @property
