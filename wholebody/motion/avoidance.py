@@ -74,6 +74,7 @@ class AvoidanceReport:
         speed: largest speed of a joint, in parts of the original's nearby; see `wb.MotionBounds`.
         deviation: largest change of a posture that was free, radians or metres.
         smoothed: windows of frames that were too rough and were made smooth after the method.
+        rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
     """
 
     solved: bool
@@ -95,6 +96,7 @@ class AvoidanceReport:
     speed: float = 1.0
     deviation: float = 0.0
     smoothed: int = 0
+    rough: bool = False
 
     def __str__(self) -> str:
         """Three lines: what is left, before and after, and what it took."""
@@ -226,17 +228,23 @@ def avoid(
     began = time.perf_counter()
     with ctrl_c_ends_all():
         result = chosen.avoid(clip, scene, given, told)
-        smooth = 0
-        if result.times is None and strong is None and not watch.ended:
-            result, smooth = _smoothed(clip, result, terms, asked, chosen.clearance, watch)
     seconds = time.perf_counter() - began
-    found = clip.with_q(result.q)
     change = None
     if strong is not None and loads is not None:
         places = None if result.times is None else result.times / clip.dt
-        change = load_change(loads, _carried(found, scene), places, strong, feet)
-    report = _report(was, found, terms, result, chosen.name, asked, change)
-    return Avoided(found, replace(report, seconds=seconds, smoothed=smooth))
+        change = load_change(loads, _carried(clip.with_q(result.q), scene), places, strong, feet)
+    report = _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
+    # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
+    if report.rough and result.times is None and strong is None and not watch.ended:
+        began = time.perf_counter()
+        with ctrl_c_ends_all():
+            found = smoothed(clip, result.q, asked, terms, chosen.clearance, watch)
+        seconds += time.perf_counter() - began
+        smooth = result._replace(q=found.q, programs=result.programs + found.programs)
+        other = _report(was, clip.with_q(smooth.q), terms, smooth, chosen.name, asked, None)
+        if found.windows and (other.solved or other.rough):
+            result, report = smooth, replace(other, smoothed=found.windows)
+    return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
 
 
 def _carried(clip: Clip, scene: Scene) -> Clip:
@@ -271,14 +279,6 @@ def _bounds(
             passed[gap : gap + 2] = True
     asked = asked.resolved(free, passed)
     return asked, (*(term for term in given if not isinstance(term, MotionBounds)), asked)
-
-
-def _smoothed(
-    clip: Clip, result: MethodResult, terms: FrameTerms, asked: MotionBounds, clearance: float, watch: Watch
-) -> tuple[MethodResult, int]:
-    """What a method made, smooth where it is beyond the bounds, and how many windows were made smooth."""
-    found = smoothed(clip, result.q, asked, terms, clearance, watch)
-    return result._replace(q=found.q, programs=result.programs + found.programs), found.windows
 
 
 def _strength(dynamics: object) -> Strength | None:
@@ -324,7 +324,8 @@ def _report(
         )
     left += seen.said
     held = faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
-    solved = now.free and held and not seen.said
+    held = held and now.free
+    solved = held and not seen.said
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")
     if not (solved or left):
@@ -347,6 +348,7 @@ def _report(
     return AvoidanceReport(
         solved, message, method, 0.0, result.posture_solves, result.programs, changed, missed, result.stretch,
         after.duration, times, was, now, loads, terms.beside, seen.jerk, seen.speed, seen.deviation,
+        rough=held and not solved,
     )  # fmt: skip
 
 
