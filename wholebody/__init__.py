@@ -76,6 +76,7 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.motion.equipment import Equipment
     from wholebody.motion.fade import Fade
+    from wholebody.motion.motion_bounds import MotionBounds
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_clip, read_skeleton
     from wholebody.motion.ready_equipment import equipment
@@ -185,6 +186,7 @@ __all__ = [
     "Measure",
     "Mesh",
     "MissingPackageError",
+    "MotionBounds",
     "Newton",
     "Orientation",
     "Owas",
@@ -314,6 +316,7 @@ _MODULES = {
     "wholebody.motion.per_frame": "PerFrame",
     "wholebody.motion.strength": "Strength",
     "wholebody.motion.torques": "Torques torques",
+    "wholebody.motion.motion_bounds": "MotionBounds",
     "wholebody.motion.stance": "StanceFeet",
     "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",

@@ -56,6 +56,7 @@ class Problem(checks.FixedAttributes):
         start: (nq,) the start posture.
         goals, constraints, bounds, measures: the terms, resolved on this scene and start.
         defaults: the constraints that were not stated; methods that cannot take one leave it to the assessment.
+        left_out: which default makes no sense at the start and is left out, and why, in words; "" where none is.
         measures_given: whether the caller gave measures; false if they are the default.
         clearance: least distance of every pair, metres.
         touching: pairs of segment or object names whose clearance is zero.
@@ -120,7 +121,7 @@ class Problem(checks.FixedAttributes):
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
         self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        added = default_constraints(
+        added, self.left_out = default_constraints(
             scene, self.start, stated, self.bounds, self.goals, ranges=self.range_of_motion, balance=self.balance
         )
         self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)

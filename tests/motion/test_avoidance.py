@@ -373,3 +373,18 @@ def test_an_answer_is_told_in_three_lines() -> None:
     assert lines[2].startswith("fade: ")
     assert str(freed.report) == str(freed).removeprefix("an arm, ")
     assert len(repr(freed)) < 200
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_person_on_tiptoe_is_freed_without_a_default_balance(human: Figure, method: str) -> None:
+    """Both feet are held and their lowest corners lie on a line: `Balance` has no area, and is left out."""
+    tiptoe = {"left_ankle_dorsiflexion": -0.7, "right_ankle_dorsiflexion": -0.7}
+    share = np.sin(np.linspace(0.0, np.pi, 15))
+    q = [human.with_joints(human.posture("standing"), {**tiptoe, "right_shoulder_abduction": -0.3 * s}) for s in share]
+    feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    way = wb.Bisection(frozen=()) if method == "bisection" else method  # a frozen root is balanced by nothing
+    found = wb.avoid(wb.Clip(human, q, DT), method=way, constraints=feet, hold_feet=False)
+    assert found.report.before.colliding
+    assert found.report.after.free, found.report.message
+    if method in ("bisection", "fade"):
+        assert "the default Balance is left out: the feet stand on a line" in found.report.message

@@ -110,3 +110,19 @@ def test_feet_in_one_line_leave_room(scene: wb.Scene) -> None:
     problem = wb.Problem(scene, start=figure.with_joints(figure.posture("standing"), hips), constraints=[LEFT, RIGHT])
     margins = [term.margin for term in problem.defaults if isinstance(term, wb.Balance)]
     assert 0.0 < margins[0] < 0.04
+
+
+def test_a_balance_on_tiptoe_is_left_out_with_a_note(scene: wb.Scene) -> None:
+    """The lowest corners of both feet lie on one line, so there is no polygon to stay in."""
+    figure = scene.figure
+    tiptoe = figure.with_joints(
+        figure.posture("standing"), {"left_ankle_dorsiflexion": -0.7, "right_ankle_dorsiflexion": -0.7}
+    )
+    problem = wb.Problem(scene, tiptoe, goals=[wb.Point("right_palm", (0.4, -0.2, 1.1))], constraints=[LEFT, RIGHT])
+    assert "Balance" not in kinds(problem)
+    assert "the feet stand on a line" in problem.left_out
+    assert problem.left_out in wb.solve(problem).message
+    assert not wb.Problem(scene, constraints=[LEFT, RIGHT]).left_out
+    for asked in ({"balance": True}, {"constraints": [LEFT, RIGHT, wb.Balance()]}):
+        with pytest.raises(wb.InputError, match="line"):
+            wb.Problem(scene, tiptoe, **asked)  # type: ignore[arg-type]

@@ -93,7 +93,8 @@ def concluded(
     if why and ending.caveat and not judgement.holds(enough):
         why += f"; {ending.caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
-    after = (judgement.in_the_way, _way_out(problem, judgement), ending.remark, _undefined(status, control))
+    note = f"; {problem.left_out}" if problem.left_out else ""
+    after = (judgement.in_the_way, _way_out(problem, judgement), ending.remark, _undefined(status, control), note)
     return Solution(
         q=ending.q,
         status=status,

@@ -15,16 +15,21 @@ from wholebody.arrays import Array
 from wholebody.checks import a, flag, instance, listed, shown
 from wholebody.errors import InputError, UnknownNameError
 from wholebody.methods.control import ctrl_c_ends_all
-from wholebody.motion.avoider import Avoider, MethodResult, Progress, check_input, has_setting
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
+from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
-from wholebody.motion.soles import standing_feet, usual_feet
+from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.motion.smoothing import smoothed
+from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
+from wholebody.motion.torques import torques
 from wholebody.motion_assessment import limit_violation
 from wholebody.scene import Scene
+from wholebody.tasks.base import Bound, filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
 FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
@@ -65,6 +70,11 @@ class AvoidanceReport:
         loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
         beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
             held at there, metres; 0 where nothing does.
+        jerk: largest root mean square jerk over half a second, in parts of the original's; see `wb.MotionBounds`.
+        speed: largest speed of a joint, in parts of the original's nearby; see `wb.MotionBounds`.
+        deviation: largest change of a posture that was free, radians or metres.
+        smoothed: windows of frames that were too rough and were made smooth after the method.
+        rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
     """
 
     solved: bool
@@ -82,6 +92,11 @@ class AvoidanceReport:
     after: ClipCheck
     loads: LoadChange | None = None
     beside: float = 0.0
+    jerk: float = 1.0
+    speed: float = 1.0
+    deviation: float = 0.0
+    smoothed: int = 0
+    rough: bool = False
 
     def __str__(self) -> str:
         """Three lines: what is left, before and after, and what it took."""
@@ -157,9 +172,13 @@ def avoid(
     constraints: Iterable[Given] = (),
     hold_feet: bool = True,
     dynamics: bool | Strength = False,
+    keep_ends: bool = False,
     progress: Progress | None = None,
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
+
+    Jerk, speed and the deviation of postures that were free are bounded, by `wb.MotionBounds()` unless `constraints`
+    has one of its own. What a method leaves beyond these bounds is made smooth by the program of "trajectory".
 
     Args:
         clip: the original postures; they may collide and be beyond limits.
@@ -174,6 +193,7 @@ def avoid(
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
             zero moment point farther outside than it was. Contacts come first; the report says what is left. The method
             "trajectory" can do this.
+        keep_ends: keep the first and the last posture as they are where they are free.
         progress: called with an `AvoidProgress` now and then; the method ends with what it has if it returns True.
 
     Returns:
@@ -197,18 +217,68 @@ def avoid(
             raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
         chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
     strong = chosen.dynamics
-    stands = {} if strong is None else standing_feet(clip, usual_feet(scene.figure, given))
+    feet = usual_feet(scene.figure, given)
+    loads = None if strong is None else torques(_carried(clip, scene), feet=feet, strength=strong)
+    flag(keep_ends, "avoid: keep_ends")
+    was = check(clip, scene, depth=COLLISION)
+    asked, given = _bounds(clip, given, was, frame_terms(scene, clip.q, clip.dt, given, chosen.clearance), keep_ends)
     terms = frame_terms(scene, clip.q, clip.dt, given, chosen.clearance)
+    watch = Watch(progress)
+    told = None if progress is None else lambda now: watch.tell(now.share, now.note)
     began = time.perf_counter()
     with ctrl_c_ends_all():
-        result = chosen.avoid(clip, scene, given, progress)
+        result = chosen.avoid(clip, scene, given, told)
     seconds = time.perf_counter() - began
-    found = clip.with_q(result.q)
     change = None
-    if strong is not None:
-        old, new = (Clip(scene.figure, each.q, each.dt, each.name) for each in (clip, found))
-        change = load_change(old, new, result.times, stands, strong, terms)
-    return Avoided(found, _report(clip, found, terms, result, chosen.name, seconds, change))
+    if strong is not None and loads is not None:
+        places = None if result.times is None else result.times / clip.dt
+        change = load_change(loads, _carried(clip.with_q(result.q), scene), places, strong, feet)
+    report = _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
+    # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
+    if report.rough and result.times is None and strong is None and not watch.ended:
+        began = time.perf_counter()
+        with ctrl_c_ends_all():
+            found = smoothed(clip, result.q, asked, terms, chosen.clearance, watch)
+        seconds += time.perf_counter() - began
+        smooth = result._replace(q=found.q, programs=result.programs + found.programs)
+        other = _report(was, clip.with_q(smooth.q), terms, smooth, chosen.name, asked, None)
+        if found.windows and (other.solved or other.rough):
+            result, report = smooth, replace(other, smoothed=found.windows)
+    return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
+
+
+def _carried(clip: Clip, scene: Scene) -> Clip:
+    """A clip of the scene's figure, with what it carries."""
+    return Clip(scene.figure, clip.q, clip.dt, clip.name)
+
+
+def _bounds(
+    clip: Clip, given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool
+) -> tuple[MotionBounds, tuple[Given, ...]]:
+    """The bounds on jerk, speed and deviation, resolved for a clip, and the terms with them in place of others.
+
+    Raises:
+        InputError: two are given.
+    """
+    stated = [term for term in given if isinstance(term, MotionBounds)]
+    if len(stated) > 1:
+        raise InputError("avoid: constraints has two wb.MotionBounds; give one")
+    asked = stated[0] if stated else MotionBounds()
+    asked = replace(asked, keep_ends=True) if keep_ends else asked
+    limits, state = terms.scene.figure.limits, terms.scene.state(clip.q[0])
+    values = clip.q[:, limits.idx_q]
+    beyond = np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0)
+    free = (was.depth <= DEPTH) & (beyond <= ROUNDING)
+    if terms.given or terms.holds:
+        free &= [terms.worst(frame, state.update(q)).by <= HELD for frame, q in enumerate(clip.q)]
+    passed = np.zeros(len(clip), dtype=bool)
+    for gap in np.flatnonzero(was.between > was.tolerance):
+        passed[gap : gap + 2] = True
+    for gap, pair in enumerate(pairwise(clip.q)):
+        if any(isinstance(term, Bound) for term in terms.given) and terms.past_speed(gap, *pair, state) > 0.0:
+            passed[gap : gap + 2] = True
+    asked = asked.resolved(free, passed)
+    return asked, (*(term for term in given if not isinstance(term, MotionBounds)), asked)
 
 
 def _strength(dynamics: object) -> Strength | None:
@@ -219,13 +289,14 @@ def _strength(dynamics: object) -> Strength | None:
 
 
 def _report(
-    before: Clip, after: Clip, terms: FrameTerms, result: MethodResult, method: str, seconds: float,
+    was: ClipCheck, after: Clip, terms: FrameTerms, result: MethodResult, method: str, asked: MotionBounds,
     loads: LoadChange | None,
 ) -> AvoidanceReport:  # fmt: skip
-    scene = terms.scene
-    was, now = check(before, scene, depth=COLLISION), check(after, scene, depth=COLLISION)
+    scene, before = terms.scene, was.clip
+    now = check(after, scene, depth=COLLISION)
     times = before.times if result.times is None else result.times
     timed = terms if result.times is None else terms.at(times)
+    seen = excess(before.with_q(timed.q), after, filled(asked, largest=timed.largest))
     state = scene.state(after.q[0])
     misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
     past = [timed.past_speed(frame, q, following, state) for frame, (q, following) in enumerate(pairwise(after.q))]
@@ -251,7 +322,10 @@ def _report(
         left.append(
             f"a speed that was given is exceeded by {faster:.1%} of it, at {past.index(faster) * after.dt:.2f} s"
         )
-    solved = now.free and faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    left += seen.said
+    held = faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
+    held = held and now.free
+    solved = held and not seen.said
     if loads is not None and not loads.kept:
         left.append("loads are beyond their bounds")
     if not (solved or left):
@@ -272,8 +346,9 @@ def _report(
         message += f"; {loads}"
     changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
     return AvoidanceReport(
-        solved, message, method, seconds, result.posture_solves, result.programs, changed, missed, result.stretch,
-        after.duration, times, was, now, loads, terms.beside,
+        solved, message, method, 0.0, result.posture_solves, result.programs, changed, missed, result.stretch,
+        after.duration, times, was, now, loads, terms.beside, seen.jerk, seen.speed, seen.deviation,
+        rough=held and not solved,
     )  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
-from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms, said
 from wholebody.motion.windows import Window, runs
 from wholebody.problem import Problem
 from wholebody.scene import Scene
@@ -73,22 +73,22 @@ class Fade:
                 wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
                 left = runs(wrong)
                 if not left:
-                    return MethodResult(q, solves, programs)
+                    return MethodResult(q, solves, programs, said(terms))
                 total, before = float(depths.sum()) + len(gaps) * SMALLEST, total
                 if total >= before:
-                    return MethodResult(q, solves, programs, "a round made nothing better")
+                    return MethodResult(q, solves, programs, said(terms, "a round made nothing better"))
                 for place, run in enumerate(left):
                     if watch.tell((number + place / len(left)) / self.rounds, f"round {number + 1}"):
-                        return MethodResult(q, solves, programs, "the caller ended it")
+                        return MethodResult(q, solves, programs, said(terms, "the caller ended it"))
                     if solves == MOST_SOLVES:
-                        return MethodResult(q, solves, programs, f"{MOST_SOLVES} postures did not free it")
+                        return MethodResult(q, solves, programs, said(terms, f"{MOST_SOLVES} postures did not free it"))
                     deepest = run.first + int(np.argmax(depths[run.first : run.end]))
                     freed, spent = freed_posture(terms, deepest, q[deepest], self.clearance)
                     solves, programs = solves + 1, programs + spent
-                    _fade(workspace.model, q, run, deepest, freed, fade)
+                    _fade(terms, q, run, deepest, freed, fade)
                 q = np.array([scene.figure.clamp(posture) for posture in q])
             left = runs(faults(workspace, terms, q, self.clearance)[1])
-        return MethodResult(q, solves, programs, f"{self.rounds} rounds did not free it" if left else "")
+        return MethodResult(q, solves, programs, said(terms, f"{self.rounds} rounds did not free it" if left else ""))
 
 
 def freed_posture(terms: FrameTerms, frame: int, q: Array, clearance: float) -> tuple[Array, int]:
@@ -105,14 +105,18 @@ def freed_posture(terms: FrameTerms, frame: int, q: Array, clearance: float) -> 
     others = [term for term in held if not isinstance(term, Goal)]
     bounds = [term for term in terms.given if isinstance(term, Bound)]
     problem = Problem(terms.scene, terms.scene.figure.clamp(q), goals=goals, constraints=[*others, *bounds])
+    terms.leave_out(frame, problem.left_out)
     problem.clearances = np.full_like(problem.clearances, clearance)
     solution = QP(restarts=0).solve(problem)
     return solution.q, sum(solution.programs.values())
 
 
-def _fade(model: pin.Model, q: Array, run: Window, deepest: int, freed: Array, fade: int) -> None:
+def _fade(terms: FrameTerms, q: Array, run: Window, deepest: int, freed: Array, fade: int) -> None:
     """Add the change of the deepest frame to the frames of its collision, and a share of it to those around."""
+    model = terms.scene.model
     change = np.asarray(pin.difference(model, q[deepest], freed))
     for frame in range(max(0, run.first - fade), min(len(q), run.end + fade)):
+        if terms.kept(frame):
+            continue
         away = max(run.first - frame, frame - run.end + 1, 0) / (fade + 1)
         q[frame] = pin.integrate(model, q[frame], (1.0 - away) ** 2 * (1.0 + 2.0 * away) * change)

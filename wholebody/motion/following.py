@@ -64,12 +64,15 @@ class Follower:
             goal: (nq,) posture that is followed in place of the original one.
         """
         terms, problem = self._terms, self._problem
+        if terms.kept(number):
+            return np.array(terms.q[number])
         problem.clearances = np.full_like(problem.clearances, self._clearance + more)
         low, high = self._still(number)
         if (low > -np.inf).any() or (high < np.inf).any():  # what is frozen keeps to the original motion
             model = terms.scene.model
             away = np.asarray(pin.difference(model, terms.q[number], q))
-            q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
+            if ((away < low) | (away > high)).any():
+                q = np.asarray(pin.integrate(model, terms.q[number], np.clip(away, low, high)))
         target = terms.q[number] if goal is None else goal
         near = filled(self._goal, target=target, resolved_target=target)
         held = terms.held(number)

@@ -19,6 +19,7 @@ from wholebody.checks import a, listed
 from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.grips import grip_shifts
+from wholebody.motion.motion_bounds import MotionBounds
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
 from wholebody.scene import Scene
@@ -28,7 +29,7 @@ from wholebody.tasks.checks import check_rows
 
 STILL = 1e-6  # rad, m in a time step: a smaller motion is rounding
 HeldTerm = Constraint | Goal
-Given = Constraint | Goal | Bound | StanceFeet
+Given = Constraint | Goal | Bound | StanceFeet | MotionBounds
 
 
 class Miss(NamedTuple):
@@ -51,11 +52,12 @@ class FrameTerms:
         scene: figure and things.
         q: (n, nq) original postures.
         dt: seconds from frame to frame.
-        given: the terms as they were given, without `StanceFeet`.
+        given: the terms as they were given, without `StanceFeet` and `MotionBounds`.
         stands: for each frame, frames of the feet that stand there and are held.
         shifts: for each frame, by how much each of them is held beside where it was (3,), metres.
         grips: for the numbers of given terms that hold a frame at another one, in each frame the shift of the grip
             (n, 3) beside where it was, metres, in the axes of the other one; without those that are not shifted.
+        largest: (n,) largest deviation of each frame, radians and metres; inf for any.
     """
 
     scene: Scene
@@ -65,8 +67,10 @@ class FrameTerms:
     stands: tuple[tuple[str, ...], ...]
     shifts: tuple[tuple[Array, ...], ...]
     grips: Mapping[int, Array] = field(default_factory=dict)
+    largest: Array | None = None
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
+    _left_out: dict[str, set[int]] = field(default_factory=dict, init=False, repr=False)
     _state: State = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -108,6 +112,20 @@ class FrameTerms:
             self._feet[frame] = tuple(found)
         return self._feet[frame]
 
+    def leave_out(self, frame: int, said: str) -> None:
+        """Keep what a problem of a frame says of a default that makes no sense there; see `Problem.left_out`."""
+        if said:
+            self._left_out.setdefault(said, set()).add(frame)
+
+    @property
+    def left_out(self) -> str:
+        """Which defaults were left out in postures that were solved for, and in which frames; "" where none was."""
+        found = []
+        for said, frames in self._left_out.items():
+            more = f" and {len(frames) - 1} others" if len(frames) > 1 else ""
+            found.append(f"{said} (frame {min(frames)}{more})")
+        return "; ".join(found)
+
     def shift(self, frame: int, joint: int) -> Array:
         """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""
         model = self.scene.model
@@ -127,7 +145,8 @@ class FrameTerms:
             Least and greatest deviation, and least and greatest change of the posture in one frame, each (nv,).
         """
         nv = self.scene.model.nv
-        low, high, slow, fast = (np.full(nv, value) for value in (-np.inf, np.inf, -np.inf, np.inf))
+        most = np.inf if self.largest is None else self.largest[frame]
+        low, high, slow, fast = (np.full(nv, value) for value in (-most, most, -np.inf, np.inf))
         bounds = [term.resolve(self.scene, self.q[frame]) for term in self.given if isinstance(term, Bound)]
         if bounds:
             state.update(self.q[frame])
@@ -138,6 +157,10 @@ class FrameTerms:
             slow = np.maximum(slow, np.where(np.isfinite(least), -np.inf, slower))
             fast = np.minimum(fast, np.where(np.isfinite(most), np.inf, faster))
         return low, high, slow, fast
+
+    def kept(self, frame: int) -> bool:
+        """Whether the posture of a frame is to stay as it is."""
+        return self.largest is not None and self.largest[frame] == 0.0
 
     def step_bounds(self, frame: int, state: State) -> tuple[Array, Array]:
         """Least and greatest motion (nv,) from a frame to the next one that speed limits allow; see `bounds`."""
@@ -159,7 +182,9 @@ class FrameTerms:
             number: np.stack([np.interp(places, frames, axis) for axis in shift.T], axis=1)
             for number, shift in self.grips.items()
         }
-        return replace(self, q=between(self.scene.model, self.q, places), stands=stands, shifts=shifts, grips=grips)
+        q = between(self.scene.model, self.q, places)
+        largest = None if self.largest is None else self.largest[nearest]
+        return replace(self, q=q, stands=stands, shifts=shifts, grips=grips, largest=largest)
 
     def missed(self, frame: int, state: State) -> float:
         """By how much the state, of the posture of a frame, misses what is held there, metres and radians."""
@@ -208,16 +233,19 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         clearance: least distance of every pair that is asked for, metres; grips that are nearer are held beside.
 
     Raises:
-        InputError: something else than a constraint, a goal, a bound or `StanceFeet`.
+        InputError: something else than a constraint, a goal, a bound, `StanceFeet` or `MotionBounds`.
         UnknownNameError: a term names something that the figure does not have.
     """
     given: list[Any] = listed(constraints, "avoid: constraints", "[wb.Freeze('root')]")
     feet: list[list[str]] = [[] for _ in q]
+    largest: Array | None = None
     for number, term in enumerate(given):
         if isinstance(term, StanceFeet):
             for foot, stand in standing(scene.figure, q, dt, term).items():
                 for frame in np.flatnonzero(stand):
                     feet[frame].append(foot)
+        elif isinstance(term, MotionBounds):
+            largest = term.largest
         elif isinstance(term, (Constraint, Goal)):
             _try(term, scene, q[0], f"avoid: constraints[{number}]")
         elif isinstance(term, Bound):
@@ -227,7 +255,7 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
                 f"avoid: constraints[{number}] is {a(type(term))}, not a constraint; see wholebody.tasks, or give "
                 "wb.StanceFeet()"
             )
-    plain = tuple(term for term in given if not isinstance(term, StanceFeet))
+    plain = tuple(term for term in given if not isinstance(term, (StanceFeet, MotionBounds)))
     stands = tuple(map(tuple, feet))
     found = {
         number: grip_shifts(scene, q, dt, term, clearance)
@@ -235,7 +263,12 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         if isinstance(term, Hold) and term.at is None and term.relative_to is not None
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
-    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips)
+    return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
+
+
+def said(terms: FrameTerms, *parts: str) -> str:
+    """The message of a method: what did not succeed, and which defaults were left out; "" where there is neither."""
+    return "; ".join(part for part in (*parts, terms.left_out) if part)
 
 
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:

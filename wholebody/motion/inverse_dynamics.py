@@ -88,6 +88,7 @@ class InverseDynamics:
     """Loads of frames of one figure.
 
     Attributes:
+        feet: names of the segments or frames that may stand.
         soles: of its feet.
         weight: N.
     """
@@ -101,7 +102,8 @@ class InverseDynamics:
             friction: coefficient of friction of the ground.
         """
         self._model, self._data, self._friction = figure.model, figure.model.createData(), friction
-        self.soles = Soles(figure, tuple(feet))
+        self.feet = tuple(feet)
+        self.soles = Soles(figure, self.feet)
         self.weight = float(pin.computeTotalMass(self._model) * np.linalg.norm(self._model.gravity.linear))
         self.free = figure.root == "free"
 

@@ -93,7 +93,7 @@ class PerFrame:
         for place, share in enumerate(np.linspace(0.0, 1.0, len(window)).tolist()):
             # the forward pass is late at the beginning of contacts, the backward pass at their ends
             blended = np.asarray(pin.interpolate(model, backward[place], forward[place], _smooth(share)))
-            if depth(workspace, blended, self.clearance) > DEPTH:
+            if depth(workspace, blended, self.clearance) > DEPTH or terms.kept(window.first + place):
                 blended = follower.frame(window.first + place, blended)
             q[window.first + place] = blended
 

@@ -13,7 +13,7 @@ from wholebody.arrays import Array, Mask
 from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, Stand, foot_wrenches
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.stance import FEET
 from wholebody.motion.strength import Strength, torque_limits
@@ -41,7 +41,7 @@ class Torques:
         moment: (n, feet, 3) moment of the ground on each foot about its centre of pressure, N m, in the world.
         pressure: (n, feet, 3) centre of pressure of each foot, metres; zero where the foot bears nothing.
         center_of_pressure: (n, 3) of both feet together, metres; zero where nothing bears.
-        supported: (n,) whether a foot stands in the frame.
+        stands: (n, feet) whether each foot stands in the frame.
         missing: (n, 6) what the ground cannot give of the wrench that the motion needs: force, N, and moment about the
             centre of mass, N m, in the world. Zero for a motion that is possible on these feet.
         outside: (n,) by how far the zero moment point of the motion is outside of the support polygon, metres; 0
@@ -59,11 +59,16 @@ class Torques:
     moment: Array = field(repr=False)
     pressure: Array = field(repr=False)
     center_of_pressure: Array = field(repr=False)
-    supported: Mask = field(repr=False)
+    stands: Mask = field(repr=False)
     missing: Array = field(repr=False)
     outside: Array = field(repr=False)
     lower: Array = field(repr=False)
     upper: Array = field(repr=False)
+
+    @property
+    def supported(self) -> Mask:
+        """(n,) whether a foot stands in the frame."""
+        return np.asarray(self.stands.any(axis=1))
 
     @property
     def share(self) -> Array:
@@ -172,9 +177,8 @@ def torques(
 
 
 def clip_torques(
-    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None,
-    soles: Sequence[Stand] | None = None,
-) -> Torques:  # fmt: skip
+    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
+) -> Torques:
     """Torques of a clip that stands on given feet in given frames; see `torques`.
 
     Args:
@@ -183,7 +187,6 @@ def clip_torques(
         strength: of the person.
         friction: coefficient.
         cutoff: Hz, or None.
-        soles: where each frame stands; None for where its own feet are.
     """
     figure, steady = clip.figure, smoothed(clip, cutoff)
     v, a = steady.velocities(), steady.accelerations()
@@ -192,8 +195,9 @@ def clip_torques(
     torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
     force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
     both, outside = np.zeros((count, 3)), np.zeros(count)
+    marks: Mask = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
     for k in range(count):
-        stand = dynamics.stand(steady.q[k], [bool(m[k]) for m in stands.values()]) if soles is None else soles[k]
+        stand = dynamics.stand(steady.q[k], marks[k].tolist())
         loads = dynamics.loads(steady.q[k], v[k], a[k], stand)
         torque[k] = loads.torque
         if not dynamics.free:
@@ -208,11 +212,8 @@ def clip_torques(
         both[k] = _pressure(forces, stand.points)
         outside[k] = dynamics.outside(loads, stand)
     lower, upper = torque_limits(figure, strength)
-    supported: Mask = np.zeros(count, dtype=bool)
-    for marks in stands.values():
-        supported[marks] = True
     return Torques(
-        figure, clip.dt, torque, tuple(stands), force, moment, pressure, both, supported, missing, outside, lower, upper
+        figure, clip.dt, torque, tuple(stands), force, moment, pressure, both, marks, missing, outside, lower, upper
     )
 
 

@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from wholebody.arrays import Array
+from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
@@ -54,8 +56,11 @@ def default_constraints(
     *,
     ranges: bool,
     balance: bool | None,
-) -> list[Constraint]:
+) -> tuple[list[Constraint], str]:
     """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
+
+    A person who stands at the start on a line, such as the tips of two toes, keeps no balance that is measured by an
+    area. The default is left out there; `balance=True` asks for it, and its error is raised.
 
     Args:
         scene: with the figure; only one with ranges of motion, a person, has defaults.
@@ -65,6 +70,12 @@ def default_constraints(
         goals: resolved goals.
         ranges: whether ranges of motion and reach cones are kept.
         balance: whether to keep balance; None if the person stands.
+
+    Returns:
+        The constraints, and which default is left out and why, in words; "" where none is.
+
+    Raises:
+        InputError: balance is asked for, and the feet do not stand on an area.
     """
     figure = scene.figure
     known = {type(term) for term in stated}
@@ -74,10 +85,16 @@ def default_constraints(
     if ranges and figure.ranges and figure.cones and ReachCones not in known:
         found.append(ReachCones())
     asked = stands(scene, start, stated, bounds, goals) if balance is None else balance
-    if asked and not known & {Balance, Stand}:
+    if not asked or known & {Balance, Stand}:
+        return found, ""
+    try:
         corners = convex_polygon(standing_points(scene, start, FEET)[:, :2])
-        found.append(Balance(margin=STEADY * least_width(corners)))
-    return found
+        inputs.check_mass(scene, "Balance")
+    except InputError as error:
+        if balance:
+            raise
+        return found, f"the default Balance is left out: {str(error).removeprefix('Balance: ').partition(';')[0]}"
+    return [*found, Balance(margin=STEADY * least_width(corners))], ""
 
 
 def stands(

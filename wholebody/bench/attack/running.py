@@ -92,9 +92,15 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 
 WRITERS = {
-    "argument": arguments.written, "file": files.written, "solve": solves.written, "stream": streams.written,
-    "sweep": sweeps.written, "own term": own_terms.written, "pairs": worlds.written_pairs, "sleeper": worlds.written_sleeper,
-}  # fmt: skip
+    "argument": arguments.written,
+    "file": files.written,
+    "solve": solves.written,
+    "stream": streams.written,
+    "sweep": sweeps.written,
+    "own term": own_terms.written,
+    "pairs": worlds.written_pairs,
+    "sleeper": worlds.written_sleeper,
+}
 
 
 def write(case: Case) -> Written:

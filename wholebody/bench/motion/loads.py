@@ -13,13 +13,12 @@ from wholebody.figures import load
 from wholebody.motion.avoidance import avoid
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.load_change import PLACE, LoadChange, load_change
 from wholebody.motion.measures import deviation, foot_sliding
 from wholebody.motion.ready_equipment import dressed
-from wholebody.motion.soles import standing_feet, usual_feet
-from wholebody.motion.stance import StanceFeet
+from wholebody.motion.soles import usual_feet
 from wholebody.motion.strength import Strength
+from wholebody.motion.torques import torques
 
 WAYS = ("before", "avoided", "avoided with dynamics")
 
@@ -79,15 +78,14 @@ def rows(clips: Mapping[str, Path | None], equipment: Sequence[str], longest: fl
         clip = clip[: 1 + round(longest / clip.dt)]
         for worn in equipment:
             scene = dressed(figure, worn)
-            terms = frame_terms(scene, clip.q, clip.dt, [StanceFeet()])
-            stands = standing_feet(clip, usual_feet(scene.figure, ()))
-            old = Clip(scene.figure, clip.q, clip.dt)
+            feet = usual_feet(scene.figure, ())
+            old = torques(Clip(scene.figure, clip.q, clip.dt), feet=feet, strength=strength)
             for way, dynamics in zip(WAYS[1:], (False, True), strict=True):
                 began = time.process_time()
                 freed = avoid(clip, scene, dynamics=dynamics)
                 spent = time.process_time() - began
                 report = freed.report
-                change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, stands, strength, terms)
+                change = load_change(old, Clip(scene.figure, freed.clip.q, clip.dt), None, strength, feet)
                 if not dynamics:
                     same = LoadChange(change.before, change.before, change.times)
                     yield _row(name, worn, WAYS[0], clip, clip, same, report.before, False, 0.0)

@@ -44,6 +44,7 @@ def add_to(commands: Commands) -> None:
     )
     add_equipment(parser)
     parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
+    parser.add_argument("--keep-ends", action="store_true", help="keep the first and the last posture where free")
     parser.add_argument(
         "--dynamics",
         action="store_true",
@@ -87,6 +88,7 @@ def run(arguments: argparse.Namespace) -> int:
             scene,
             method=method,
             hold_feet=not arguments.no_feet,
+            keep_ends=arguments.keep_ends,
             progress=lambda told: _ignored(tell(told.share, told.note)),
         )
     _tell(Console(), avoided, avoided.clip.write(out))
@@ -133,6 +135,8 @@ def _tell(console: Console, avoided: Avoided, written: Path) -> None:
     made.add_row("frames in collision", str(report.before.colliding), str(report.after.colliding))
     made.add_row("deepest in a frame", f"{1e3 * report.before.deepest:.3g} mm", f"{1e3 * report.after.deepest:.3g} mm")
     made.add_row("dips between frames", str(report.before.dips), str(report.after.dips))
+    made.add_row("jerk, parts of the original's", "1", f"{report.jerk:.3g}")
+    made.add_row("speed, parts of the original's", "1", f"{report.speed:.3g}")
     if report.loads is not None:
         was, now = report.loads.before, report.loads.after
         made.add_row("largest torque", f"{was.largest_share:.0%} of strength", f"{now.largest_share:.0%} of strength")
@@ -153,6 +157,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from rich.console import Console
 
     from wholebody.motion.batch import BatchProgress, avoid_many
+    from wholebody.motion.motion_bounds import MotionBounds
 
     console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]
@@ -166,7 +171,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
 
             rows = avoid_many(
                 arguments.files, folder, figure=figure_of(arguments), equipment=worn,
-                methods=ways,
+                methods=ways, constraints=[MotionBounds(keep_ends=True)] if arguments.keep_ends else (),
                 hold_feet=not arguments.no_feet, jobs=jobs_of(arguments), cluster=arguments.cluster, progress=said,
             )  # fmt: skip
     except KeyboardInterrupt:

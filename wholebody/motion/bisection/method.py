@@ -19,7 +19,7 @@ from wholebody.motion.bisection.prediction import ANKLES, ELBOWS, Predictor
 from wholebody.motion.bisection.recursion import SHORT, Recursion, Stays, changed_frames, hold_between
 from wholebody.motion.clip import Clip
 from wholebody.motion.following import Follower
-from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
+from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms, said
 from wholebody.motion.repair import Repairer
 from wholebody.scene import Scene
 from wholebody.tasks import Freeze
@@ -153,9 +153,9 @@ class Bisection:
             stuck = [frame for frame in sorted(recursion.stuck) if not predictor.good(frame, q[frame])]
             bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
             missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
-        said = _message(recursion, stuck, bad, missed, watch)
+        message = said(terms, _message(recursion, stuck, bad, missed, watch))
         predictions, programs = predictions + recursion.predictions, programs + recursion.programs
-        return MethodResult(q, predictions, programs + follower.programs + repairer.programs, said)
+        return MethodResult(q, predictions, programs + follower.programs + repairer.programs, message)
 
     def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
         """What is frozen, and what else where a frame cannot be freed so."""
@@ -178,17 +178,17 @@ def _with_frozen(terms: FrameTerms, frozen: tuple[str, ...]) -> FrameTerms:
 
 def _message(recursion: Recursion, stuck: list[int], bad: list[int], missed: list[int], watch: Watch) -> str:
     """What did not succeed, in one sentence; empty where all did."""
-    said = []
+    parts = []
     if stuck:
         others = f" and {len(stuck) - 1} others" if len(stuck) > 1 else ""
-        said.append(f"frame {stuck[0]}{others} could not be freed ({recursion.stuck[stuck[0]]})")
+        parts.append(f"frame {stuck[0]}{others} could not be freed ({recursion.stuck[stuck[0]]})")
     if bad:
-        said.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
+        parts.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
     if missed:
-        said.append(f"what is held does not hold in {_frames(missed)}")
+        parts.append(f"what is held does not hold in {_frames(missed)}")
     if watch.ended:
-        said.append("it was ended before it was done")
-    return "; ".join(said)
+        parts.append("it was ended before it was done")
+    return "; ".join(parts)
 
 
 def _frames(frames: list[int]) -> str:

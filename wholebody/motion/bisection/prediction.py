@@ -150,6 +150,7 @@ class Predictor:
             measures=self._measures,
             clearance=self._clearance,
         )
+        self.terms.leave_out(frame, problem.left_out)
         problem.clearances[self._together(frame)] = 0.0
         if effort_from is not None:
             problem.measures = tuple(measure.resolve(self.scene, effort_from) for measure in self._measures)

@@ -18,10 +18,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.arrays import Array, Indices, Mask
+from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
-from wholebody.motion.load_change import on_filtered, soles_of, standing_frames
+from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.torques import CUTOFF, smoothed
 from wholebody.motion.trajectory.chart import Chart
@@ -39,6 +40,20 @@ TOLERATED = 5e-4
 
 NEAR = 0.05
 """Metres: a load that is farther from its bound has no row; what passes unseen has one in the next step."""
+
+
+class Defects(NamedTuple):
+    """By how much loads that `wb.torques` measures are more than those of the rows; see `ClipLoads.corrected`.
+
+    Attributes:
+        torque: (n, nv) N m.
+        place: (n, 2) of the zero moment point, metres.
+        pressed: (n,) whether the measurement says where the zero moment point is; see `LIGHT`.
+    """
+
+    torque: Array
+    place: Array
+    pressed: Mask
 
 
 class LoadBounds(NamedTuple):
@@ -68,7 +83,7 @@ class ClipLoads:
 
     def __init__(
         self, clip: Clip, dynamics: InverseDynamics, stands: Sequence[Stand], bounds: LoadBounds,
-        changed: Array | None = None,
+        changed: Array | None = None, defects: Defects | None = None,
     ) -> None:  # fmt: skip
         """Look at a clip.
 
@@ -78,7 +93,9 @@ class ClipLoads:
             stands: where each frame stands.
             bounds: of the loads.
             changed: (n, nq) postures made of them, whose loads are looked at; None for the original ones.
+            defects: of the loads; None for none.
         """
+        self._defects, self._changed = defects, changed
         self.figure, self.dt, self.bounds, self._original = clip.figure, clip.dt, bounds, clip.q
         self.base = on_filtered(clip.figure, clip.q, clip.q if changed is None else changed, clip.dt)
         self.dynamics, self.stands = dynamics, stands
@@ -118,18 +135,29 @@ class ClipLoads:
 
     def gaps(self, frame: int, loads: Loads) -> tuple[Array, Array]:
         """Gaps of torques to their bounds (2 nv,), and of the zero moment point to its (e,); metres, see `LENGTH`."""
-        bounds, stand = self.bounds, self.stands[frame]
+        bounds, stand, defects = self.bounds, self.stands[frame], self._defects
+        needed = loads.torque if defects is None else loads.torque + defects.torque[frame]
         with np.errstate(invalid="ignore"):
-            high = LENGTH * (bounds.upper - loads.torque) / bounds.upper
-            low = LENGTH * (loads.torque - bounds.lower) / -bounds.lower
+            high = LENGTH * (bounds.upper - needed) / bounds.upper
+            low = LENGTH * (needed - bounds.lower) / -bounds.lower
         torque = np.concatenate([high, low])
         torque[np.isnan(torque)] = np.inf
-        leaning = self.leaning(stand, loads)
-        return torque, leaning + bounds.outside[frame] if len(leaning) else leaning
+        leaning = self.leaning(stand, loads, None if defects is None else bool(defects.pressed[frame]))
+        if not len(leaning):
+            return torque, leaning
+        moved = 0.0 if defects is None else stand.normals @ defects.place[frame]
+        return torque, leaning + moved + bounds.outside[frame]
 
-    def leaning(self, stand: Stand, loads: Loads) -> Array:
-        """(e,) distances of the zero moment point from the edges of the support; none where it says little."""
-        if not len(stand.normals) or loads.wrench[2] < LIGHT * self.dynamics.weight:
+    def leaning(self, stand: Stand, loads: Loads, pressed: bool | None = None) -> Array:
+        """(e,) distances of the zero moment point from the edges of the support; none where it says little.
+
+        Args:
+            stand: where the frame stands.
+            loads: of the frame.
+            pressed: whether it says much; None to see that from the loads.
+        """
+        pressed = loads.wrench[2] >= LIGHT * self.dynamics.weight if pressed is None else pressed
+        if not len(stand.normals) or not pressed:
             return np.zeros(0)
         return stand.margins(zero_moment_point(loads.wrench, stand.height))
 
@@ -141,19 +169,49 @@ class ClipLoads:
             times: (m,) these times, seconds; None for those of the frames.
         """
         if times is None:
-            return ClipLoads(Clip(self.figure, self._original, self.dt), self.dynamics, self.stands, self.bounds, q)
+            clip = Clip(self.figure, self._original, self.dt)
+            return ClipLoads(clip, self.dynamics, self.stands, self.bounds, q, self._defects)
         clip = Clip(self.figure, between(self.figure.model, self._original, times / self.dt), self.dt)
         feet = np.array([len(np.unique(stand.owner)) for stand in self.stands])
         frames = standing_frames(times / self.dt, feet).tolist()
         bounds = with_values(self.bounds, outside=tuple(self.bounds.outside[frame] for frame in frames))
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
+    def corrected(self, q: Array) -> ClipLoads:
+        """The same with rows whose loads at postures (n, nq) are those that `wb.torques` measures.
+
+        Rows see a change of the recording as it is, at three frames, and the feet where they stood. The measurement
+        filters the sum, and looks at which feet stand then. The difference of both is added to the rows; it is nearly
+        the same for postures nearby.
+        """
+        own, clip = self.of(q), Clip(self.figure, q, self.dt)
+        steady, marks = smoothed(clip, CUTOFF).q, standing_feet(clip, self.dynamics.feet)
+        torque, place = np.zeros((len(q), self.figure.model.nv)), np.zeros((len(q), 2))
+        pressed: Mask = np.zeros(len(q), dtype=bool)
+        for frame in range(1, len(q) - 1):
+            here = self.dynamics.stand(steady[frame], [bool(mark[frame]) for mark in marks.values()])
+            told, seen = (
+                self.dynamics.loads(postures[frame], *self.motion(*postures[frame - 1 : frame + 2]), stand)
+                for postures, stand in ((own.base, self.stands[frame]), (steady, here))
+            )
+            torque[frame] = seen.torque - told.torque
+            pressed[frame] = seen.wrench[2] >= LIGHT * self.dynamics.weight and told.wrench[2] > 0.0
+            if pressed[frame] and len(self.stands[frame].normals):
+                height = self.stands[frame].height
+                place[frame] = zero_moment_point(seen.wrench, height) - zero_moment_point(told.wrench, height)
+        clip = Clip(self.figure, self._original, self.dt)
+        return ClipLoads(clip, self.dynamics, self.stands, self.bounds, self._changed, Defects(torque, place, pressed))
+
+    def worst(self) -> Array:
+        """(n,) by how much loads are beyond their bounds, metres, see `LENGTH`; 0 where they are not."""
+        rows, found = WindowLoads(self, 0, len(self.base)), np.zeros(len(self.base))
+        for frame in rows.frames:
+            found[frame] = -min(part.min(initial=0.0) for part in rows.gaps(frame))
+        return found
+
     def beyond(self) -> Mask:
         """(n,) frames whose loads are beyond their bounds by more than `TOLERATED`."""
-        rows, found = WindowLoads(self, 0, len(self.base)), np.zeros(len(self.base), dtype=bool)
-        for frame in rows.frames:
-            found[frame] = min(part.min(initial=0.0) for part in rows.gaps(frame)) < -TOLERATED
-        return found
+        return self.worst() > TOLERATED
 
     def timed(self, b: Array) -> TimedRows:
         """Rows of the loads of these postures, when they are passed at rates whose squares are b (n,) or about that.
@@ -282,3 +340,53 @@ class WindowLoads:
         back = [np.asarray(pin.dDifference(model, here, before, arg)) for arg in (pin.ARG0, pin.ARG1)]
         forward, backward = speed / (2.0 * dt) + push / dt**2, -speed / (2.0 * dt) + push / dt**2
         return [backward @ back[1], at + forward @ ahead[0] + backward @ back[0], forward @ ahead[1]]
+
+
+def on_filtered(figure: Figure, original: Array, changed: Array, dt: float) -> Array:
+    """(n, nq) postures whose loads are those of changed postures of a recording.
+
+    Differences of a recording amplify its noise, so it is filtered. Filtering what was changed would hide how fast it
+    changes; so the change is taken as it is, on top of the filtered recording.
+
+    Args:
+        figure: of the postures.
+        original: (n, nq) of the recording.
+        changed: (n, nq) made of them.
+        dt: seconds from frame to frame.
+    """
+    model, steady = figure.model, smoothed(Clip(figure, original, dt), CUTOFF).q
+    each = zip(steady, original, changed, strict=True)
+    return np.array([pin.integrate(model, base, pin.difference(model, was, now)) for base, was, now in each])
+
+
+def standing_frames(places: Array, feet: Array) -> Indices:
+    """(m,) frames of a clip whose standing feet are those at places between its frames.
+
+    A foot stands from the first frame in which it stands to the last one. So it stands between two frames if it stands
+    in both: a foot that leaves the ground after a frame bears nothing a quarter of a frame later. So of the two frames
+    it is the one in which fewer feet stand, or else the nearer one.
+
+    Args:
+        places: (m,) in frames.
+        feet: (n,) how many feet stand in each frame.
+    """
+    near, below, above = (np.clip(to(places).astype(int), 0, len(feet) - 1) for to in (np.rint, np.floor, np.ceil))
+    fewer = np.where(feet[below] < feet[above], below, above)
+    found: Indices = np.where(feet[below] == feet[above], near, fewer)
+    return found
+
+
+def soles_of(
+    dynamics: InverseDynamics, q: Array, stands: Mapping[str, Mask], terms: FrameTerms
+) -> tuple[list[Stand], list[Stand]]:
+    """Where each of postures (n, nq) stands, and where it stands while its feet are held; often the same objects.
+
+    Args:
+        dynamics: with the feet that stand.
+        q: the postures.
+        stands: foot -> (n,) frames in which it stands.
+        terms: what is held.
+    """
+    own = [dynamics.stand(posture, [bool(marks[k]) for marks in stands.values()]) for k, posture in enumerate(q)]
+    joints = dynamics.soles.joints
+    return own, [stand.shifted([terms.shift(k, joint) for joint in joints]) for k, stand in enumerate(own)]

@@ -15,7 +15,7 @@ from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults
-from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms
+from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms, said
 from wholebody.motion.soles import standing_feet, usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
@@ -27,6 +27,11 @@ from wholebody.scene import Scene
 from wholebody.workspace import Workspace
 
 RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
+CORRECTIONS = 6  # of the loads of rows; more = fewer loads beyond their bounds, longer where they cannot keep to them
+CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
+# rows, as filters change less of it
+WORTH = 0.9  # of what loads are beyond their bounds: a correction that leaves more gets no farther
+MEASURED = 1.5e-3  # m: as far a load may be beyond its bound, see `loads.LENGTH`; `avoid` allows 2e-3
 LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
 
@@ -100,7 +105,13 @@ class Trajectory:
             q, missed = self._freed(run, terms, workspace, clip.q, watch)
             new = None if watch.ended else self._timing(q, terms, workspace.state, solve, loads)
             if new is None:
-                return MethodResult(q, run.posture_solves, run.programs, _said(watch, missed))
+
+                def again_with(loads: ClipLoads, time: float) -> ClipRun:
+                    smoother = settings._replace(time=time)
+                    return ClipRun(smoother, terms, workspace, solve, clip.q, self.stretch, loads)
+
+                q, used = self._measured(again_with, terms, workspace, clip.q, q, loads, watch)
+                return MethodResult(q, run.posture_solves, run.programs + used, _said(watch, terms, missed))
             # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
             slower = terms.at(new.times)
             passed = between(scene.model, q, new.times / clip.dt)
@@ -108,10 +119,65 @@ class Trajectory:
             again = ClipRun(settings, slower, workspace, solve, passed, 1.0, loads)
             beyond = None if loads is None else loads.beyond()
             q, left = self._freed(again, slower, workspace, passed, watch, beyond)
+
+            def slower_with(loads: ClipLoads, time: float) -> ClipRun:
+                smoother = settings._replace(time=time)
+                return ClipRun(smoother, slower, workspace, solve, passed, 1.0, loads)
+
+            q, used = self._measured(slower_with, slower, workspace, passed, q, loads, watch)
         return MethodResult(
-            q, run.posture_solves + again.posture_solves, run.programs + again.programs, _said(watch, [*missed, *left]),
-            times=new.times, stretch=new.largest,
+            q, run.posture_solves + again.posture_solves, run.programs + again.programs + used,
+            _said(watch, terms, [*missed, *left, slower.left_out]), times=new.times, stretch=new.largest,
         )  # fmt: skip
+
+    def _measured(
+        self, run_with: Callable[[ClipLoads, float], ClipRun], terms: FrameTerms, workspace: Workspace,
+        reference: Array, q: Array, loads: ClipLoads | None, watch: Watch,
+    ) -> tuple[Array, int]:  # fmt: skip
+        """Postures whose loads keep to their bounds as `wb.torques` measures them, as far as a few corrections get.
+
+        Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
+        what is beyond its bounds are computed again.
+
+        Args:
+            run_with: makes a run with loads and a smoothness, seconds.
+            terms: of the reference.
+            workspace: of this run alone.
+            reference: (n, nq) postures that deviations are from.
+            q: (n, nq) free postures.
+            loads: of the reference; None where they are not looked at.
+            watch: is told of every window.
+
+        Returns:
+            (n, nq) the best postures that were found, and how many quadratic programs were solved.
+        """
+        if loads is None:
+            return q, 0
+        depths, _, gaps = faults(workspace, terms, reference, self.clearance)
+        corrected = loads.corrected(q)
+        worst, programs, times = corrected.of(q).worst(), 0, list(CORRECTING)
+        margin = max(3, round(self.margin / terms.dt))
+        for _ in range(CORRECTIONS):
+            beyond = worst > MEASURED
+            if not beyond.any() or not times or watch.ended:
+                break
+            run = run_with(corrected, times[0])
+            changed: Mask = beyond | (q != reference).any(axis=1)
+            other = np.array(q)
+            for window in windows(changed, margin):
+                if beyond[window.first : window.end].any():
+                    told = self._teller(watch, 1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
+                    freed = run.window(window, depths, gaps, told, q[window.first : window.end])
+                    other[window.first : window.end] = freed.q
+            programs += run.programs
+            _, wrong, dipping = faults(workspace, terms, other, self.clearance)
+            again = loads.corrected(other)
+            now = again.of(other).worst()
+            if wrong.any() or dipping or now.max() > WORTH * worst.max():
+                times.pop(0)
+            else:
+                q, corrected, worst = other, again, now
+        return q, programs
 
     def _freed(
         self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch,
@@ -197,5 +263,5 @@ class Trajectory:
         return lambda part: watch.tell(LOOKED + (1.0 - LOOKED) * (begun + share * part), note)
 
 
-def _said(watch: Watch, missed: list[str]) -> str:
-    return "the caller ended it" if watch.ended else "; ".join(missed)
+def _said(watch: Watch, terms: FrameTerms, missed: list[str]) -> str:
+    return "the caller ended it" if watch.ended else said(terms, *missed)

@@ -8,6 +8,7 @@ from itertools import chain
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array, Mask
 from wholebody.motion.clip import Clip
@@ -343,8 +344,9 @@ class ClipRun:
         lower, upper = chart.bounds(self._terms.scene.figure.limits)
         steps, slowest, fastest = chart.steps, np.zeros((count - 1, nv)), np.zeros((count - 1, nv))
         for frame in range(count):
-            bounds = self._terms.bounds(window.first + frame, self._workspace.state)
-            lower[frame], upper[frame] = np.maximum(lower[frame], bounds[0]), np.minimum(upper[frame], bounds[1])
+            low, high = self._terms.bounds(window.first + frame, self._workspace.state)[:2]
+            away = pin.difference(chart.model, self._terms.q[window.first + frame], chart.original[frame])
+            lower[frame], upper[frame] = np.maximum(lower[frame], low - away), np.minimum(upper[frame], high - away)
             if frame < count - 1:
                 limits_here = self._terms.step_bounds(window.first + frame, self._workspace.state)
                 slowest[frame], fastest[frame] = (self._rate * bound for bound in limits_here)
