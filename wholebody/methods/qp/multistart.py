@@ -13,7 +13,7 @@ from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.curved_reach import CurvedReach
+from wholebody.methods.qp.curved_reach import ENDLESS, CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
@@ -22,6 +22,7 @@ from wholebody.methods.starts import Minima, hooked_hands, named_postures, resta
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
+from wholebody.tasks.approach import approached, has_face
 from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
@@ -36,6 +37,7 @@ REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-2  # share of what is left of the goals by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
+IN_FRONT = 0.02  # m: how far in front of the faces that they are to meet surfaces are before contact
 FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
 AGREEING_FEW = 8  # the same for them
 REACH_TRIALS_FEW = 16  # most descents for them
@@ -84,6 +86,7 @@ class Search:
         self._through: list[Array] = []  # where one of them from another start reached the goals
         self._out_of_reach: bool | None = None
         self._best: LocalSolution | None = None
+        self._faces = any(has_face(term) for term in (*problem.goals, *problem.constraints))
 
     @property
     def best(self) -> LocalSolution:
@@ -108,7 +111,11 @@ class Search:
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
-        if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
+        if least is None:
+            return
+        if self._faces and self._accept(self._feasibility_first(self._before_contact(start)), "from before contact"):
+            return
+        if self._accept(self._feasibility_first(start), "by feasibility first"):
             return
         hooked = [*hooked_hands(self.problem, self.lineariser.state, start)]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
@@ -130,6 +137,17 @@ class Search:
         for local, how in self._relaxed_probes(chain([] if near else [start], self._through, others)):
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
+
+    def _before_contact(self, start: Array) -> Array:
+        """Where surfaces are in front of the faces that they are to meet, (nq,), from a start (nq,) through things."""
+        lineariser = self.lineariser.relaxed(ENDLESS)
+        goals, constraints = (
+            [approached(term, IN_FRONT) for term in terms] for terms in (self.problem.goals, self.problem.constraints)
+        )
+        lineariser.take(goals, lineariser.clearances, constraints)
+        local = self._feasibility(lineariser, self._at_most(PROBE_PROGRAMS), "before contact").once(start)
+        self.spent += local.iterations
+        return local.q
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""
@@ -157,7 +175,7 @@ class Search:
             complete = self._minima.complete or self._relaxed_minima.complete
             if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
-            relaxed = self._probe(q, RELAXATION_DEPTH)
+            relaxed = self._probe(self._before_contact(q) if self._faces else q, RELAXATION_DEPTH)
             nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
             self._without_gain = 0 if nearer else self._without_gain + 1
             if relaxed.violation.worst > REACHED * self.settings.tolerance:
