@@ -38,6 +38,7 @@ FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away b
 HELD = 1e-2  # share of what is left of the goals by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
 IN_FRONT = 0.02  # m: how far in front of the faces that they are to meet surfaces are before contact
+BEFORE = 1e-3  # m, rad: to which that is met; what is exact there is not where surfaces meet
 FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
 AGREEING_FEW = 8  # the same for them
 REACH_TRIALS_FEW = 16  # most descents for them
@@ -113,7 +114,7 @@ class Search:
         least = least_left(self.contradictions)
         if least is None:
             return
-        if self._faces and self._accept(self._feasibility_first(self._before_contact(start)), "from before contact"):
+        if self._faces and self._accept(self._feasibility_first(self._before_contact(start).q), "from before contact"):
             return
         if self._accept(self._feasibility_first(start), "by feasibility first"):
             return
@@ -138,16 +139,22 @@ class Search:
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
-    def _before_contact(self, start: Array) -> Array:
-        """Where surfaces are in front of the faces that they are to meet, (nq,), from a start (nq,) through things."""
+    def _before_contact(self, start: Array) -> LocalSolution:
+        """Where surfaces are in front of the faces that they are to meet, from a start (nq,) and through everything.
+
+        The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
+        """
         lineariser = self.lineariser.relaxed(ENDLESS)
         goals, constraints = (
             [approached(term, IN_FRONT) for term in terms] for terms in (self.problem.goals, self.problem.constraints)
         )
         lineariser.take(goals, lineariser.clearances, constraints)
-        local = self._feasibility(lineariser, self._at_most(PROBE_PROGRAMS), "before contact").once(start)
+        local = SQP(
+            self.subproblem, lineariser, self.solver, BEFORE, self._at_most(PROBE_PROGRAMS), None,
+            self.trace, "before contact", True, False, True, self.control,
+        ).run(start)  # fmt: skip
         self.spent += local.iterations
-        return local.q
+        return local
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""
@@ -175,10 +182,10 @@ class Search:
             complete = self._minima.complete or self._relaxed_minima.complete
             if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
-            relaxed = self._probe(self._before_contact(q) if self._faces else q, RELAXATION_DEPTH)
+            relaxed = self._before_contact(q) if self._faces else self._probe(q, RELAXATION_DEPTH)
             nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
             self._without_gain = 0 if nearer else self._without_gain + 1
-            if relaxed.violation.worst > REACHED * self.settings.tolerance:
+            if not self._faces and relaxed.violation.worst > REACHED * self.settings.tolerance:
                 self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
                 continue
             probe = self._probe(relaxed.q, 0.0)
