@@ -12,8 +12,9 @@ from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.curved_reach import ENDLESS, CurvedReach
+from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP, LocalSolution
@@ -22,7 +23,6 @@ from wholebody.methods.starts import Minima, hooked_hands, named_postures, resta
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import TraceEntry
-from wholebody.tasks.approach import approached, has_face
 from wholebody.workspace import Workspace
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
@@ -37,8 +37,6 @@ REACH_TRIAL_PROGRAMS = 60  # most programs of each
 FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
 HELD = 1e-2  # share of what is left of the goals by which constraints may be missed where such a descent ends
 AGREEING = 3  # of them that have to come to rest equally near
-IN_FRONT = 0.02  # m: how far in front of the faces that they are to meet surfaces are before contact
-BEFORE = 1e-3  # m, rad: to which that is met; what is exact there is not where surfaces meet
 FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
 AGREEING_FEW = 8  # the same for them
 REACH_TRIALS_FEW = 16  # most descents for them
@@ -87,7 +85,6 @@ class Search:
         self._through: list[Array] = []  # where one of them from another start reached the goals
         self._out_of_reach: bool | None = None
         self._best: LocalSolution | None = None
-        self._faces = any(has_face(term) for term in (*problem.goals, *problem.constraints))
 
     @property
     def best(self) -> LocalSolution:
@@ -114,9 +111,7 @@ class Search:
         least = least_left(self.contradictions)
         if least is None:
             return
-        if self._faces and self._accept(self._feasibility_first(self._before_contact(start).q), "from before contact"):
-            return
-        if self._accept(self._feasibility_first(start), "by feasibility first"):
+        if self._from_before_contact() or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
         hooked = [*hooked_hands(self.problem, self.lineariser.state, start)]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
@@ -139,22 +134,17 @@ class Search:
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
-    def _before_contact(self, start: Array) -> LocalSolution:
-        """Where surfaces are in front of the faces that they are to meet, from a start (nq,) and through everything.
-
-        The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
-        """
-        lineariser = self.lineariser.relaxed(ENDLESS)
-        goals, constraints = (
-            [approached(term, IN_FRONT) for term in terms] for terms in (self.problem.goals, self.problem.constraints)
-        )
-        lineariser.take(goals, lineariser.clearances, constraints)
-        local = SQP(
-            self.subproblem, lineariser, self.solver, BEFORE, self._at_most(PROBE_PROGRAMS), None,
-            self.trace, "before contact", True, False, True, self.control,
-        ).run(start)  # fmt: skip
-        self.spent += local.iterations
-        return local
+    def _from_before_contact(self) -> bool:
+        """Whether what is asked is met from where surfaces are in front of the faces that they are to meet."""
+        for local in before_contact(
+            self.problem, self.subproblem, self.lineariser, self.solver, self.settings.seed, self.trace, self.control
+        ):
+            self.spent += local.iterations
+            if self._accept(self._feasibility_first(local.q), "from before contact"):
+                return True
+            if self.control.spent > FOR_WAYS:
+                break
+        return False
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""
@@ -182,10 +172,10 @@ class Search:
             complete = self._minima.complete or self._relaxed_minima.complete
             if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
-            relaxed = self._before_contact(q) if self._faces else self._probe(q, RELAXATION_DEPTH)
+            relaxed = self._probe(q, RELAXATION_DEPTH)
             nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
             self._without_gain = 0 if nearer else self._without_gain + 1
-            if not self._faces and relaxed.violation.worst > REACHED * self.settings.tolerance:
+            if relaxed.violation.worst > REACHED * self.settings.tolerance:
                 self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
                 continue
             probe = self._probe(relaxed.q, 0.0)
