@@ -12,7 +12,6 @@ from itertools import chain
 
 import numpy as np
 
-from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import ENDLESS
