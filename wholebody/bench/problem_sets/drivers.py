@@ -176,7 +176,7 @@ def _placed(figure: wb.Figure, q: Array) -> list[pin.SE3]:
 SET = ProblemSet(
     "drivers",
     "drivers",
-    f"{len(PEOPLE)} women and men sit against a backrest, take bars or press a panel, and have their feet on a board or "
-    "on two pedals; what touches may slide.",
+    f"{len(PEOPLE)} women and men sit against a backrest, take bars or press a panel, and have their feet on a board "
+    "or on two pedals; what touches may slide.",
     _posed,
 )
