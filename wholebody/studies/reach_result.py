@@ -35,7 +35,7 @@ class ReachMap:
         measure: (nx, ny, nz) weighted sum of the measures where reached, 0 elsewhere.
         q: (nx, ny, nz, nq) the posture of a reached place, the nearest of a missed one, the start elsewhere.
         solves: how many solves it took.
-        from_neighbours: how many of the reached places were missed at first, and then reached from a neighbour's posture.
+        from_neighbours: how many reached places were missed at first, and then reached from a neighbour's.
     """
 
     problem: Problem = field(repr=False)
@@ -85,7 +85,8 @@ class ReachMap:
             for name, axis in zip("xyz", (self.x, self.y, self.z), strict=True)
         )
         again = f", {self.from_neighbours} reached only from a neighbour" if self.from_neighbours else ""
-        return f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves\n  {counts}{again}\n  {span}"
+        head = f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves"
+        return f"{head}\n  {counts}{again}\n  {span}"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all arrays into an npz file; returns the path.
