@@ -136,3 +136,34 @@ def test_records_are_written_as_a_table(arm: wb.Figure, tmp_path: Path) -> None:
 def test_something_else_than_a_problem_is_refused(arm: wb.Figure) -> None:
     with pytest.raises(wb.InputError, match=r"problems\[1\]"):
         wb.solve_many([problem(arm, PLACES[0]), "x"])  # type: ignore[list-item]
+
+
+def test_what_is_not_solved_from_its_own_start_is_tried_from_the_answers_of_neighbours(arm: wb.Figure) -> None:
+    places = [(0.4 - 0.06 * k, 0.1 * k - 0.2, 0.5) for k in range(8)]
+    problems, method = [problem(arm, place) for place in places], wb.DampedLeastSquares(iterations=8)
+    alone = [wb.solve(one, method).solved for one in problems]
+    assert alone == [True] * 3 + [False] * 5
+    for jobs in (1, 2):
+        records = wb.solve_many(problems, method, jobs=jobs)
+        assert [one.neighbour for one in records] == ["", "", "", "2", "2", "2", "2", "2"]
+        assert records.from_neighbours == 5
+        assert "5 solved from the answer of a neighbour" in repr(records)
+        for record, place in zip(records, places, strict=True):
+            assert record.solved
+            np.testing.assert_allclose(arm.placement(record.q, "hand").translation, place, atol=2e-5)
+
+
+def test_the_nearest_answer_is_tried_first_and_kept(arm: wb.Figure, tmp_path: Path) -> None:
+    turns = np.linspace(-0.6, 2.4, 9)
+    given = [problem(arm, (0.45 * np.cos(turn), 0.45 * np.sin(turn), 0.5)) for turn in turns]
+    method = wb.DampedLeastSquares(iterations=7)
+    first = wb.solve_many(given, method, folder=tmp_path)
+    assert [one.neighbour for one in first] == ["", "", "", "", "3", "3", "8", "8", ""]
+    assert first.solved == 1.0
+    again = wb.solve_many(given, method, folder=tmp_path)  # what was found is kept
+    assert [one.neighbour for one in again] == [one.neighbour for one in first]
+
+
+def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:
+    reached, far = wb.solve_many([problem(arm, PLACES[0]), problem(arm, (5.0, 0.0, 0.5))])
+    assert (reached.solved, far.outcome, far.neighbour) == (True, "unreachable", "")

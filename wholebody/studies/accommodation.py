@@ -52,7 +52,7 @@ class Accommodation:
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        why = self.records.first_without_answer()
+        why = self.records.from_neighbours_in_words() + self.records.first_without_answer()
         return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{why}"
 
 
@@ -97,6 +97,8 @@ def accommodation(
     progress: Callable[[SolveProgress], Any] | None = None,
 ) -> Accommodation:
     """Solve a task for people of all statures, and count who reaches, fits and sees.
+
+    Who is not solved from the task's start is tried from the answers of people of neighbouring statures, see `study`.
 
     Args:
         task: a task file, or a function, see `study`; its target and layout are None.

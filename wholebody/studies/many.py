@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, is_dataclass, replace
 from typing import Any, NamedTuple
 
 from wholebody import checks
@@ -24,6 +24,8 @@ from wholebody.version import __version__
 MOST_JOBS = 4096
 LONGEST = 1e7  # s: a greater deadline of a solve is a mistake
 RUN = 16  # problems that warm-start one from the other: longer = fewer cold starts, fewer processes busy at the end
+
+NEIGHBOURS = 4  # answers of others that are tried for one problem: more find more, and cost where there is no answer
 
 Make = Callable[[], Problem]
 
@@ -50,11 +52,13 @@ class Case:
         record: its record before it is done: name and factors.
         make: makes the problem.
         asked: fingerprint; a case with the same is not done again.
+        place: numbers of its factors; cases are neighbours as far as these are alike.
     """
 
     record: SolveRecord
     make: Make
     asked: str = ""
+    place: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,9 @@ def solve_many(
     """Solve many problems, several at a time, each in a child process.
 
     The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
-    and ends no other.
+    and ends no other. A problem that is not solved from its own start is tried from the answers of up to four solved
+    ones beside it in the order given, of figures with as many coordinates; `SolveRecord.neighbour` names the one that
+    led to its answer.
 
     Args:
         problems: the problems; a mapping gives them names, otherwise they are numbered from "0".
@@ -132,9 +138,9 @@ def solve_many(
     warm_start = checks.flag(warm_start, f"{what}: warm_start")
     store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
     cases = []
-    for name, problem in named:
+    for number, (name, problem) in enumerate(named):
         asked = "" if store is None else fingerprint(problem, running.method, warm_start)
-        cases.append(Case(SolveRecord(name), _Given(problem), asked))
+        cases.append(Case(SolveRecord(name), _Given(problem), asked, (number,)))
     return run_cases(runs_of(cases, RUN if warm_start else 1), running, store)
 
 
@@ -173,7 +179,59 @@ def run_cases(runs: Sequence[Sequence[Case]], running: Running, store: RecordSto
     for work in (waiting, alone):  # the cases of a run whose process ended are done again, one by one
         if not over and work:
             over = _run(work, order, running, keep, alone)
+    if not over and waiting:
+        _from_neighbours(order, done, running, keep)
     return Records([done.get(k, order[k].record) for k in range(len(order))])
+
+
+def _from_neighbours(
+    order: Sequence[Case], done: dict[int, SolveRecord], running: Running, keep: Callable[[int, SolveRecord], bool]
+) -> None:
+    """Try the answers of solved cases as starts of their neighbours that are not solved, until nothing new is solved.
+
+    Args:
+        order: the cases.
+        done: their records; those of cases that are solved now are put in their place.
+        running: how.
+        keep: keeps a record; whether the caller ends the run.
+    """
+    tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
+    while True:
+        work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
+        jobs = (
+            Job(k, _solve_from, (packed(order[k].make), running.method, done[j].q), running.seconds or 0.0)
+            for k, (j, _) in work.items()
+        )
+        outcomes, found = run_batch(jobs, running.jobs, running.cluster), {}
+        try:
+            for outcome in outcomes:
+                if outcome.error is None and outcome.answer is not None:
+                    found[outcome.job.name] = outcome.answer
+        finally:
+            outcomes.close()  # type: ignore[attr-defined]
+        for k, (j, distance) in work.items():
+            tried[k][j] = distance
+            if k in found and keep(k, replace(order[k].record, **found[k], neighbour=order[j].record.name)):
+                return
+        if not work:
+            return
+
+
+def _nearest(
+    k: int, order: Sequence[Case], done: Mapping[int, SolveRecord], tried: Mapping[int, int]
+) -> tuple[int, int] | None:
+    """The nearest solved case that was not tried for a case, and how far it is; None where enough were tried.
+
+    After `NEIGHBOURS` only those count that are nearer than all before: an answer spreads from neighbour to neighbour.
+    """
+    q, found = done[k].q, []
+    for j, one in done.items():
+        if one.solved and j not in tried and one.q is not None and q is not None and one.q.shape == q.shape:
+            found.append((sum(abs(a - b) for a, b in zip(order[k].place, order[j].place, strict=True)), j))
+    if not found:
+        return None
+    distance, j = min(found)
+    return (j, distance) if len(tried) < NEIGHBOURS or distance < min(tried.values()) else None
 
 
 def _run(
@@ -235,6 +293,18 @@ def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
         return replace(empty, outcome=REFUSED, message=str(error))
     except Exception as error:  # of a term or a task of the user's own
         return replace(empty, outcome=REFUSED, message=one_line(f"{type(error).__name__}: {error}"))
+
+
+def _solve_from(make: bytes, method: Method, q: Array) -> dict[str, Any] | None:
+    """Solve a problem from another's answer (nq,), in a process of its own: what its record says; None if unsolved."""
+    problem = check_problem(pickle.loads(make)(), "the task's answer")
+    record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
+    return {name: getattr(record, name) for name in _ANSWERED} if record.solved else None
+
+
+def _alone(method: Method) -> Method:
+    """The method without starts of its own, where it has such: those of the first solve led to nothing."""
+    return replace(method, restarts=0) if is_dataclass(method) and hasattr(method, "restarts") else method  # type: ignore[return-value, type-var]
 
 
 def fingerprint(*asked: Any) -> str:

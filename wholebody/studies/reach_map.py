@@ -118,7 +118,7 @@ class _Search:
         self._q: dict[int, Array] = {}
         self._tried: set[tuple[int, int]] = set()
         self._balls: dict[int, float] = {}
-        self._solves = 0
+        self._solves, self._from_neighbours = 0, 0
         self._bricks = _bricks(grid)
         self._sent = packed(asked)
         self._key = sha256(self._sent).hexdigest()
@@ -144,6 +144,7 @@ class _Search:
         return ReachMap(
             self._asked.problem, self._asked.frame, x, y, z, self._verdict.reshape(shape),
             self._left.reshape(shape), self._measure.reshape(shape), postures.reshape((*shape, model.nq)), self._solves,
+            int(self._from_neighbours),
         )  # fmt: skip
 
     def _round(self, bricks: Sequence[Brick]) -> None:
@@ -178,6 +179,7 @@ class _Search:
         self._tried.add((place, begin))
         self._solves += not one.inside
         if one.reached:
+            self._from_neighbours += self._verdict[place] == MISSED
             if self._verdict[place] != REACHED or one.measure < self._measure[place]:
                 self._verdict[place], self._left[place], self._measure[place] = REACHED, 0.0, one.measure
                 self._q[place] = one.q

@@ -34,6 +34,7 @@ class ReachMap:
         measure: (nx, ny, nz) weighted sum of the measures where reached, 0 elsewhere.
         q: (nx, ny, nz, nq) the posture of a reached place, the nearest of a missed one, the start elsewhere.
         solves: how many solves it took.
+        from_neighbours: how many reached places were missed at first, and then reached from a neighbour's.
     """
 
     problem: Problem = field(repr=False)
@@ -46,6 +47,7 @@ class ReachMap:
     measure: Array
     q: Array
     solves: int
+    from_neighbours: int = 0
 
     @property
     def inside(self) -> Mask:
@@ -81,7 +83,9 @@ class ReachMap:
             f"{name} {axis[0]:.2f} to {axis[-1]:.2f} m"
             for name, axis in zip("xyz", (self.x, self.y, self.z), strict=True)
         )
-        return f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves\n  {counts}\n  {span}"
+        again = f", {self.from_neighbours} reached only from a neighbour" if self.from_neighbours else ""
+        head = f"ReachMap of {self.frame!r}: {self.verdict.size} places, {self.solves} solves"
+        return f"{head}\n  {counts}{again}\n  {span}"
 
     def save(self, path: str | os.PathLike[str]) -> Path:
         """Write all arrays into an npz file; returns the path.

@@ -42,6 +42,7 @@ class SolveRecord:
         measure: weighted sum of the measures.
         q: (nq,) the posture; None where there is none. Numbers of a record without a posture are 0.
         factors: what the case is made of, such as {"person": "F5", "target": "shelf"}.
+        neighbour: name of the case whose answer was the start that led to the posture; "" where it was its own start.
     """
 
     name: str
@@ -57,6 +58,7 @@ class SolveRecord:
     measure: float = 0.0
     q: Array | None = None
     factors: Mapping[str, str] | None = None
+    neighbour: str = ""
 
     @property
     def solved(self) -> bool:
@@ -135,7 +137,7 @@ class Records(Sequence[SolveRecord]):
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
             f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
-            f"  goal missed most: {missed}{self.first_without_answer()}"
+            f"  goal missed most: {missed}{self.from_neighbours_in_words()}{self.first_without_answer()}"
         )  # fmt: skip
 
     def first_without_answer(self) -> str:
@@ -145,6 +147,15 @@ class Records(Sequence[SolveRecord]):
             first = next((one for one in self._records if one.outcome == outcome), None)
             lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"
         return lines
+
+    def from_neighbours_in_words(self) -> str:
+        """A line about how many are solved from the answers of neighbours; "" for none."""
+        return f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
+
+    @property
+    def from_neighbours(self) -> int:
+        """How many are solved from the answer of a neighbouring case, and were not from their own start."""
+        return sum(bool(one.neighbour) for one in self._records)
 
     def counts(self) -> dict[str, int]:
         """How many records have each outcome."""

@@ -46,6 +46,9 @@ def study(
 ) -> Records:
     """Solve one task for every person, with every target, in every layout.
 
+    A case that is not solved from the task's start is tried from the answers of its nearest solved neighbours: cases
+    whose person, target and layout are the same or beside its own in the order given. See `solve_many`.
+
     Args:
         task: a function of a figure, a target and a layout that returns a problem, or a task file. In a task file, a
             person replaces the figure's options by name, and sex, stature, mass, percentile, age and proportions all
@@ -102,13 +105,15 @@ def study(
                 file.check(*(value if k == number else None for k in range(3)))
     store = None if folder is None else RecordStore(checks.path(folder, f"{what}: folder"))
     runs = []
-    for (who, person), (where, layout) in product(_or_none(persons), _or_none(factors[2])):
+    pairs = product(enumerate(_or_none(persons)), enumerate(_or_none(factors[2])))
+    for (i, (who, person)), (j, (where, layout)) in pairs:
         cases = []
-        for aim, target in _or_none(factors[1]):
+        for k, (aim, target) in enumerate(_or_none(factors[1])):
             named = {key: name for key, name in zip(FACTORS, (who, aim, where), strict=True) if name}
             variant = Variant(make, person, target, layout)
             asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
-            cases.append(Case(SolveRecord(", ".join(named.values()), factors=named), variant, asked))
+            record = SolveRecord(", ".join(named.values()), factors=named)
+            cases.append(Case(record, variant, asked, (i, j, k)))
         runs += runs_of(cases, RUN if warm_start else 1)
     return run_cases(runs, running, store)
 

@@ -32,10 +32,16 @@ class Part(Protocol):
 
 
 class Gap(NamedTuple):
-    """The signed distance of two surfaces: one row, zero where they touch [m]."""
+    """The signed distance of two surfaces: one row, zero where they touch [m].
+
+    Attributes:
+        first, second: the surfaces.
+        face: the face of the second that the first is to lie on; None where any side will do.
+    """
 
     first: Surface
     second: Surface
+    face: Face | None = None
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -50,11 +56,18 @@ class Gap(NamedTuple):
 
 
 class Near(NamedTuple):
-    """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m]."""
+    """Two surfaces not farther apart than a distance: one row, zero within it, and what is beyond it [m].
+
+    Attributes:
+        first, second: the surfaces.
+        most: the distance [m].
+        face: as for a `Gap`.
+    """
 
     first: Surface
     second: Surface
     most: float
+    face: Face | None = None
 
     @property
     def in_radians(self) -> tuple[bool, ...]:

@@ -124,7 +124,7 @@ class Grasp(ContactTerm):
             outwards = _heading(scene, state) @ sideways
         taken = face(scene, self.thing, outwards, state, where)
         facing = Facing(place, across(np.array((0.0, 0.0, 1.0))), taken, np.array((0.0, 0.0, -1.0)))
-        return [Gap(hand, thing), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
+        return [Gap(hand, thing, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
 
     def _pinch(self, scene: Surroundings, thing: Surface, where: str) -> list[Part]:
         ends = [f"{self._side}_{finger}_distal" for finger in ("index", "thumb")]

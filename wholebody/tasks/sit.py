@@ -84,7 +84,7 @@ class Sit(ContactTerm):
         deep = _depth(scene, self.pelvis, place) + DEEP
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
         left = _rest(scene, place).T @ np.array((0.0, 1.0, 0.0))
-        parts: list[Part] = [Gap(bottom, thing), over]
+        parts: list[Part] = [Gap(bottom, thing, seat), over]
         touches = owner_pairs(bottom.owners, thing.owners)
         if self.back is None:
             parts.append(Level(place, left, seat))
@@ -95,7 +95,7 @@ class Sit(ContactTerm):
             rest = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
             to_left = _level(np.cross(UP, rest.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
-            parts += [Gap(upper, at_back), Near(lower, at_back, AT_BACK)]
+            parts += [Gap(upper, at_back, rest), Near(lower, at_back, AT_BACK, rest)]
             parts += [Facing(place, across(left), rest, rest.at(state)[1] @ to_left)]
             touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
         return filled(self, parts=tuple(parts), touches=touches)

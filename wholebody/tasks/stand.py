@@ -83,7 +83,7 @@ class Stand(Constraint):
                 raise InputError(f"{where}: {foot!r} has no pieces to stand on; name segments with geometry as feet")
             up = rest.frame(place.frame).rotation.T @ UP
             parts += [
-                Gap(sole, thing),
+                Gap(sole, thing, ground),
                 Facing(place, across(up), ground, UP),
                 Over(place, ground, -ground.half, ground.half),
             ]

@@ -128,16 +128,14 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     """The nearest points of two surfaces, by coal; of several pairs of pieces, those of the nearest pair."""
     ours = [first.placed(k, state) for k in range(len(first.shapes))]
     theirs = [second.placed(k, state) for k in range(len(second.shapes))]
-    least = [
-        (float(np.linalg.norm(a.translation - b.translation)) - first.reach[i] - second.reach[j], i, j)
-        for i, a in enumerate(ours)
-        for j, b in enumerate(theirs)
-    ]
+    apart = _origins(ours)[:, None] - _origins(theirs)
+    least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
     request = coal.DistanceRequest()
     request.gjk_tolerance = request.epa_tolerance = ACCURACY
     best: tuple[float, Any, int, int] | None = None
-    for bound, i, j in sorted(least):
-        if best is not None and bound > best[0]:
+    for number in np.argsort(least, axis=None, kind="stable").tolist():
+        i, j = divmod(number, len(theirs))
+        if best is not None and least[i, j] > best[0]:
             break
         result = coal.DistanceResult()
         a, b = ours[i], theirs[j]
@@ -158,6 +156,11 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
         normal = _between(ours[i].translation, theirs[j].translation)
     middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
     return Nearest(distance, normal, middle, second.joints[j], first.joints[i])
+
+
+def _origins(placements: list[pin.SE3]) -> Array:
+    """Translations (k, 3) of placements."""
+    return np.array([place.translation for place in placements])
 
 
 def _between(first: Array, second: Array) -> Array:

@@ -123,7 +123,8 @@ class Lean(ContactTerm):
         toward = state.frame(place.frame).rotation @ self.resolved_side
         leaned_on = face(scene, self.on, -toward, state, where)
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
-        return filled(self, parts=(Gap(first, second), facing), touches=owner_pairs(first.owners, second.owners))
+        parts = (Gap(first, second, leaned_on), facing)
+        return filled(self, parts=parts, touches=owner_pairs(first.owners, second.owners))
 
 
 def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:

@@ -12,7 +12,7 @@ from wholebody.bench.compare.run import Progress, run
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.summary import GOOD, Summary, summaries
 from wholebody.bench.problem_sets import robots
-from wholebody.bench.problem_sets.registry import NAMED, TUNED_ON, problem_set
+from wholebody.bench.problem_sets.registry import TUNED_ON, problem_set
 from wholebody.bench.report import render
 from wholebody.bench.statistics import against
 from wholebody.errors import InputError
@@ -33,7 +33,7 @@ class Beside(NamedTuple):
 
 def settings(adapters: tuple[Adapter, ...], cases: int, seed: int, minutes: float) -> tuple[Settings, str]:
     """What is run: every held-out set and its counterpart; and why a set is left out, empty where none is."""
-    left_out, names = "", list(NAMED)
+    left_out, names = "", list(TUNED_ON)
     try:
         robots.folder()
     except InputError as error:

@@ -9,6 +9,7 @@ from wholebody.bench.problem_sets import (
     balance,
     closed_loop,
     drag,
+    drivers,
     held_out,
     passage,
     reaching,
@@ -27,10 +28,10 @@ SETS: Mapping[str, ProblemSet] = MappingProxyType({each.name: each for each in _
 """By name, as they are listed in reports."""
 
 NAMED: Mapping[str, ProblemSet] = MappingProxyType(
-    {each.name: each for each in (held_out.UNIFORM, held_out.PEOPLE_SET, held_out.CLUTTER, robots.SET)}
+    {each.name: each for each in (held_out.UNIFORM, held_out.PEOPLE_SET, held_out.CLUTTER, robots.SET, drivers.SET)}
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
-that are not a part of this package."""
+that are not a part of this package; and drivers, whose contacts most other tools and the published files lack."""
 
 TUNED_ON: Mapping[str, str] = MappingProxyType(
     {
@@ -40,7 +41,7 @@ TUNED_ON: Mapping[str, str] = MappingProxyType(
         robots.SET.name: robot_arm.SET.name,
     }
 )
-"""Sets of `NAMED` -> the set of the same question that constants were tuned on."""
+"""Those distributions -> the set of the same question that constants were tuned on."""
 
 CASES = 200
 """Problems of a set, if nothing else is asked for."""

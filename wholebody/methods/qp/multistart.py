@@ -12,7 +12,9 @@ from wholebody.arrays import Array
 from wholebody.linearisation import Lineariser
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
+from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
+from wholebody.methods.qp.comparison import better, held
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -24,8 +26,6 @@ from wholebody.records import with_values
 from wholebody.solution import TraceEntry
 from wholebody.workspace import Workspace
 
-ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
-JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well
 PROBE_PROGRAMS = 40  # most programs of a probe; more = surer on curved ways, fewer starts within the budget
 RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; two limbs that cross need as much
 NO_NEARER = 20  # probes in a row that came no nearer: the goals are out of reach
@@ -108,7 +108,9 @@ class Search:
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
         least = least_left(self.contradictions)
-        if least is None or self._accept(self._feasibility_first(start), "by feasibility first"):
+        if least is None:
+            return
+        if self._from_before_contact() or self._accept(self._feasibility_first(start), "by feasibility first"):
             return
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
@@ -131,6 +133,18 @@ class Search:
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
+    def _from_before_contact(self) -> bool:
+        """Whether what is asked is met from where surfaces are in front of the faces that they are to meet."""
+        for local in before_contact(
+            self.problem, self.subproblem, self.lineariser, self.solver, self.settings.seed, self.trace, self.control
+        ):
+            self.spent += local.iterations
+            if self._accept(self._feasibility_first(local.q), "from before contact"):
+                return True
+            if self.control.spent > FOR_WAYS:
+                break
+        return False
+
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""
         local = self._feasibility(self.lineariser, self.settings.iterations, "feasibility").run(start)
@@ -142,7 +156,7 @@ class Search:
 
     def _leave_cancelling(self) -> None:
         """Where contacts hold the best posture inside of something and cancel, come near from where it is left."""
-        if _held(self.best, self.settings.tolerance):
+        if held(self.best, self.settings.tolerance):
             return
         apart = posture_apart(self.problem, self.lineariser.workspace, self.best.q)
         for q in self.lineariser.defined([] if apart is None else [apart]):
@@ -165,7 +179,7 @@ class Search:
                 self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
                 continue
             probe = self._probe(relaxed.q, 0.0)
-            if not _held(probe, self.settings.tolerance) and not _held(self.best, self.settings.tolerance):
+            if not held(probe, self.settings.tolerance) and not held(self.best, self.settings.tolerance):
                 probe = self._probe(q, 0.0)  # nothing leads out from there; to be outside comes before the goals
             reached = probe.violation.worst <= self.settings.tolerance
             if not reached:
@@ -199,7 +213,7 @@ class Search:
             return
         if self._out_of_reach:
             self._come_near()
-        if not _held(self.best, tolerance):
+        if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
             self._leave_from_named_postures()
         if not self._out_of_reach and self.best.violation.worst > tolerance:
@@ -209,12 +223,12 @@ class Search:
         best = self.best
         if best.violation.left > tolerance and self.problem.measures and self.settings.measures:
             local = self._stay(best)
-            if _held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
+            if held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
 
     def _leave_from_named_postures(self) -> None:
         """Where nothing leads out of what the best posture is inside of, begin at the figure's other postures."""
-        if _held(self.best, self.settings.tolerance) or self.contradictions:
+        if held(self.best, self.settings.tolerance) or self.contradictions:
             return
         for q in self.lineariser.defined(named_postures(self.problem, self.lineariser.state, self.problem.start)):
             if not self.control.over:
@@ -225,7 +239,7 @@ class Search:
     def _proven(self) -> bool:
         """Whether the best posture is known to be as near to the goals as any."""
         near = self.best.violation.left <= NEAREST * self._least
-        return near and bool(self._least) and _held(self.best, self.settings.tolerance)
+        return near and bool(self._least) and held(self.best, self.settings.tolerance)
 
     def _known_out_of_reach(self, q: Array) -> bool:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
@@ -286,7 +300,7 @@ class Search:
         self._approach(self.best.q)
         for local in self._nearest[:PUSHED_OUT]:
             nearer = (1.0 - STATIONARY) * local.violation.goal < self.best.violation.goal
-            if not self.control.over and (nearer or not _held(self.best, self.settings.tolerance)):
+            if not self.control.over and (nearer or not held(self.best, self.settings.tolerance)):
                 self._approach(self._pushed_out(local.q))
 
     def _approach(self, begin: Array) -> None:
@@ -294,7 +308,7 @@ class Search:
         tolerance = self.settings.tolerance
         local = self._curved().among_things(begin, tolerance, self._at_most(COMING_NEAR))
         self.spent += local.iterations
-        if not _held(local, tolerance) and local.violation.total < self.best.violation.total:
+        if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
         self._accept(local, self.how)
 
@@ -314,7 +328,7 @@ class Search:
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        most = self._at_most(STAYING) if _held(local, self.settings.tolerance) else self.settings.iterations
+        most = self._at_most(STAYING) if held(local, self.settings.tolerance) else self.settings.iterations
         stayed = self._descent(most, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))
@@ -350,9 +364,9 @@ class Search:
         self.spent += local.iterations
         if early_exit:
             return local
-        if not _held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
+        if not held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
             stayed = self._stay(local)
-            local = stayed if _better(stayed, local, self.settings.tolerance) else local
+            local = stayed if better(stayed, local, self.settings.tolerance) else local
         return local
 
     def _descent(
@@ -372,29 +386,6 @@ class Search:
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
         """Keep the better one; whether what is asked holds now."""
-        if self._best is None or _better(local, self._best, self.settings.tolerance):
+        if self._best is None or better(local, self._best, self.settings.tolerance):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.settings.tolerance
-
-
-def _held(local: LocalSolution, tolerance: float) -> bool:
-    return _broken(local) <= tolerance
-
-
-def _better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
-    met = one.violation.worst <= tolerance
-    if met != (other.violation.worst <= tolerance):
-        return met
-    for left, right, alike in (
-        (_broken(one), _broken(other), JUST * tolerance),
-        (one.violation.goal, other.violation.goal, tolerance),
-    ):
-        left, right = max(left, tolerance), max(right, tolerance)
-        if abs(left - right) > max(alike, ALIKE * min(left, right)):
-            return left < right
-    return one.measure < other.measure
-
-
-def _broken(local: LocalSolution) -> float:
-    return max(local.violation.hold, local.violation.elastic)

@@ -1,0 +1,77 @@
+"""Starts on the open side of the faces that surfaces are to meet.
+
+A descent never passes through a thing. From a foot under the pedal that it is to press, or a back behind its backrest,
+none leads to the contact. The posture just before contact, which is found through everything, is on the right side of
+all faces at once, and a few programs lead from there to the contacts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import chain
+
+import numpy as np
+
+from wholebody.linearisation import Lineariser
+from wholebody.methods.control import Control
+from wholebody.methods.qp.curved_reach import ENDLESS
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.sqp import SQP, LocalSolution
+from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.starts import restarts
+from wholebody.problem import Problem
+from wholebody.solution import TraceEntry
+from wholebody.tasks.approach import approached, has_face
+
+IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
+NEAR = 1e-3  # m, rad: to which that is met; what is exact there is not where surfaces meet
+PROGRAMS = 40  # most programs of one descent
+TRIES = 4  # descents, of which the first is from the start; two of three lead to the contacts of a driver
+SPREAD = 0.3  # share of each joint's range by which the others may be away from it
+FAR = 0.15  # m, rad: left through everything; then other starts are no help
+
+
+def before_contact(
+    problem: Problem,
+    subproblem: Subproblem,
+    lineariser: Lineariser,
+    solver: QPSolver,
+    seed: int,
+    trace: list[TraceEntry],
+    control: Control,
+) -> Iterator[LocalSolution]:
+    """Descents through everything to where surfaces are in front of their faces; none where no term has a face.
+
+    The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
+
+    Args:
+        problem: what is asked.
+        subproblem: builds the programs.
+        lineariser: of the problem.
+        solver: of the programs.
+        seed: of the starts.
+        trace: grows by one entry a program.
+        control: what may end it.
+    """
+    if not any(has_face(term) for term in (*problem.goals, *problem.constraints)):
+        return
+    goals, constraints = (
+        [approached(term, IN_FRONT) for term in terms] for terms in (problem.goals, problem.constraints)
+    )
+    alone = lineariser.relaxed(ENDLESS)
+    alone.take(goals, alone.clearances, constraints)
+    start = problem.scene.figure.clamp(problem.start)
+    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), TRIES - 1, (SPREAD,))
+    for q in chain([start], others):
+        local = _descent(subproblem, alone, solver, trace, control).run(q)
+        yield local
+        if local.violation.worst > FAR or control.over:
+            return
+
+
+def _descent(
+    subproblem: Subproblem, alone: Lineariser, solver: QPSolver, trace: list[TraceEntry], control: Control
+) -> SQP:
+    return SQP(
+        subproblem, alone, solver, NEAR, PROGRAMS, trace=trace, note="before contact", full_step=True, control=control
+    )
