@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks.axis import across
@@ -31,7 +32,7 @@ class Surface(NamedTuple):
 
     Attributes:
         name: of the segment, thing, piece or frame.
-        owners: segments and things that the pieces are part of; none for a point.
+        owners: segments and things that the pieces are part of; none for a point and for what is only drawn.
         geometry: the geometry model that has the pieces' placements; None for a point.
         pieces: (k,) indices of the pieces in it.
         joints: (k,) joint that carries each.
@@ -76,9 +77,13 @@ class Nearest(NamedTuple):
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
     """The surface of a thing, a segment or a piece; of a frame, the point at its origin.
 
+    A link of a file may have no pieces of its own: then its surface is the convex hull of what is drawn of it. If
+    nothing is drawn, and it has mass or a joint of its own, it is that of all that moves with it.
+
     Raises:
         UnknownNameError: there is nothing of that name.
         InputError: the name is not a string.
+        WholebodyError: what is drawn cannot be read.
     """
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
@@ -88,11 +93,21 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
     if owned:
         return _of_pieces(scene, name, owned)
     try:
-        frame = scene.model.frames[scene.figure.frame_id(name)]
+        number = scene.figure.frame_id(name)
     except UnknownNameError as error:
         known = [*error.known, *dict.fromkeys(scene.piece_owner)]
         raise UnknownNameError("segment, thing, piece or frame", name, known, where) from None
+    frame = scene.model.frames[number]
     joint = int(frame.parentJoint)
+    visual = scene.figure.visual
+    drawn = [part for part in visual.geometryObjects if part.parentFrame == number]
+    if drawn:
+        return _of_drawn(name, joint, drawn)
+    held_by = scene.model.frames[frame.parentFrame]  # its joint; that of a fixed one has the mass of the link
+    if held_by.type == pin.FrameType.JOINT or max(frame.inertia.mass, held_by.inertia.mass) > 0.0:
+        rigid = carried_by(scene, name, joint)
+        if rigid.pieces:
+            return rigid
     return Surface(name, (), None, (), (joint,), (coal.Sphere(POINT),), (POINT,), frame.placement)
 
 
@@ -108,6 +123,17 @@ def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
     pieces = scene.geometry.geometryObjects
     owned = [k for k, owner in enumerate(scene.piece_owner) if owner in segments and pieces[k].parentJoint == joint]
     return _of_pieces(scene, name, owned)
+
+
+def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Surface:
+    """The surface of what is drawn of a link; it has pieces of its own, which are tested against nothing."""
+    made = pin.GeometryModel()
+    for visual in drawn:
+        for solid, placement in drawn_pieces(visual, name):
+            made.addGeometryObject(pin.GeometryObject(f"{name}:{made.ngeoms}", joint, placement, solid))
+    shapes = tuple(piece.geometry for piece in made.geometryObjects)
+    reach = tuple(float(swept_points(shape).reach) for shape in shapes)
+    return Surface(name, (), made, tuple(range(made.ngeoms)), (joint,) * made.ngeoms, shapes, reach)
 
 
 def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
