@@ -39,6 +39,7 @@ class Surface(NamedTuple):
         shapes: (k,) coal's shapes.
         reach: (k,) radius of each about its origin, metres.
         fixed: placement of a point in its joint; None for pieces.
+        moved: displacement in the world of the pieces on a joint, and that joint; None where they are.
     """
 
     name: str
@@ -49,11 +50,19 @@ class Surface(NamedTuple):
     shapes: tuple[Any, ...]
     reach: tuple[float, ...]
     fixed: Any = None
+    moved: tuple[int, Any] | None = None
+
+    def displaced(self, joint: int, displacement: Any) -> Surface:
+        """The surface after its pieces on a joint were displaced in the world (pin.SE3)."""
+        return self._replace(moved=(joint, displacement))
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
         local = self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
-        return state.data.oMi[self.joints[number]] * local
+        place = state.data.oMi[self.joints[number]] * local
+        if self.moved is None or self.moved[0] != self.joints[number]:
+            return place
+        return self.moved[1] * place
 
 
 class Nearest(NamedTuple):
