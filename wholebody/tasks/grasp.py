@@ -19,7 +19,7 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.bars import Crossing, Looking, Rim, bar_of, ring_of
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
-from wholebody.tasks.opposition import Opposing
+from wholebody.tasks.opposition import Opposing, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart, named
 
@@ -171,7 +171,7 @@ class Grasp(ContactTerm):
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
         if others:
-            parts.append(Opposing(hand, others, thing, float(self.opposed)))
+            parts.append(Opposing(hand, others, rounded(thing), float(self.opposed)))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
@@ -194,7 +194,7 @@ class Grasp(ContactTerm):
                 )
         thumb, *others = (surface(scene, end, where) for end in ends)
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
-        parts.append(Opposing(thumb, tuple(others), thing, float(self.opposed)))
+        parts.append(Opposing(thumb, tuple(others), rounded(thing), float(self.opposed)))
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
         if bar is not None and (self.along is not None or bar.half[2] > LONG * bar.half[1]):
             low, high = self._room(float(bar.half[2]))

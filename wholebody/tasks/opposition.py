@@ -17,11 +17,16 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.records import with_values
-from wholebody.tasks.surfaces import Surface, nearest
+from wholebody.tasks.axis import across
+from wholebody.tasks.contact_parts import Gap
+from wholebody.tasks.surfaces import Surface, between_pieces, nearest
 
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
 ROUND = 0.9  # share of a box's least half size by which its edges are rounded, so that normals turn on its faces
+FAR = 0.03  # m: distance of the farthest contact from which the angle does not count
 SHORTEST = 1e-6  # length of a mean normal, and sine of an angle, below which they have no direction
+
+AHEAD, BEHIND = ([pin.exp6(sign * STEP * axis) for axis in np.eye(6)] for sign in (1.0, -1.0))
 
 
 class Opposing(NamedTuple):
@@ -32,7 +37,7 @@ class Opposing(NamedTuple):
     Attributes:
         first: surface on one side, such as a thumb.
         others: surfaces on the other, such as fingers.
-        thing: what is between them.
+        thing: what is between them; the edges of its boxes count as `rounded`.
         most: largest angle from opposite [rad].
     """
 
@@ -48,26 +53,45 @@ class Opposing(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and wrenches on every finger."""
-        surfaces, thing = (self.first, *self.others), rounded(self.thing)
-        normals = np.array([nearest(surface, thing, state).normal for surface in surfaces])
+        surfaces, thing = (self.first, *self.others), self.thing
+        nears = [nearest(surface, thing, state) for surface in surfaces]
+        farthest = int(np.argmax([near.distance for near in nears]))
+        share, fall = _share(nears[farthest].distance)
+        if share == 0.0:
+            return np.zeros(1), np.zeros((1, state.model.nv))
+        normals = np.array([near.normal for near in nears])
         total = normals[1:].sum(axis=0)
         length = max(float(np.linalg.norm(total)), SHORTEST)
         mean = total / length
         cosine = float(np.clip(-normals[0] @ mean, -1.0, 1.0))
-        value = float(np.arccos(cosine)) - self.most
-        row = np.zeros((1, state.model.nv))
-        if value <= 0.0:
-            return np.zeros(1), row
-        slope = 1.0 / max(float(np.sqrt(1.0 - cosine * cosine)), SHORTEST)  # of the angle by normals[0] @ mean
-        on_first = slope * mean
-        on_other = slope * (normals[0] - (normals[0] @ mean) * mean) / length
-        for number, surface in enumerate(surfaces):
-            force = on_first if number == 0 else on_other
-            near = nearest(surface, thing, state)
-            wrench = _by_twist(surface, thing, state, near.against) @ force
-            joints = np.array([near.against]), np.array([near.joint])
-            row += state.rows(wrench[None], *joints)
-        return np.array([value]), row
+        beyond = float(np.arccos(cosine)) - self.most
+        if beyond <= 0.0:
+            return np.zeros(1), np.zeros((1, state.model.nv))
+        ahead = mean + cosine * normals[0]  # of the mean across the first normal: the angle grows along it
+        sine = float(np.linalg.norm(ahead))
+        toward = ahead / sine if sine > SHORTEST else perpendicular(normals[0])
+        back = normals[0] + cosine * mean
+        other = back / sine if sine > SHORTEST else perpendicular(mean)
+        row = fall * beyond * Gap(surfaces[farthest], thing).rows(state)[1]
+        for number, (surface, near) in enumerate(zip(surfaces, nears, strict=True)):
+            force = share * (toward if number == 0 else other / length)
+            wrench = _by_twist(surface, thing, state, near.pieces) @ force
+            row += state.rows(wrench[None], np.array([near.against]), np.array([near.joint]))
+        return np.array([share * beyond]), row
+
+
+def _share(distance: float) -> tuple[float, float]:
+    """How much of the angle counts at the distance of the farthest contact [m], and the derivative; all of it at contact.
+
+    Far away the normals say where the thing is, not how it is held.
+    """
+    left = 1.0 - max(distance, 0.0) / FAR
+    return (left * left, -2.0 * left / FAR * (distance > 0.0)) if left > 0.0 else (0.0, 0.0)
+
+
+def perpendicular(direction: Array) -> Array:
+    """A unit vector (3,) perpendicular to one."""
+    return across(direction)[0]
 
 
 def rounded(thing: Surface) -> Surface:
@@ -83,14 +107,14 @@ def rounded(thing: Surface) -> Surface:
     return with_values(thing, shapes=tuple(shapes))
 
 
-def _by_twist(surface: Surface, thing: Surface, state: State, joint: int) -> Array:
-    """Derivative (6, 3) of the normal by the velocity and rotation at the world's origin of a joint, by differences."""
+def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
+    """Derivative (6, 3) of the normal of two pieces by the twist of the first at the world's origin, by differences."""
+    i, j = pieces
+    place, other = surface.placed(i, state), thing.placed(j, state)
     found = np.empty((6, 3))
-    for axis in range(6):
-        ends = []
-        for sign in (1.0, -1.0):
-            twist = np.zeros(6)
-            twist[axis] = sign * STEP
-            ends.append(nearest(surface.displaced(joint, pin.exp6(twist)), thing, state).normal)
-        found[axis] = (ends[0] - ends[1]) / (2.0 * STEP)
+    for axis, (ahead, behind) in enumerate(zip(AHEAD, BEHIND, strict=True)):
+        ends = [
+            between_pieces(surface.shapes[i], moved * place, thing.shapes[j], other).normal for moved in (ahead, behind)
+        ]
+        found[axis] = (np.array(ends[0]) - np.array(ends[1])) / (2.0 * STEP)
     return found

@@ -39,7 +39,6 @@ class Surface(NamedTuple):
         shapes: (k,) coal's shapes.
         reach: (k,) radius of each about its origin, metres.
         fixed: placement of a point in its joint; None for pieces.
-        moved: displacement in the world of the pieces on a joint, and that joint; None where they are.
     """
 
     name: str
@@ -50,19 +49,11 @@ class Surface(NamedTuple):
     shapes: tuple[Any, ...]
     reach: tuple[float, ...]
     fixed: Any = None
-    moved: tuple[int, Any] | None = None
-
-    def displaced(self, joint: int, displacement: Any) -> Surface:
-        """The surface after its pieces on a joint were displaced in the world (pin.SE3)."""
-        return self._replace(moved=(joint, displacement))
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
         local = self.fixed if self.fixed is not None else self.geometry.geometryObjects[self.pieces[number]].placement
-        place = state.data.oMi[self.joints[number]] * local
-        if self.moved is None or self.moved[0] != self.joints[number]:
-            return place
-        return self.moved[1] * place
+        return state.data.oMi[self.joints[number]] * local
 
 
 class Nearest(NamedTuple):
@@ -74,6 +65,7 @@ class Nearest(NamedTuple):
         point: (3,) a point on the line of both nearest points [m].
         joint: joint that carries the piece of the second surface.
         against: joint that carries the piece of the first.
+        pieces: numbers of the two pieces in their surfaces.
     """
 
     distance: float
@@ -81,6 +73,7 @@ class Nearest(NamedTuple):
     point: Array
     joint: int
     against: int
+    pieces: tuple[int, int]
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
@@ -168,31 +161,35 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
         for i, a in enumerate(ours)
         for j, b in enumerate(theirs)
     ]
-    request = coal.DistanceRequest()
-    request.gjk_tolerance = request.epa_tolerance = ACCURACY
     best: tuple[float, Any, int, int] | None = None
     for bound, i, j in sorted(least):
         if best is not None and bound > best[0]:
             break
-        result = coal.DistanceResult()
-        a, b = ours[i], theirs[j]
-        distance = coal.distance(
-            first.shapes[i],
-            coal.Transform3s(a.rotation, a.translation),
-            second.shapes[j],
-            coal.Transform3s(b.rotation, b.translation),
-            request,
-            result,
-        )
-        if best is None or distance < best[0]:
-            best = float(distance), result, i, j
+        result = between_pieces(first.shapes[i], ours[i], second.shapes[j], theirs[j])
+        if best is None or result.min_distance < best[0]:
+            best = float(result.min_distance), result, i, j
     assert best is not None
     distance, result, i, j = best
     normal = np.array(result.normal)
     if not np.linalg.norm(normal) > 0.5:
         normal = _between(ours[i].translation, theirs[j].translation)
     middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
-    return Nearest(distance, normal, middle, second.joints[j], first.joints[i])
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
+
+
+def between_pieces(first: Any, placed: Any, second: Any, other: Any) -> Any:
+    """Coal's distance of two shapes at their placements (pin.SE3)."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.gjk_tolerance = request.epa_tolerance = ACCURACY
+    coal.distance(
+        first,
+        coal.Transform3s(placed.rotation, placed.translation),
+        second,
+        coal.Transform3s(other.rotation, other.translation),
+        request,
+        result,
+    )
+    return result
 
 
 def _between(first: Array, second: Array) -> Array:
