@@ -28,6 +28,8 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
 LONG = 2.0  # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
+CLOSING = 0.1  # m: distance of the farthest of fingertips from which they begin to oppose the thumb
+CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
 TILTED = pi / 4  # rad: of the palm from straight down, up or level, for the three ways of approach
 APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
@@ -171,7 +173,7 @@ class Grasp(ContactTerm):
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
         if others:
-            parts.append(Opposing(hand, others, rounded(thing), float(self.opposed)))
+            parts.append(Opposing(hand, others, rounded(thing), float(self.opposed), CLOSED))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
@@ -194,7 +196,11 @@ class Grasp(ContactTerm):
                 )
         thumb, *others = (surface(scene, end, where) for end in ends)
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
-        parts.append(Opposing(thumb, tuple(others), rounded(thing), float(self.opposed)))
+        parts.append(
+            Opposing(
+                thumb, tuple(others), rounded(thing), float(self.opposed), CLOSED if self.kind == "pinch" else CLOSING
+            )
+        )
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
         if bar is not None and (self.along is not None or bar.half[2] > LONG * bar.half[1]):
             low, high = self._room(float(bar.half[2]))

@@ -23,7 +23,6 @@ from wholebody.tasks.surfaces import Surface, between_pieces, nearest
 
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
 ROUND = 0.9  # share of a box's least half size by which its edges are rounded, so that normals turn on its faces
-FAR = 0.03  # m: distance of the farthest contact from which the angle does not count
 SHORTEST = 1e-6  # length of a mean normal, and sine of an angle, below which they have no direction
 
 AHEAD, BEHIND = ([pin.exp6(sign * STEP * axis) for axis in np.eye(6)] for sign in (1.0, -1.0))
@@ -39,12 +38,15 @@ class Opposing(NamedTuple):
         others: surfaces on the other, such as fingers.
         thing: what is between them; the edges of its boxes count as `rounded`.
         most: largest angle from opposite [rad].
+        far: distance of the farthest contact from which the angle does not count; nearer, it counts more and more [m].
+            Far away the normals say where the thing is, not how it is held.
     """
 
     first: Surface
     others: tuple[Surface, ...]
     thing: Surface
     most: float
+    far: float
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -56,7 +58,7 @@ class Opposing(NamedTuple):
         surfaces, thing = (self.first, *self.others), self.thing
         nears = [nearest(surface, thing, state) for surface in surfaces]
         farthest = int(np.argmax([near.distance for near in nears]))
-        share, fall = _share(nears[farthest].distance)
+        share, fall = _share(nears[farthest].distance, self.far)
         if share == 0.0:
             return np.zeros(1), np.zeros((1, state.model.nv))
         normals = np.array([near.normal for near in nears])
@@ -80,13 +82,10 @@ class Opposing(NamedTuple):
         return np.array([share * beyond]), row
 
 
-def _share(distance: float) -> tuple[float, float]:
-    """How much of the angle counts at the distance of the farthest contact [m], and the derivative; all of it at contact.
-
-    Far away the normals say where the thing is, not how it is held.
-    """
-    left = 1.0 - max(distance, 0.0) / FAR
-    return (left * left, -2.0 * left / FAR * (distance > 0.0)) if left > 0.0 else (0.0, 0.0)
+def _share(distance: float, far: float) -> tuple[float, float]:
+    """How much of the angle counts at the distance of the farthest contact [m], and the derivative; all at contact."""
+    left = 1.0 - max(distance, 0.0) / far
+    return (left * left, -2.0 * left / far * (distance > 0.0)) if left > 0.0 else (0.0, 0.0)
 
 
 def perpendicular(direction: Array) -> Array:
