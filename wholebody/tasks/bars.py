@@ -1,7 +1,7 @@
 """Bars and rings that a hand closes around: the direction of the bar at the hand, and what crosses the palm.
 
-A bar has the direction of its thing's longest axis. A ring, such as a steering wheel, is a bar whose direction is that
-of the rim next to the palm.
+A bar has the direction of its thing's longest axis. A ring, such as a steering wheel, is held at the side of the hand,
+where its rim counts as a bar.
 """
 
 from __future__ import annotations
@@ -14,14 +14,14 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.contact_parts import through
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
 RING = 8  # least number of pieces of a ring
-AT_CENTER = 1e-6  # m: distance from a ring's axis below which the rim next to a place is not known
+STRAIGHT = 0.25  # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
+LEVEL = 0.1  # sine of the angle to a ring's axis below which a direction names no place of the rim
 
 
 def bar_of(thing: Surface, state: State, where: str) -> Face:
@@ -43,42 +43,43 @@ def bar_of(thing: Surface, state: State, where: str) -> Face:
     return Face(thing, center, np.eye(3)[order], half[order])
 
 
-class Ring(NamedTuple):
-    """A ring: its middle and axis in the axes of the thing's first piece, and the radius of its rim [m]."""
+def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
+    """The rim of a ring where it lies in a direction (3,) from the ring's middle, as a bar; None for no ring.
 
-    surface: Surface
-    center: Array
-    axis: Array
-    radius: float
+    Args:
+        thing: what may be a ring: pieces all around a circle.
+        outwards: in the world.
+        state: at the start.
 
-    @property
-    def joint(self) -> int:
-        """Joint that carries the thing; 0 is the world."""
-        return self.surface.joints[0]
-
-
-def ring_of(thing: Surface, state: State) -> Ring | None:
-    """The ring that the pieces of a thing make, or None."""
+    Returns:
+        Its axes are the ring's own, the direction outwards in the ring's plane, and that of the rim; `half` the size of
+        what counts as straight.
+    """
     if len(thing.shapes) < RING:
         return None
     middles = []
     for k, shape in enumerate(thing.shapes):
         place = thing.placed(k, state)
-        ends = [outermost(shape, place, sign * axis) @ axis for axis in np.eye(3) for sign in (1.0, -1.0)]
-        lows, highs = [end.min() for end in ends[1::2]], [end.max() for end in ends[::2]]
-        middles.append(0.5 * (np.array(lows) + np.array(highs)))
+        high = np.array([(outermost(shape, place, axis) @ axis).max() for axis in np.eye(3)])
+        low = np.array([(outermost(shape, place, -axis) @ axis).min() for axis in np.eye(3)])
+        middles.append(0.5 * (low + high))
     points = np.array(middles)
     center = points.mean(axis=0)
-    _, sizes, axes = np.linalg.svd(points - center)
+    _, sizes, axes = np.linalg.svd(points - center, full_matrices=False)
     way = (points - center) @ axes.T
     radii = np.hypot(way[:, 0], way[:, 1])
-    radius = float(radii.mean())
+    radius, n = float(radii.mean()), axes[2]
     flat = np.abs(way[:, 2]).max() <= ROUNDNESS * radius and np.ptp(radii) <= 2.0 * ROUNDNESS * radius
-    even = sizes[1] >= (1.0 - ROUNDNESS) * sizes[0]  # all around, not an arc
-    if not (flat and even):
+    if not (flat and sizes[1] >= (1.0 - ROUNDNESS) * sizes[0]):  # all around, not an arc
         return None
+    level = outwards - (outwards @ n) * n
+    if np.linalg.norm(level) < LEVEL:  # it looks along the ring's axis: the rim's highest place
+        up = np.array((0.0, 0.0, 1.0))
+        level = up - (up @ n) * n
+    e = level / np.linalg.norm(level)
     at = thing.placed(0, state)
-    return Ring(thing, at.actInv(center), at.rotation.T @ axes[2], radius)
+    local = np.array([n, e, np.cross(n, e)]) @ at.rotation
+    return Face(thing, at.actInv(center + radius * e), local, np.array([0.0, 0.0, STRAIGHT * radius]))
 
 
 class Crossing(NamedTuple):
@@ -117,53 +118,6 @@ class Crossing(NamedTuple):
         wrench[0, 3:] += pin.skew(fingers) @ (way - reach * along)
         joints = np.full(2, self.place.joint, dtype=np.intp), np.full(2, self.bar.joint, dtype=np.intp)
         return np.array([level @ way, excess]), state.rows(wrench, *joints)
-
-
-class Rim(NamedTuple):
-    """A hand around the rim of a ring, from outside: four rows [rad, rad, m, m].
-
-    With e the direction from the ring's axis to the palm, k the rim there and n the axis: two rows are the angle of
-    the palm's y to the tangent n x e, whichever of its two directions is nearer. One is x . (k - p), with x the axis of
-    the fingers and p the palm. The last is how far the palm is within the rim, zero outside of it.
-    """
-
-    place: Place
-    ring: Ring
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """The first two."""
-        return True, True, False, False
-
-    def rows(self, state: State) -> tuple[Array, Array]:
-        """The rows, and wrenches."""
-        at, frame = self.ring.surface.placed(0, state), state.frame(self.place.frame)
-        center, n = at.act(self.ring.center), at.rotation @ self.ring.axis
-        palm, (x, y, z) = frame.translation, frame.rotation.T
-        flat = np.eye(3) - np.outer(n, n)
-        radial = flat @ (palm - center)
-        distance = max(float(np.linalg.norm(radial)), AT_CENTER)
-        e = radial / distance
-        tangent = np.cross(n, e)
-        turning = np.outer(tangent, tangent) / distance  # of e, by a motion of the palm seen from the ring
-        sign = 1.0 if y @ tangent >= 0.0 else -1.0
-        axes = np.array((z, x, y))
-        components = (axes @ (sign * tangent)).tolist()
-        slope = equidistant_jacobian(*components) @ axes
-        rim = center + self.ring.radius * e
-        way = rim - palm
-        inside = self.ring.radius - distance
-        forces = np.zeros((4, 3))
-        forces[:2] = sign * slope @ pin.skew(n) @ turning
-        forces[2] = x @ (self.ring.radius * turning - np.eye(3))
-        forces[3] = -e if inside > 0.0 else 0.0
-        wrench = through(palm, forces)
-        # the palm's turn moves its axes, seen from the ring: y' = w x y
-        wrench[:2, 3:] += slope @ pin.skew(sign * tangent)
-        wrench[2, 3:] += np.cross(x, way)
-        joints = np.full(4, self.place.joint, dtype=np.intp), np.full(4, self.ring.joint, dtype=np.intp)
-        values = np.array([*equidistant_error(*components), x @ way, max(inside, 0.0)])
-        return values, state.rows(wrench, *joints)
 
 
 class Looking(NamedTuple):

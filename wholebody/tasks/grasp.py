@@ -16,7 +16,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.bars import Crossing, Looking, Rim, bar_of, ring_of
+from wholebody.tasks.bars import Crossing, Looking, bar_of, rim_of
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
 from wholebody.tasks.opposition import Opposing, rounded
@@ -158,17 +158,21 @@ class Grasp(ContactTerm):
     def _power(
         self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
     ) -> list[Part]:
-        ring = ring_of(thing, state)
-        parts: list[Part] = [Gap(hand, thing)]
-        if ring is not None:
-            if self.along is not None:
-                raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
-            parts.append(Rim(place, ring))
-        else:
-            bar = bar_of(thing, state, where)
-            y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
-            low, high = self._room(float(bar.half[2]))
-            parts += [Facing(place, across(y), bar, z, either=True), Crossing(place, bar, low, high)]
+        sideways = np.array((0.0, 1.0 if self._side == "left" else -1.0, 0.0))
+        rim = rim_of(thing, _heading(scene, state) @ sideways, state)
+        if rim is not None and self.along is not None:
+            raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
+        bar = bar_of(thing, state, where) if rim is None else rim
+        low, high = self._room(float(bar.half[2]))
+        y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
+        parts: list[Part] = [
+            Gap(hand, thing),
+            Facing(place, across(y), bar, z, either=True),
+            Crossing(place, bar, low, high),
+        ]
+        if rim is not None:
+            outwards = rim._replace(axes=rim.axes[[1, 0, 2]])
+            parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
         fingers = self._outer_parts(scene)
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
