@@ -14,6 +14,7 @@ from wholebody.arrays import Array
 from wholebody.checks import choice, number, shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.bars import Crossing, Looking, bar_of, rim_of
@@ -171,7 +172,7 @@ class Grasp(ContactTerm):
             Crossing(place, bar, low, high),
         ]
         if rim is not None:
-            outwards = rim._replace(axes=rim.axes[[1, 0, 2]])
+            outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
             parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
         fingers = self._outer_parts(scene)
         parts += [Gap(finger, thing) for finger in fingers.values()]
@@ -208,7 +209,7 @@ class Grasp(ContactTerm):
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
         if bar is not None and (self.along is not None or bar.half[2] > LONG * bar.half[1]):
             low, high = self._room(float(bar.half[2]))
-            lengthwise = bar._replace(axes=bar.axes[::-1])
+            lengthwise = with_values(bar, axes=bar.axes[::-1])
             tip = inputs.find_place(scene, f"{self._side}_index_tip", where)
             parts.append(Over(tip, lengthwise, np.array([low]), np.array([high])))
         return parts
