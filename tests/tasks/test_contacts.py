@@ -257,3 +257,51 @@ def test_grounded_says_what_is_missing() -> None:
         figure.grounded(q, wb.Scene(figure))
     with pytest.raises(wb.InputError, match="scene of this figure"):
         figure.grounded(q, wb.Scene(wb.load("hand")))
+
+
+ARM = """<robot name="arm"><link name="base"/>
+<link name="upper"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<collision><origin xyz="0.3 0 0"/><geometry><box size="0.4 0.05 0.05"/></geometry></collision></link>
+<link name="wrist">{wrist}</link><link name="hand">{hand}</link><link name="tool"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="wrist"/><origin xyz="0.6 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+<joint name="palm" type="fixed"><parent link="wrist"/><child link="hand"/><origin xyz="0.1 0 0"/></joint>
+<joint name="tip" type="fixed"><parent link="hand"/><child link="tool"/><origin xyz="0.2 0 0"/></joint></robot>"""
+MASS = '<inertial><mass value="0.2"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>'
+COLLISION = '<collision><origin xyz="0.06 0 0"/><geometry><sphere radius="0.03"/></geometry></collision>'
+
+
+@pytest.mark.parametrize(
+    ("wrist", "hand", "part", "along", "radius"),
+    [
+        ("", COLLISION, "hand", 0.16, 0.03),
+        (COLLISION, COLLISION.replace("collision", "visual") + MASS, "hand", 0.16, 0.03),
+        (COLLISION, '<visual><geometry><cylinder radius="0.02" length="0.1"/></geometry></visual>', "hand", 0.1, 0.02),
+        (COLLISION, MASS, "hand", 0.06, 0.03),
+        (MASS, COLLISION, "wrist", 0.16, 0.03),
+        (COLLISION, COLLISION, "tool", 0.3, 0.0),
+    ],
+    ids=["own pieces", "drawn", "drawn cylinder", "mass alone", "pieces of a fixed child", "bare frame"],
+)
+@pytest.mark.parametrize("joints", ["all", "shoulder"])
+def test_a_link_at_a_fixed_joint_touches_with_its_surface(
+    tmp_path: Any, wrist: str, hand: str, part: str, along: float, radius: float, joints: str
+) -> None:
+    """By its pieces, by what is drawn of it, or by what moves with it; a frame without a body by its origin."""
+    path = tmp_path / "arm.urdf"
+    path.write_text(ARM.format(wrist=wrist, hand=hand))
+    figure = wb.load(path).reduced(joints)
+    scene = wb.Scene(figure).add(wb.HalfSpace(offset=-0.4), name="table")
+    found = wb.solve(wb.Problem(scene, goals=[wb.Touch(part, "table")]))
+    assert found.status == "solved", found.message
+    center = figure.placement(found.q, "wrist").act(np.array((along, 0.0, 0.0)))
+    lowest = radius if "cylinder" not in hand else _cylinder(figure.placement(found.q, "hand"), 0.02, 0.05)
+    assert center[2] - lowest == pytest.approx(-0.4, abs=2e-4)
+
+
+def _cylinder(place: pin.SE3, radius: float, half: float) -> float:
+    """How far a cylinder reaches below its middle."""
+    tilt = abs(float(place.rotation[2, 2]))
+    return half * tilt + radius * float(np.sqrt(1.0 - tilt**2))

@@ -106,6 +106,23 @@ def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any,
     return [(piece.geometry, piece.placement)], notes
 
 
+def drawn_pieces(visual: pin.GeometryObject, link: str) -> list[tuple[Any, pin.SE3]]:
+    """Convex pieces of what is drawn of a link, in the frame of its joint.
+
+    Raises:
+        WholebodyError: a mesh that cannot be read.
+    """
+    solid: Any = visual.geometry
+    kind = type(solid).__name__.lower()
+    if visual.meshPath:
+        shape = LinkShape(link, visual.placement, "mesh", tuple(visual.meshScale), Path(visual.meshPath))
+    elif kind in ("capsule", "cylinder"):
+        shape = LinkShape(link, visual.placement, kind, (float(solid.radius), 2.0 * float(solid.halfLength)))
+    else:
+        return [(solid, visual.placement)]
+    return [(piece, shape.placement * placement) for piece, placement in link_pieces(shape, None)[0]]
+
+
 def _solid(size: tuple[float, ...], kind: str) -> tuple[tuple[float, ...], tuple[str, ...]]:
     """Sizes for which coal is reliable, and notes on changes."""
     if min(size) >= SMALLEST:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
@@ -75,6 +76,15 @@ CONTACTS = {
                 "on a face, around a bar, by two tips or all",
             ),
             Key("side", DIRECTION, "where the face looks that a palm takes; to the hand's side if left out"),
+            Key(
+                "opposed",
+                Number(0.0, math.pi, "rad"),
+                "most that two sides are off from opposite; 45 degrees if left out",
+            ),
+            Key(
+                "along", Number(-1.0, 1.0, ""), "place along the thing, from its one end to the other; free if left out"
+            ),
+            Key("approach", kinds.Choice(("overhand", "underhand", "side")), "where the palm looks; free if left out"),
             _weight("1/m^2, 1/rad^2"),
         ),
         tasks.Grasp,

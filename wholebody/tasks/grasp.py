@@ -4,27 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Literal, NamedTuple
+from math import pi
+from typing import Literal
 
 import numpy as np
-import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
-from wholebody.checks import choice, shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.checks import choice, number, shown
+from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
+from wholebody.tasks.bars import Crossing, Looking, bar_of, rim_of
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs, through
-from wholebody.tasks.surfaces import Face, Surface, carried_by, face, joined, outermost, segments_beyond, surface
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
+from wholebody.tasks.opposition import Opposing, rounded
+from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
 from wholebody.tasks.touch import check_apart, named
 
 KINDS = ("palm", "power", "pinch", "fingertips")
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
+LONG = 2.0  # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
+CLOSING = 0.1  # m: distance of the farthest of fingertips from which they begin to oppose the thumb
+CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
+TILTED = pi / 4  # rad: of the palm from straight down, up or level, for the three ways of approach
+APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,10 +45,15 @@ class Grasp(ContactTerm):
     - "palm": the flat hand lies on a face of the thing. The hand touches it, z looks into the face, and the palm is
       over the face, a tenth within its edges. The hand may turn about z.
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
-      touches the thing. Where the hand has fingers, the two outer parts of each touch it too.
-    - "pinch": the fingertips touch the thing: thumb and index finger from two sides where the figure has both,
-      otherwise the tip of the index finger. Where the hand has fingers, their last parts touch it.
-    - "fingertips": the last parts of all five fingers touch the thing; the hand needs fingers.
+      touches the thing. A ring, such as a wheel, is held by its rim, with the palm outside of it. Where the hand has
+      fingers, the two outer parts of each touch the thing too, and the four fingers oppose the palm.
+    - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the hand has
+      fingers, otherwise their tips.
+    - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
+      needs fingers.
+
+    Two sides oppose where the normals of their contacts are antiparallel, within `opposed`; of several fingers the
+    mean of the normals counts. Edges of boxes count as rounded.
 
     Use it as a goal or as a constraint. The clearance between hand and thing is zero.
 
@@ -50,11 +63,17 @@ class Grasp(ContactTerm):
         kind: "palm", "power", "pinch" or "fingertips".
         side: (3,) for a palm, direction in the world in which the face looks; by default a left hand takes the face on
             the figure's left, a right hand that on its right.
+        opposed: largest angle of two sides from opposite, up to pi, where anything goes [rad].
+        along: where the hand is along the thing's longest axis, from -1 at one end to 1 at the other; anywhere but the
+            ends if left out. Not for a palm, and not for a ring.
+        approach: "overhand", the palm looks down, "underhand", it looks up, or "side", it looks to the side, within 45
+            degrees each; any if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
         parts: the rows, once resolved.
 
     Raises:
-        InputError: the hand is neither, the kind is another word, or the side has no direction.
+        InputError: the hand is neither, the kind or the approach is another word, the side has no direction, or an
+            angle or a place is out of range.
     """
 
     hand: str
@@ -62,6 +81,9 @@ class Grasp(ContactTerm):
     kind: Literal["palm", "power", "pinch", "fingertips"] = "palm"
     _: KW_ONLY
     side: ArrayLike | None = None
+    opposed: float = pi / 4
+    along: float | None = None
+    approach: Literal["overhand", "underhand", "side"] | None = None
     weight: float = 1.0
     parts: Sequence[Part] = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
@@ -74,6 +96,13 @@ class Grasp(ContactTerm):
         if self.hand.split("_")[0] not in ("left", "right"):
             raise InputError(f"{where}: hand is {shown(self.hand)}; give 'left' or 'right'")
         choice(self.kind, KINDS, f"{where}: kind")
+        object.__setattr__(self, "opposed", number(self.opposed, f"{where}: opposed", 0.0, pi, ", in radians"))
+        if self.along is not None:
+            object.__setattr__(self, "along", number(self.along, f"{where}: along", -1.0, 1.0))
+            if self.kind == "palm":
+                raise InputError(f"{where}: along is for bars; a palm takes a face, so give its side")
+        if self.approach is not None:
+            choice(self.approach, tuple(APPROACHES), f"{where}: approach")
         if self.side is not None:
             object.__setattr__(self, "side", inputs.direction(self.side, f"{where}: side"))
         object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
@@ -106,12 +135,13 @@ class Grasp(ContactTerm):
         if self.kind == "palm":
             parts = self._palm(scene, place, hand, thing, state, where)
         elif self.kind == "power":
-            parts = _power(place, hand, thing, state, where)
-            parts += [Gap(finger, thing) for finger in self._outer_parts(scene)]
-        elif self.kind == "fingertips":
-            parts = self._fingertips(scene, thing, where)
+            parts = self._power(scene, place, hand, thing, state, where)
         else:
-            parts = self._pinch(scene, thing, where)
+            parts = self._fingers(scene, thing, state, where)
+        if self.approach is not None:
+            height = APPROACHES[self.approach]
+            up = np.array((0.0, 0.0, height or 1.0))
+            parts.append(Looking(place, up, TILTED, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
     def _palm(
@@ -126,130 +156,81 @@ class Grasp(ContactTerm):
         facing = Facing(place, across(np.array((0.0, 0.0, 1.0))), taken, np.array((0.0, 0.0, -1.0)))
         return [Gap(hand, thing, taken), facing, Over(place, taken, -MIDDLE * taken.half, MIDDLE * taken.half)]
 
-    def _pinch(self, scene: Surroundings, thing: Surface, where: str) -> list[Part]:
-        ends = [f"{self._side}_{finger}_distal" for finger in ("index", "thumb")]
-        if set(ends) <= set(scene.figure.segments):
-            index, thumb = (surface(scene, end, where) for end in ends)
-            return [Gap(index, thing), Gap(thumb, thing), Opposite(index, thumb, thing)]
-        tips = [surface(scene, f"{self._side}_index_tip", where)]
-        try:
-            tips.append(surface(scene, f"{self._side}_thumb_tip", where))
-        except UnknownNameError:
-            return [Gap(tips[0], thing)]
-        return [*(Gap(tip, thing) for tip in tips), Opposite(tips[0], tips[1], thing)]
+    def _power(
+        self, scene: Surroundings, place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str
+    ) -> list[Part]:
+        sideways = np.array((0.0, 1.0 if self._side == "left" else -1.0, 0.0))
+        rim = rim_of(thing, _heading(scene, state) @ sideways, state)
+        if rim is not None and self.along is not None:
+            raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
+        bar = bar_of(thing, state, where) if rim is None else rim
+        low, high = self._room(float(bar.half[2]))
+        y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
+        parts: list[Part] = [
+            Gap(hand, thing),
+            Facing(place, across(y), bar, z, either=True),
+            Crossing(place, bar, low, high),
+        ]
+        if rim is not None:
+            outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
+            parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
+        fingers = self._outer_parts(scene)
+        parts += [Gap(finger, thing) for finger in fingers.values()]
+        others = tuple(finger for name, finger in fingers.items() if name != "thumb")
+        if others:
+            parts.append(Opposing(hand, others, rounded(thing), float(self.opposed), CLOSED))
+        return parts
 
-    def _fingertips(self, scene: Surroundings, thing: Surface, where: str) -> list[Part]:
-        ends = [f"{self._side}_{finger}_distal" for finger in FINGERS]
-        if not set(ends) <= set(scene.figure.segments):
+    def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
+        """Of a pinch or of all fingertips: they touch, and the thumb opposes the others."""
+        known = set(scene.figure.segments)
+        wanted = FINGERS if self.kind == "fingertips" else FINGERS[:2]
+        ends = [f"{self._side}_{finger}_distal" for finger in wanted]
+        if not set(ends) <= known and self.kind == "fingertips":
             raise InputError(
                 f"{where}: kind 'fingertips' needs a hand with fingers; load the person with hands='fingers', "
                 "or take the thing by kind 'pinch'"
             )
-        return [Gap(surface(scene, end, where), thing) for end in ends]
+        if not set(ends) <= known:
+            ends = [f"{self._side}_{finger}_tip" for finger in wanted]
+            missing = [end for end in ends if not scene.model.existFrame(end)]
+            if missing:
+                raise InputError(
+                    f"{where}: kind 'pinch' needs a thumb and an index finger that oppose each other, and "
+                    f"{scene.figure.name} has no {shown(missing[0])}; use Touch for a single finger"
+                )
+        thumb, *others = (surface(scene, end, where) for end in ends)
+        parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
+        parts.append(
+            Opposing(
+                thumb, tuple(others), rounded(thing), float(self.opposed), CLOSED if self.kind == "pinch" else CLOSING
+            )
+        )
+        bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
+        if bar is not None and (self.along is not None or bar.half[2] > LONG * bar.half[1]):
+            low, high = self._room(float(bar.half[2]))
+            lengthwise = with_values(bar, axes=bar.axes[::-1])
+            tip = inputs.find_place(scene, f"{self._side}_index_tip", where)
+            parts.append(Over(tip, lengthwise, np.array([low]), np.array([high])))
+        return parts
 
-    def _outer_parts(self, scene: Surroundings) -> list[Surface]:
+    def _room(self, half: float) -> tuple[float, float]:
+        """Where the hand may be along a bar, from its middle [m]."""
+        if self.along is None:
+            return -ALONG * half, ALONG * half
+        return float(self.along) * half, float(self.along) * half
+
+    def _outer_parts(self, scene: Surroundings) -> dict[str, Surface]:
         """Of each finger of the hand, its two outer parts; none of a hand that is one segment."""
         known = set(scene.figure.segments)
-        found = []
+        found = {}
         for finger in FINGERS:
             kinds = ("proximal" if finger == "thumb" else "middle", "distal")
             parts = [f"{self._side}_{finger}_{kind}" for kind in kinds]
             owned = [part for part in parts if part in known]
             if owned:
-                found.append(joined(scene, f"{self._side}_{finger}", owned))
+                found[finger] = joined(scene, f"{self._side}_{finger}", owned)
         return found
-
-
-class Opposite(NamedTuple):
-    """The middle of a thing on the line through two points: three rows, what is across the line [m].
-
-    With a and b the points, c the middle and u the unit vector from a to b, the rows are (1 - u u') (c - a).
-    """
-
-    first: Surface
-    second: Surface
-    thing: Surface
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """None is."""
-        return False, False, False
-
-    def rows(self, state: State) -> tuple[Array, Array]:
-        """What is across the line, and forces."""
-        a, b, c = self.first.placed(0, state).translation, self.second.placed(0, state).translation, self._middle(state)
-        way = b - a
-        length = max(float(np.linalg.norm(way)), 1e-9)
-        u, arm = way / length, c - a
-        flat = np.eye(3) - np.outer(u, u)
-        # d(flat) arm = -(du (u . arm) + u (du . arm)), du = flat (db - da) / length
-        turn = -((u @ arm) * flat + np.outer(u, flat @ arm)) / length
-        joints = (self.first.joints[0], self.second.joints[0], self.thing.joints[0])
-        blocks = zip((a, b, c), (-flat - turn, turn, flat), joints, strict=True)
-        total = np.zeros((3, state.model.nv))
-        for point, force, joint in blocks:
-            wrench = through(point, force)
-            total += state.rows(wrench, np.full(3, joint, dtype=np.intp), np.zeros(3, dtype=np.intp))
-        return flat @ arm, total
-
-    def _middle(self, state: State) -> Array:
-        places = [self.thing.placed(k, state).translation for k in range(len(self.thing.shapes))]
-        return np.asarray(np.mean(places, axis=0))
-
-
-def _power(place: inputs.Place, hand: Surface, thing: Surface, state: State, where: str) -> list[Part]:
-    """Rows of a hand around a bar.
-
-    Raises:
-        InputError: the thing has no longest axis.
-    """
-    at = thing.placed(0, state)
-    bounded = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes) if np.isfinite(thing.reach[k])]
-    if not bounded:
-        raise InputError(f"{where}: {thing.name!r} has no end, so no hand closes around it; take it by the palm")
-    center, half = np.zeros(3), np.zeros(3)
-    for axis, along in enumerate(at.rotation.T):
-        ends = [outermost(shape, placed, sign * along) @ along for shape, placed in bounded for sign in (1.0, -1.0)]
-        low, high = float(np.concatenate(ends).min()), float(np.concatenate(ends).max())
-        center[axis], half[axis] = 0.5 * (low + high) - float(at.translation @ along), 0.5 * (high - low)
-    longest = int(np.argmax(half))
-    others = [k for k in range(3) if k != longest]
-    # a "face" through the middle of the bar, whose normal is the bar's axis
-    bar = Face(thing, center, np.array([*np.eye(3)[others], np.eye(3)[longest]]), half[others])
-    facing = Facing(place, across(np.array((0.0, 1.0, 0.0))), bar, np.array((0.0, 0.0, 1.0)), either=True)
-    room = ALONG * half[longest]
-    return [Gap(hand, thing), facing, Crossing(place, bar, room)]
-
-
-class Crossing(NamedTuple):
-    """A bar that crosses the palm: one row across the palm, and one along the bar that is zero within its room [m].
-
-    The first row is x . w, with x the axis of the fingers and w the way from the palm to the bar's axis.
-    """
-
-    place: inputs.Place
-    bar: Face
-    room: float
-
-    @property
-    def in_radians(self) -> tuple[bool, ...]:
-        """None is."""
-        return False, False
-
-    def rows(self, state: State) -> tuple[Array, Array]:
-        """The two rows, and wrenches."""
-        center, axes = self.bar.at(state)
-        frame, along = state.frame(self.place.frame), axes[2]
-        palm, fingers = frame.translation, frame.rotation[:, 0]
-        way = center - palm
-        level = fingers - (fingers @ along) * along  # x . (1 - l l') (c - p) = level . way
-        reach = float(along @ way)
-        excess = reach - float(np.clip(reach, -self.room, self.room))
-        # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
-        wrench = through(palm, np.array([-level, -along if excess else np.zeros(3)]))
-        wrench[0, 3:] += pin.skew(fingers) @ (way - reach * along)
-        joints = np.full(2, self.place.joint, dtype=np.intp), np.full(2, self.bar.joint, dtype=np.intp)
-        return np.array([level @ way, excess]), state.rows(wrench, *joints)
 
 
 def _heading(scene: Surroundings, state: State) -> Array:

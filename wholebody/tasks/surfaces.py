@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError, UnknownNameError
+from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks.axis import across
@@ -31,7 +32,7 @@ class Surface(NamedTuple):
 
     Attributes:
         name: of the segment, thing, piece or frame.
-        owners: segments and things that the pieces are part of; none for a point.
+        owners: segments and things that the pieces are part of; none for a point and for what is only drawn.
         geometry: the geometry model that has the pieces' placements; None for a point.
         pieces: (k,) indices of the pieces in it.
         joints: (k,) joint that carries each.
@@ -64,6 +65,7 @@ class Nearest(NamedTuple):
         point: (3,) a point on the line of both nearest points [m].
         joint: joint that carries the piece of the second surface.
         against: joint that carries the piece of the first.
+        pieces: numbers of the two pieces in their surfaces.
     """
 
     distance: float
@@ -71,14 +73,19 @@ class Nearest(NamedTuple):
     point: Array
     joint: int
     against: int
+    pieces: tuple[int, int]
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
     """The surface of a thing, a segment or a piece; of a frame, the point at its origin.
 
+    A link of a file may have no pieces of its own: then its surface is the convex hull of what is drawn of it. If
+    nothing is drawn, and it has mass or a joint of its own, it is that of all that moves with it.
+
     Raises:
         UnknownNameError: there is nothing of that name.
         InputError: the name is not a string.
+        WholebodyError: what is drawn cannot be read.
     """
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
@@ -88,11 +95,21 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
     if owned:
         return _of_pieces(scene, name, owned)
     try:
-        frame = scene.model.frames[scene.figure.frame_id(name)]
+        number = scene.figure.frame_id(name)
     except UnknownNameError as error:
         known = [*error.known, *dict.fromkeys(scene.piece_owner)]
         raise UnknownNameError("segment, thing, piece or frame", name, known, where) from None
+    frame = scene.model.frames[number]
     joint = int(frame.parentJoint)
+    visual = scene.figure.visual
+    drawn = [part for part in visual.geometryObjects if part.parentFrame == number]
+    if drawn:
+        return _of_drawn(name, joint, drawn)
+    held_by = scene.model.frames[frame.parentFrame]  # its joint; that of a fixed one has the mass of the link
+    if held_by.type == pin.FrameType.JOINT or max(frame.inertia.mass, held_by.inertia.mass) > 0.0:
+        rigid = carried_by(scene, name, joint)
+        if rigid.pieces:
+            return rigid
     return Surface(name, (), None, (), (joint,), (coal.Sphere(POINT),), (POINT,), frame.placement)
 
 
@@ -108,6 +125,17 @@ def carried_by(scene: Surroundings, name: str, joint: int) -> Surface:
     pieces = scene.geometry.geometryObjects
     owned = [k for k, owner in enumerate(scene.piece_owner) if owner in segments and pieces[k].parentJoint == joint]
     return _of_pieces(scene, name, owned)
+
+
+def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Surface:
+    """The surface of what is drawn of a link; it has pieces of its own, which are tested against nothing."""
+    made = pin.GeometryModel()
+    for visual in drawn:
+        for solid, placement in drawn_pieces(visual, name):
+            made.addGeometryObject(pin.GeometryObject(f"{name}:{made.ngeoms}", joint, placement, solid))
+    shapes = tuple(piece.geometry for piece in made.geometryObjects)
+    reach = tuple(float(swept_points(shape).reach) for shape in shapes)
+    return Surface(name, (), made, tuple(range(made.ngeoms)), (joint,) * made.ngeoms, shapes, reach)
 
 
 def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
@@ -130,32 +158,36 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     theirs = [second.placed(k, state) for k in range(len(second.shapes))]
     apart = _origins(ours)[:, None] - _origins(theirs)
     least = np.sqrt(np.einsum("ijk,ijk->ij", apart, apart)) - np.add.outer(first.reach, second.reach)
-    request = coal.DistanceRequest()
-    request.gjk_tolerance = request.epa_tolerance = ACCURACY
     best: tuple[float, Any, int, int] | None = None
     for number in np.argsort(least, axis=None, kind="stable").tolist():
         i, j = divmod(number, len(theirs))
         if best is not None and least[i, j] > best[0]:
             break
-        result = coal.DistanceResult()
-        a, b = ours[i], theirs[j]
-        distance = coal.distance(
-            first.shapes[i],
-            coal.Transform3s(a.rotation, a.translation),
-            second.shapes[j],
-            coal.Transform3s(b.rotation, b.translation),
-            request,
-            result,
-        )
-        if best is None or distance < best[0]:
-            best = float(distance), result, i, j
+        result = between_pieces(first.shapes[i], ours[i], second.shapes[j], theirs[j])
+        if best is None or result.min_distance < best[0]:
+            best = float(result.min_distance), result, i, j
     assert best is not None
     distance, result, i, j = best
     normal = np.array(result.normal)
     if not np.linalg.norm(normal) > 0.5:
         normal = _between(ours[i].translation, theirs[j].translation)
     middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
-    return Nearest(distance, normal, middle, second.joints[j], first.joints[i])
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
+
+
+def between_pieces(first: Any, placed: Any, second: Any, other: Any) -> Any:
+    """Coal's distance of two shapes at their placements (pin.SE3)."""
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    request.gjk_tolerance = request.epa_tolerance = ACCURACY
+    coal.distance(
+        first,
+        coal.Transform3s(placed.rotation, placed.translation),
+        second,
+        coal.Transform3s(other.rotation, other.translation),
+        request,
+        result,
+    )
+    return result
 
 
 def _origins(placements: list[pin.SE3]) -> Array:

@@ -28,7 +28,8 @@ class Touch(ContactTerm):
     is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
 
     Attributes:
-        part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches.
+        part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches. Of a link
+            without pieces what is drawn of it touches, else, if it has mass or a joint, what moves with it.
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
         parts: the rows, once resolved.
@@ -124,11 +125,11 @@ class Lean(ContactTerm):
         leaned_on = face(scene, self.on, -toward, state, where)
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
         parts = (Gap(first, second, leaned_on), facing)
-        return filled(self, parts=parts, touches=owner_pairs(first.owners, second.owners))
+        return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
 
 
 def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:
-    """Segments and things whose clearance is zero where a surface touches: of a point, what its joint carries."""
+    """Segments and things whose clearance is zero where a surface touches: without owners, what its joint carries."""
     return found.owners or carried_by(scene, found.name, found.joints[0]).owners
 
 

@@ -14,6 +14,7 @@ from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.batches import Key
 from wholebody.methods.newton.linear_algebra.normal_equations import Gram
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.tracking.drag import Drag
 
 Y = (0.0, 1.0, 0.0)
 
@@ -365,3 +366,94 @@ def test_a_residual_is_that_of_the_numbers_now() -> None:
     assert np.abs(system.residual(x)).max() == pytest.approx(0.4)
     with pytest.raises(ValueError, match="read-only"):
         system.residual(x)[:] = 0.0
+
+
+@pytest.mark.parametrize("joint", ["revolute", "spherical"])
+@pytest.mark.parametrize("share", [0.9, 0.3, 0.0, -0.7])
+def test_a_straight_chain_folds_to_a_goal_on_its_own_line(joint: str, share: float) -> None:
+    """No motion lowers the error to first order there, and the chain can fold."""
+    made = _straight(5, joint)
+    made.point_goal("link4", (share, 0, 0), place=(0.2, 0, 0))
+    answer = made.solve()
+    assert answer.status == "solved", answer.message
+    tip = answer.placements["link4"].act(np.array((0.2, 0, 0)))
+    assert tip == pytest.approx(np.array((share, 0, 0)), abs=2e-5)
+
+
+def test_a_straight_chain_with_limits_folds_within_them() -> None:
+    made = _straight(4, "planar", limits=(-1.5, 1.5))
+    made.point_goal("link3", (0.4, 0, 0), place=(0.2, 0, 0))
+    assert made.solve().status == "solved"
+
+
+def test_a_straight_loop_opens_and_closes() -> None:
+    """Three bars of 0.2 m on a line close a loop over 0.3 m: first-order steps alone call that infeasible."""
+    made = _straight(3, "spherical")
+    made.spherical("link2", "world", at_first=(0.2, 0, 0), at_second=(0.3, 0, 0))
+    assert made.solve().status == "solved"
+
+
+def test_a_goal_beyond_a_straight_chain_stays_unreachable() -> None:
+    made = _straight(5, "spherical")
+    made.point_goal("link4", (1.3, 0, 0), place=(0.2, 0, 0))
+    answer = made.solve()
+    assert answer.status == "unreachable"
+    assert answer.goal_error == pytest.approx(0.3, abs=1e-3)
+    assert made.q == pytest.approx(answer.path[-1])
+
+
+def test_a_drag_folds_a_straight_chain() -> None:
+    made = _straight(5, "revolute")
+    made.point_goal("link4", (1, 0, 0), place=(0.2, 0, 0))
+    drag = Drag(made)
+    assert max(drag.to((x, 0, 0)).error for x in np.linspace(1.0, 0.6, 15)) < 1e-3
+
+
+def _straight(count: int, joint: str, limits: tuple[float, float] | None = None) -> Assembly:
+    if joint == "revolute":
+        return _chain(count, limits)
+    made = Assembly()
+    for k in range(count):
+        base, place = f"link{k - 1}" if k else "world", (0.2 * k, 0, 0)
+        made.body(f"link{k}", place, size=0.1)
+        if joint == "spherical":
+            made.spherical(base, f"link{k}", at=place)
+        else:
+            made.revolute(base, f"link{k}", at=place, axis=Y, limits=limits)
+    return made
+
+
+def test_errors_are_distances_and_angles() -> None:
+    """Of a goal, a spherical joint, a prismatic joint and a frame: norms of vectors and angles of rotations."""
+    goal = Assembly().body("a").fixed("world", "a").point_goal("a", (1, 1, 1))
+    found = goal.solve()
+    assert found.goal_error == pytest.approx(np.sqrt(3.0), abs=1e-5)
+    assert f"{found.goal_error:.3g} m" in found.message
+    assert goal.goal_error(0) == pytest.approx(found.goal_error, abs=1e-9)
+    assert goal.step().goal_error == pytest.approx(np.sqrt(3.0), abs=1e-5)
+
+    joint = Assembly().body("a").body("b").fixed("world", "a").fixed("world", "b")
+    joint.spherical("a", "b", at_first=(0.3, 0.3, 0.3), at_second=(0, 0, 0))
+    open_by = joint.solve()
+    assert open_by.status == "infeasible"
+    a, b = open_by.placements["a"], open_by.placements["b"]
+    gaps = [
+        np.linalg.norm(a.act(np.full(3, 0.3)) - b.translation),
+        *map(np.linalg.norm, (a.translation, b.translation)),
+    ]
+    assert open_by.joint_error == pytest.approx(max(gaps), abs=1e-6)
+
+    slide = Assembly().body("a").prismatic("world", "a", axis=(0, 0, 1))
+    moved = slide.variables()
+    moved[:3] = 3.0, 4.0, 2.0
+    assert slide.system().largest_errors(slide.system().residual(moved))[0] == pytest.approx(5.0)
+
+    turned = (
+        Assembly()
+        .body("a")
+        .fixed("world", "a")
+        .frame_goal("a", pin.SE3(pin.exp3(np.array((1.0, 1.0, 1.0))), np.zeros(3)))
+    )
+    said = turned.solve()
+    assert said.goal_error == pytest.approx(np.sqrt(3.0), abs=1e-5)
+    assert turned.goal_error(0) == pytest.approx(said.goal_error, abs=1e-9)

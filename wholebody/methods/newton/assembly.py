@@ -67,8 +67,8 @@ class AssemblyStep(NamedTuple):
     """Answer of one frame of a drag.
 
     Attributes:
-        goal_error: largest goal error, metres or radians.
-        joint_error: largest error of a joint, a constraint or a contact, metres or radians.
+        goal_error: largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
+        joint_error: largest distance [m] or angle [rad] by which a joint, a constraint or a contact is open.
         iterations: Newton iterations.
         systems: linear systems solved.
         taken: whether the bodies moved there.
@@ -298,13 +298,12 @@ class Assembly(AssemblyJoints):
 
     def _newton_frame(self, active: AssemblySystem, start: Array, tolerance: float) -> AssemblyStep:
         """A few Newton steps from the variables `start` (7 n,) of a system that begun there."""
-        before = active.system.residual(start)
-        wrong = np.where(active.system.inequality, np.minimum(before, 0.0), before)[~active.system.goal]
+        before, _ = active.system.largest_errors(active.system.residual(start))
         found = satisfy(
             active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
-            early_exit=True,
+            early_exit=True, leave_saddles=True,
         )  # fmt: skip
-        holds = found.hard <= max(10.0 * HARD_TOLERANCE, float(np.abs(wrong).max(initial=0.0)))
+        holds = found.hard <= max(10.0 * HARD_TOLERANCE, before)
         taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
         if taken:
             self._places = list(found.x.reshape(-1, 7))

@@ -140,8 +140,8 @@ class AssemblyJoints(AssemblyBodies):
         basis = axes_along(turn_a.inverse() * along)
         self._holding.turn(a, b, what, basis, turn_b.inverse() * turn_a * basis, 3)
         way = turn_a.inverse() * (here_b.translation - here_a.translation)
-        for side in basis.toRotationMatrix().T[:2]:
-            self._holding.slide(a, b, what, side, np.zeros(3), float(side @ way))
+        sides = basis.toRotationMatrix().T[:2]
+        self._holding.slide(a, b, what, sides, np.zeros(3), sides @ way)
         return self._connected(a, b)
 
     def fixed(self, first: str, second: str, *, placement_second: PlacementLike | None = None) -> Self:

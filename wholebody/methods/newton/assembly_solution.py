@@ -31,8 +31,8 @@ class AssemblySolution:
         placements: name to pin.SE3.
         status: "solved", "unreachable" (goals missed, all joints hold), "infeasible" (joints cannot all hold; the least
             residual) or "stalled".
-        goal_error: largest goal error, metres or radians.
-        joint_error: largest error of a joint or constraint, metres or radians.
+        goal_error: largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
+        joint_error: largest distance [m] or angle [rad] by which a joint or constraint is open.
         residuals: largest error before each iteration and at the end.
         systems: linear systems solved.
         algebra: name of the factorisation.
@@ -87,21 +87,29 @@ def solved(
 
     With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
     """
-    found = satisfy(active_system, before, tolerance=tolerance, iterations=iterations, kind=kind, improve_goals=True)
+    found = satisfy(
+        active_system,
+        before,
+        tolerance=tolerance,
+        iterations=iterations,
+        kind=kind,
+        improve_goals=True,
+        leave_saddles=True,
+    )
     system, x = active_system.system, found.x
     nearness: tuple[float, ...] = ()
     if nearest is not None and found.met:
         settled = project(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
         x, nearness = (unit(settled.x) if settled.met else x), settled.errors
     residual = system.residual(x)
-    size = np.abs(np.where(system.inequality, np.minimum(residual, 0.0), residual))
+    joint_error, goal_error = system.largest_errors(residual)
     status: Status = "solved"
     message = f"solved in {found.iterations} iterations"
     if not found.met:
         hard = found.hard > tolerance
         status = ("infeasible" if hard else "unreachable") if found.stationary else "stalled"
-        counted = np.where(system.goal == hard, 0.0, size)
-        worst = system.label(int(counted.argmax()))
+        counted = np.where(system.goal_groups == hard, 0.0, system.errors(residual))
+        worst = system.label(int(system.group_starts[counted.argmax()]))
         why = {"infeasible": "the joints cannot all hold", "unreachable": "all joints hold, the goals cannot"}
         left = f"{worst} is missed by {counted.max():.3g} m or rad"
         message = f"{why.get(status, 'ran out of iterations')}: {left}"
@@ -117,8 +125,8 @@ def solved(
     return x, AssemblySolution(
         placements=placements,
         status=status,
-        goal_error=float(size[system.goal].max(initial=0.0)),
-        joint_error=float(size[~system.goal].max(initial=0.0)),
+        goal_error=goal_error,
+        joint_error=joint_error,
         residuals=found.residuals,
         systems=found.systems,
         algebra=active_system.algebra.name,

@@ -28,7 +28,6 @@ class AssemblySystem(ActiveSystem):
 
     Attributes:
         patterns: what was laid out and analysed.
-        path: the accepted states (7 n,) since `begin`.
         q: (nq,) posture of the scene at the last `retract`, if pairs can touch.
     """
 
@@ -58,7 +57,6 @@ class AssemblySystem(ActiveSystem):
             self.longest = LONGEST
         self._laid: Hashable = None
         self._goals_laid: Hashable = None
-        self.path: list[Array] = []
         self._here = self._left = self.q = np.zeros(0)
         self._fresh = True
 
@@ -66,7 +64,7 @@ class AssemblySystem(ActiveSystem):
         """Begin a solve at x (7 n,) with these goals, and with the things where they are now; returns the start."""
         self._goals = list(goals)
         self._goals_laid = tuple((key, batch.size, batch.bodies.tobytes()) for batch, key in goals)
-        self.path = []
+        self.path = ()
         if self.contacts is not None:
             self.workspace.refresh()
         self._here, self._fresh = np.zeros(0), True
@@ -111,7 +109,7 @@ class AssemblySystem(ActiveSystem):
         x = self.retract(x)
         self._left = self.q
         if not self.path or not np.array_equal(self.path[-1], x):
-            self.path.append(x)
+            self.path = (*self.path, x)
         if self.contacts is None and not self._figures and not self._fresh:
             return False  # nothing depends on the state
         self._fresh = False

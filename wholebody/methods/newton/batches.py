@@ -41,12 +41,14 @@ class Batch(ABC):
         size: rows of each group.
         pattern: (size, 7 b) structural non-zeros of the Jacobian.
         labels: (k,) names of the groups in messages.
+        half_sines: whether the norm of a group is twice the sine of half the angle that is left, not a distance.
 
     Residual and Jacobian at the same array of bodies share their work, so do not change such an array in place.
     """
 
     size: int
     pattern: Mask
+    half_sines = False
 
     def __init__(self, bodies: Indices, labels: list[str]) -> None:
         self.bodies = np.asarray(bodies, dtype=np.intp)
@@ -156,6 +158,8 @@ class Turn(Batch):
     The x and y components vanish if the z axes agree (revolute joint; the opposite direction is no solution),
     all three if all axes agree (fixed and prismatic joint). To first order a row is an angle [rad].
     """
+
+    half_sines = True
 
     def __init__(self, bodies: Indices, labels: list[str], forms: Array) -> None:
         """Take the bilinear forms (k, size, 4, 4)."""

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import ArrayLike
 
 from wholebody.arrays import Array
 from wholebody.methods.newton.angles import Angle
@@ -60,16 +61,17 @@ class EquationSet:
         a: int,
         b: int,
         label: str,
-        normal: Array,
+        normals: Array,
         place: Array,
-        height: float,
+        heights: ArrayLike,
         *,
         above: bool = False,
         goal: bool = False,
         weight: float = 1.0,
     ) -> None:
-        """A point (3,) of the second body in a plane of the first, or above it."""
-        self._add(Key("slide", goal, above, weight), a, b, label, normal, place, height)
+        """A point (3,) of the second body in planes of the first with normals (m, 3) or (3,), or above them."""
+        normals = np.atleast_2d(normals)
+        self._add(Key(f"slide{len(normals)}", goal, above, weight), a, b, label, normals, place, np.atleast_1d(heights))
 
     def limit(self, a: int, b: int, label: str, first: Any, second: Any, low: float, high: float) -> None:
         """The angle about z of two axes (pin.Quaternion) stays between bounds, which may be infinite."""
@@ -118,8 +120,8 @@ def _batch(kind: str, rows: list[Row], count: int) -> Batch:
     if kind == "coincide":
         axes = np.broadcast_to(np.eye(3), (k, 3, 3))
         return Coincide(bodies, labels, columns[0], columns[1], axes, np.zeros((k, 3)))
-    if kind == "slide":
-        return Slide(bodies, labels, columns[0][:, None], columns[1], columns[2][:, None])
+    if kind.startswith("slide"):
+        return Slide(bodies, labels, *columns)
     forms = relative_forms(columns[0], columns[1])
     if kind == "angle":
         return Angle(bodies, labels, forms[:, 2:], columns[2], columns[3], columns[4])

@@ -4,13 +4,18 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+import numpy as np
+
 from wholebody.arrays import Array
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.iteration import Iteration
+from wholebody.methods.newton.iteration import LEAST_PROGRESS, Iteration
 from wholebody.methods.newton.system import ActiveSystem
 
 FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
 RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
+NUDGE = 0.05  # parts of a quaternion, and of a body's size: random motion that leaves a saddle
+NUDGES = 3  # random motions tried; joint limits send some of them back. More = more time where a goal is out of reach
+GAIN = 1e-2  # least share of the error by which the end of another iteration is lower
 GOAL_DAMPING = 1e-2  # of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
 
 
@@ -51,6 +56,7 @@ def satisfy(
     goal_tolerance: float | None = None,
     early_exit: bool = False,
     improve_goals: bool = False,
+    leave_saddles: bool = False,
 ) -> FeasibilityResult:
     """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
 
@@ -63,28 +69,83 @@ def satisfy(
         goal_tolerance: of the goals, if it differs.
         improve_goals: go on from where goals out of reach pulled the constraints open and these were restored, with
             goals that give way; the end is nearer to the goals then.
+        leave_saddles: where no step lowers the error, go on from states nearby.
         early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
+    far = run.goal
     run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)
     if not early_exit and run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, measures="ignore")
-    if run.hard > tolerance and len(run.goal_rows):
-        stationary = run.stationary
-        run.iterate(RESTORATIONS, goals=False, measures="ignore")
-        run.stationary = stationary if run.hard <= tolerance else run.stationary
-        if improve_goals and run.hard <= tolerance and not run.met:
-            _improve_goals(run, iterations, tolerance)
+    _restore(run, iterations, improve_goals)
+    stuck = run.goal > (1.0 - LEAST_PROGRESS) * far if early_exit else run.stationary
+    if leave_saddles and stuck and not run.met:
+        _leave_saddle(run, 1 if early_exit else NUDGES, iterations, improve_goals)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
+
+
+def _restore(run: Iteration, iterations: int, improve_goals: bool) -> None:
+    """Meet the constraints that goals out of reach pulled open."""
+    if run.hard <= run.tolerance or not len(run.goal_rows):
+        return
+    stationary = run.stationary
+    run.iterate(RESTORATIONS, goals=False, measures="ignore")
+    run.stationary = stationary if run.hard <= run.tolerance else run.stationary
+    if improve_goals and run.hard <= run.tolerance and not run.met:
+        _improve_goals(run, iterations, run.tolerance)
+
+
+def _leave_saddle(run: Iteration, nudges: int, iterations: int, improve_goals: bool) -> None:
+    """Go on from states nearby, as a stationary one may be a saddle or a maximum; it stays if that gains nothing.
+
+    A chain that is straight with its goal on its own line is at one: no motion lowers the error to first order.
+    """
+    saddle = best = run.mark()
+    least, rng = _missed(run), np.random.default_rng(0)
+    size = np.sqrt(run.system.weight.reshape(-1, 7))
+    size[:, :3] *= size[:, 3:].max(axis=1, keepdims=True)
+    size[:, 3:] = 1.0
+    run.least_damping = 0.0
+    for _ in range(nudges):
+        if run.met:
+            return
+        run.go_back(saddle)
+        if not _moved(run, (NUDGE * size * rng.normal(size=size.shape)).ravel()):
+            continue
+        run.iterate(iterations, goals=True, measures="ignore")
+        _restore(run, iterations, improve_goals)
+        missed = _missed(run)
+        if missed < tuple((1.0 - GAIN) * value for value in least):
+            best, least = run.mark(), missed
+    if not run.met:
+        run.go_back(best)
+
+
+def _moved(run: Iteration, step: Array) -> bool:
+    """Make a step (7 n,), as far as its motion is free; False where it is not."""
+    start, length = run.x, run.length(step)
+    trial = run.active_system.retract(start + length * step)
+    if run.active_system.runs_into():
+        run.begin(start)
+        trial = run.active_system.retract(start + length * step)
+    trial, length, free = run.shorten(trial, step, length)
+    if free:
+        run.advance(trial, length)
+    return free
+
+
+def _missed(run: Iteration) -> tuple[float, float]:
+    """What to lower: violations above the tolerance first, then the goals' errors."""
+    return (run.hard if run.hard > run.tolerance else 0.0), run.goal
 
 
 def _improve_goals(run: Iteration, iterations: int, tolerance: float) -> None:
     """Lower the error of goals out of reach, from a state that meets the constraints; it stays if that fails."""
-    best, goal, stationary = run.x, run.goal, run.stationary
+    best, goal, stationary = run.mark(), run.goal, run.stationary
     run.least_damping = GOAL_DAMPING
     run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance:
         run.iterate(RESTORATIONS, goals=False, measures="ignore")
     if run.hard > tolerance or run.goal > goal:
-        run.begin(best)
+        run.go_back(best)
     run.stationary = stationary

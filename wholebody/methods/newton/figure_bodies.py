@@ -245,8 +245,8 @@ class FigureBodies:
             axis = _axis(kind)
             basis = pin.Quaternion(axes_with_z(axis[None])[0])
             equations.turn(a, b, label, turn * basis, basis, 3)
-            for side in (turn * basis).toRotationMatrix().T[:2]:
-                equations.slide(a, b, label, side, np.zeros(3), float(side @ place))
+            sides = (turn * basis).toRotationMatrix().T[:2]
+            equations.slide(a, b, label, sides, np.zeros(3), sides @ place)
             along = turn * axis
             low, high = model.lowerPositionLimit[kind.idx_q], model.upperPositionLimit[kind.idx_q]
             for bound, sign in ((low, 1.0), (high, -1.0)):

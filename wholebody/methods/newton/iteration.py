@@ -80,14 +80,20 @@ class Iteration:
         self.multiplier = np.zeros(len(self.residual))
         self.state: Inequalities = inequalities(self.kind, self.residual[self.one_sided])
 
+    def mark(self) -> tuple[Array, tuple[Array, ...], bool]:
+        """The present state, for `go_back`."""
+        return self.x, self.active_system.path, self.stationary
+
+    def go_back(self, mark: tuple[Array, tuple[Array, ...], bool]) -> None:
+        """Begin again at an earlier state."""
+        x, self.active_system.path, self.stationary = mark
+        self.begin(x)
+
     def _move(self, x: Array, residual: Array | None) -> None:
         residual = self.system.residual(x) if residual is None else residual
         values = self.system.values(x)
         self.x, self.residual, self.values = x, residual, values
-        error = np.abs(self._error(self.residual))
-        self.goal = float(error[self.goal_rows].max(initial=0.0))
-        error[self.goal_rows] = 0.0
-        self.hard = float(error.max(initial=0.0))
+        self.hard, self.goal = self.system.largest_errors(self.residual)
 
     def _error(self, residual: Array) -> Array:
         error: Array = residual.copy()

@@ -26,6 +26,9 @@ class System:
         inequality: (m,) rows that must be at least zero.
         share: (m,) root of each goal's weight, as a share of the greatest; 1 for constraints.
         objective: (m,) rows whose squares are minimised.
+        group_starts: (g,) first row of each group of rows whose norm is one error: a distance or an angle. Rows of
+            inequalities are groups of their own.
+        goal_groups: (g,) which groups are goals.
         stiffness: (m,) their factors, 1 by default.
         weight: (7 n,) weight of each variable in the least motion.
     """
@@ -50,6 +53,12 @@ class System:
         self.inequality = np.repeat([key.one_sided for key in keys], sizes).astype(bool)
         self.objective = np.repeat([key.kind == OBJECTIVE for key in keys], sizes).astype(bool)
         self.stiffness = np.ones(len(self.objective))
+        rows_of = [1 if key.one_sided else batch.size for batch, key in batches if len(batch)]
+        counts = [size // rows for size, rows in zip(sizes, rows_of, strict=True)]
+        groups = np.repeat(np.array(rows_of, dtype=np.intp), counts)
+        self.group_starts = (np.cumsum(groups) - groups).astype(np.intp)
+        self.goal_groups = self.goal[self.group_starts]
+        self._group_half_sines = np.repeat([batch.half_sines for batch in self.batches], counts).astype(bool)
         weights = np.repeat([key.weight if key.goal else 0.0 for key in keys], sizes)
         self.share = np.where(self.goal, np.sqrt(weights / weights.max(initial=1e-300)), 1.0)
         rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
@@ -84,6 +93,22 @@ class System:
             found.flags.writeable = False
             self._found = (x, found)
         return self._found[1]
+
+    def errors(self, residual: Array) -> Array:
+        """(g,) what each group of rows misses at a residual (m,), metres or radians; 0 for those of the objective."""
+        rows = np.where(self.inequality, np.minimum(residual, 0.0), residual)
+        rows[self.objective] = 0.0
+        if not len(rows):
+            return rows
+        result: Array = np.sqrt(np.add.reduceat(rows * rows, self.group_starts))
+        turned = self._group_half_sines
+        result[turned] = 2.0 * np.arcsin(np.minimum(0.5 * result[turned], 1.0))
+        return result
+
+    def largest_errors(self, residual: Array) -> tuple[float, float]:
+        """The largest error of a joint or constraint, and of a goal, at a residual (m,); metres or radians."""
+        errors, goal = self.errors(residual), self.goal_groups
+        return float(errors[~goal].max(initial=0.0)), float(errors[goal].max(initial=0.0))
 
     def values(self, x: Array) -> Array:
         """Values (nnz,) of the Jacobian in the order of the pattern."""
@@ -136,8 +161,10 @@ class ActiveSystem:
         algebra: factorisation for the system's pattern.
         longest: largest motion of any part of a body in a step, metres.
         control: may end the iteration early.
+        path: the accepted states (7 n,), where a system records them.
     """
 
+    path: tuple[Array, ...] = ()
     longest = np.inf
     control = Control(np.inf)
 

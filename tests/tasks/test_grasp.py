@@ -1,0 +1,161 @@
+"""Grasps: sides that oppose by coal's normals, derivatives by differences, options, and wheels held from outside."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+
+FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+AT = (0.40, -0.2, 1.1)
+
+
+@pytest.fixture(scope="module")
+def figure() -> wb.Figure:
+    return wb.load("human", hands="fingers")
+
+
+def _start(figure: wb.Figure) -> Any:
+    return figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(80.0)})
+
+
+def _normal(scene: wb.Scene, q: Any, pieces: str) -> Any:
+    """Of the nearest contact of pieces, by the beginning of their names, with the thing."""
+    data = scene.model.createData()
+    pin.forwardKinematics(scene.model, data, q)
+    best, request = None, coal.DistanceRequest()
+    for one in scene.geometry.geometryObjects:
+        for other in scene.geometry.geometryObjects:
+            if one.name.startswith(pieces) and other.name.startswith("thing:"):
+                ends = [data.oMi[piece.parentJoint] * piece.placement for piece in (one, other)]
+                a, b = (coal.Transform3s(end.rotation, end.translation) for end in ends)
+                result = coal.DistanceResult()
+                coal.distance(one.geometry, a, other.geometry, b, request, result)
+                if best is None or result.min_distance < best[0]:
+                    best = result.min_distance, np.array(result.normal)
+    assert best is not None
+    return best[1]
+
+
+def _apart(a: Any, b: Any) -> float:
+    return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
+
+
+@pytest.mark.parametrize(
+    ("kind", "shape"),
+    [
+        ("pinch", wb.Sphere(0.03)),
+        ("pinch", wb.Capsule(0.01, 0.2)),
+        ("fingertips", wb.Sphere(0.01)),
+        ("fingertips", wb.Capsule(0.01, 0.2)),
+    ],
+    ids=["pinch ball", "pinch bar", "fingertips ball", "fingertips bar"],
+)
+def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> None:
+    scene = wb.Scene(figure).add(shape, name="thing", at=AT)
+    grasp = wb.Grasp("right", "thing", kind)
+    solution = wb.solve(wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET))
+    assert solution.status == "solved", solution.message
+    fingers = ("index",) if kind == "pinch" else ("index", "middle", "ring", "little")
+    mean = np.sum([_normal(scene, solution.q, f"right_{finger}_distal") for finger in fingers], axis=0)
+    assert _apart(_normal(scene, solution.q, "right_thumb_distal"), mean) > 135.0 - 0.1
+
+
+def test_fingers_on_one_side_do_not_oppose(figure: wb.Figure) -> None:
+    """All fingertips on a floor, which has one side."""
+    scene = wb.Scene(figure).add(wb.HalfSpace(offset=1.0), name="thing")
+    q = _start(figure)
+    for opposed in (np.pi / 4, np.pi):
+        grasp = wb.Grasp("right", "thing", "fingertips", opposed=opposed).resolve(scene, q)
+        down = figure.placement(q, "right_index_tip").translation[2] - 1.0
+        state = scene.state(q)
+        near = pin.integrate(figure.model, q, np.eye(figure.model.nv)[2] * -(down - 0.01))
+        value = grasp.value(state.update(near))
+        assert (value[-1] > 0.05) == (opposed < np.pi)
+
+
+@pytest.mark.parametrize(
+    ("shape", "kind"),
+    [(wb.Sphere(0.02), "pinch"), (wb.Capsule(0.015, 0.3), "fingertips"), (wb.Capsule(0.015, 0.3), "power"),
+     (wb.Box((0.05, 0.06, 0.04)), "pinch")],
+)  # fmt: skip
+def test_derivatives(figure: wb.Figure, shape: Any, kind: Any) -> None:
+    model, q = figure.model, _start(figure)
+    place = figure.placement(q, "right_palm")
+    scene = wb.Scene(figure).add(shape, name="thing", at=place.act(np.array((0.05, 0.0, 0.06))))
+    grasp = wb.Grasp("right", "thing", kind, approach="overhand").resolve(scene, q)
+    state, rng, half = scene.state(q), np.random.default_rng(1), 2e-6
+    there = pin.integrate(model, q, 0.05 * rng.normal(size=model.nv))
+    given, kinks = grasp.jacobian(state.update(there)), 0
+    for dof in range(model.nv):
+        step = half * np.eye(model.nv)[dof]
+        ahead = grasp.value(state.update(pin.integrate(model, there, step)))
+        behind = grasp.value(state.update(pin.integrate(model, there, -step)))
+        kinks += int(np.abs((ahead - behind) / (2.0 * half) - given[:, dof]).max() > 3e-3)
+    assert kinks <= 1
+
+
+@pytest.mark.parametrize(
+    ("approach", "low", "high"), [("overhand", -1.0, -0.7), ("underhand", 0.7, 1.0), ("side", -0.71, 0.71)]
+)
+def test_the_palm_looks_where_the_approach_says(approach: Any, low: float, high: float) -> None:
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(
+        wb.Capsule(0.015, 0.4), name="thing", at=(0.4, -0.25, 1.1, 0.0, 0.7071068, 0.0, 0.7071068)
+    )
+    grasp = wb.Grasp("right", "thing", "power", approach=approach)
+    solution = wb.solve(wb.Problem(scene, goals=[grasp], constraints=FEET))
+    assert solution.status == "solved", solution.message
+    assert low - 1e-3 < figure.placement(solution.q, "right_palm").rotation[2, 2] < high + 1e-2
+
+
+@pytest.mark.parametrize("along", [-0.7, 0.0, 0.5])
+def test_the_hand_is_where_along_says(along: float) -> None:
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.Capsule(0.015, 0.4), name="thing", at=(0.4, -0.25, 1.1))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Grasp("right", "thing", "power", along=along)], constraints=FEET))
+    assert solution.status == "solved", solution.message
+    palm = figure.placement(solution.q, "right_palm").translation
+    assert palm[2] - 1.1 == pytest.approx(along * 0.215, abs=1e-3)
+
+
+def test_a_wheel_is_held_by_its_rim_from_outside() -> None:
+    figure = wb.load("human")
+    scene = wb.Scene(figure).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
+    grips = [wb.Grasp(side, "wheel", "power") for side in ("left", "right")]
+    solution = wb.solve(wb.Problem(scene, goals=grips, constraints=FEET))
+    assert solution.status == "solved", solution.message
+    wheel = scene.objects["wheel"].placement
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        palm = wheel.actInv(figure.placement(solution.q, f"{side}_palm"))
+        outwards = np.array((*palm.translation[:2], 0.0)) / np.hypot(*palm.translation[:2])
+        assert np.hypot(*palm.translation[:2]) > 0.18
+        assert palm.rotation[:, 2] @ outwards < 0.0  # the palm looks inwards
+        assert abs(palm.rotation[:, 1] @ np.cross(outwards, (0.0, 0.0, 1.0))) > 0.95  # the rim crosses it
+        assert sign * palm.translation[1] > 0.0
+
+
+@pytest.mark.parametrize(
+    ("values", "sentence"),
+    [
+        ({"opposed": 4.0}, "opposed is 4"),
+        ({"along": 1.5, "kind": "power"}, "along is 1.5"),
+        ({"along": 0.0}, "give its side"),
+        ({"approach": "below"}, "approach"),
+        ({"opposed": np.nan}, "opposed"),
+    ],
+)
+def test_odd_options_are_refused(values: Any, sentence: str) -> None:
+    with pytest.raises(wb.InputError, match=sentence):
+        wb.Grasp("right", "thing", **values)
+
+
+def test_a_wheel_has_no_ends_to_be_along() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
+    with pytest.raises(wb.InputError, match="is a ring"):
+        wb.Problem(scene, goals=[wb.Grasp("left", "wheel", "power", along=0.5)])
