@@ -302,9 +302,9 @@ def _solve_from(make: bytes, method: Method, q: Array) -> dict[str, Any] | None:
     return {name: getattr(record, name) for name in _ANSWERED} if record.solved else None
 
 
-def _alone(method: Method) -> Method:
+def _alone(method: Any) -> Any:
     """The method without starts of its own, where it has such: those of the first solve led to nothing."""
-    return replace(method, restarts=0) if is_dataclass(method) and hasattr(method, "restarts") else method  # type: ignore[return-value, type-var]
+    return replace(method, restarts=0) if is_dataclass(method) and hasattr(method, "restarts") else method
 
 
 def fingerprint(*asked: Any) -> str:

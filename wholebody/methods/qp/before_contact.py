@@ -55,9 +55,8 @@ def before_contact(
     """
     if not any(has_face(term) for term in (*problem.goals, *problem.constraints)):
         return
-    goals, constraints = (
-        [approached(term, IN_FRONT) for term in terms] for terms in (problem.goals, problem.constraints)
-    )
+    goals = [approached(term, IN_FRONT) for term in problem.goals]
+    constraints = [approached(term, IN_FRONT) for term in problem.constraints]
     alone = lineariser.relaxed(ENDLESS)
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)

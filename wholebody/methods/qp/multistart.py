@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain
+from itertools import chain, islice
 from typing import NamedTuple
 
 import numpy as np
@@ -110,7 +110,9 @@ class Search:
         least = least_left(self.contradictions)
         if least is None:
             return
-        if self._from_before_contact() or self._accept(self._feasibility_first(start), "by feasibility first"):
+        contacts = self._from_before_contact()
+        feasible = ((self._feasibility_first(q), "by feasibility first") for q in (start,))
+        if any(self._accept(*found) for found in chain(islice(contacts, 1), feasible, contacts)):
             return
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
@@ -133,17 +135,15 @@ class Search:
             if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
                 return
 
-    def _from_before_contact(self) -> bool:
-        """Whether what is asked is met from where surfaces are in front of the faces that they are to meet."""
+    def _from_before_contact(self) -> Iterator[tuple[LocalSolution, str]]:
+        """What is reached from where surfaces are in front of the faces that they are to meet."""
         for local in before_contact(
             self.problem, self.subproblem, self.lineariser, self.solver, self.settings.seed, self.trace, self.control
         ):
             self.spent += local.iterations
-            if self._accept(self._feasibility_first(local.q), "from before contact"):
-                return True
+            yield self._feasibility_first(local.q), "from before contact"
             if self.control.spent > FOR_WAYS:
-                break
-        return False
+                return
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""
