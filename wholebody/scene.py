@@ -7,7 +7,6 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
 import pinocchio as pin
 
 from wholebody import checks
@@ -103,8 +102,7 @@ class Scene(SceneContents):
         near = workspace.near(q, 0.0)
         pieces, group = self.built.standing
         standing = near_among(self.built.table, near.placements, pieces, group, 0.0, self._held())
-        together = (np.concatenate(parts) for parts in zip(near[:-1], standing[:-1], strict=True))
-        return Contacts(*together, near.placements).nearest_first()
+        return near.joined(standing).nearest_first()
 
     def _held(self) -> list[tuple[int, int]]:
         """Pairs of things that joints hold together, as numbers of `SceneGeometry.standing`."""

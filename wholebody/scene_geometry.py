@@ -236,7 +236,7 @@ def _pairs_of_things(
     if excluded:
         kept = [(owners[first], owners[second]) not in excluded for first, second in pairs.tolist()]
         pairs = pairs[np.array(kept, dtype=bool)] if len(pairs) else pairs
-    return pairs
+    return np.asarray(pairs, dtype=np.intp)
 
 
 def _leaning(

@@ -123,7 +123,7 @@ class Sleepers:
         arm = state.position[own] - state.position[other]
         at_centre = state.velocity[other] + np.cross(state.spin[other], arm)
         spin = np.linalg.norm(state.spin[other], axis=1)
-        return np.linalg.norm(at_centre, axis=1) + spin * state.pieces.lever[own]
+        return np.asarray(np.linalg.norm(at_centre, axis=1) + spin * state.pieces.lever[own])
 
     def _moved(self) -> Array:
         """Most by which what touches each sleeper (k,) is elsewhere, within the sleeper, than when that fell asleep."""
@@ -133,4 +133,4 @@ class Sleepers:
         at_centre = state.position[other] + np.einsum("kij,kj->ki", turn, arm) - state.position[own]
         # the chord of a turn over a lever is the spectral norm of what it changes, Frobenius's over the root of two
         turned = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
-        return np.linalg.norm(at_centre, axis=1) + turned * state.pieces.lever[own]
+        return np.asarray(np.linalg.norm(at_centre, axis=1) + turned * state.pieces.lever[own])

@@ -65,6 +65,15 @@ class Contacts(NamedTuple):
         distance = number(distance, "nearer: distance", -np.inf, np.inf, "m")
         return self._rows(np.flatnonzero(self.distance < distance))
 
+    def joined(self, others: Contacts) -> Contacts:
+        """These and others at the same placements."""
+        return Contacts(
+            np.concatenate([self.pair, others.pair]), np.concatenate([self.distance, others.distance]),
+            np.concatenate([self.normal, others.normal]), np.concatenate([self.point_a, others.point_a]),
+            np.concatenate([self.point_b, others.point_b]), np.concatenate([self.number, others.number]),
+            self.placements,
+        )  # fmt: skip
+
     def _rows(self, rows: Indices) -> Contacts:
         return Contacts(
             self.pair[rows], self.distance[rows], self.normal[rows], self.point_a[rows], self.point_b[rows],

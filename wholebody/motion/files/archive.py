@@ -113,7 +113,7 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
                 with archive.open(entry) as file:
                     _check_size(file, f"{path.name}: {one_line(name, 30)}")
                 with archive.open(entry) as file:
-                    content = np.lib.format.read_array(file, allow_pickle=False)
+                    content = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
                 arrays[name] = content
     except FileFormatError:
         raise
@@ -130,9 +130,9 @@ def _check_size(file: IO[bytes], what: str) -> None:
         FileFormatError: more frames than a clip has, or more numbers than can be read as such.
         ValueError: it is no header.
     """
-    version = np.lib.format.read_magic(file)
+    version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape = read(file)[0]
+    shape: tuple[int, ...] = read(file)[0]  # type: ignore[no-untyped-call]
     if shape and shape[0] > MOST_FRAMES:
         raise FileFormatError(f"{what} has {shape[0]} frames; give 1 to {MOST_FRAMES}, or cut the clip into parts")
     size = 8 * math.prod(shape)  # as float64
