@@ -745,6 +745,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Spheres", Call(Spheres, {"centers": [[0.0, 0.0, 0.0]], "radii": [0.1]})
     yield "Spheres.pieces", Call(Spheres([[0.0, 0.0, 0.0]], [0.1]).pieces, {})
     stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
+    yield "MotionBounds", Call(wb.MotionBounds, {"jerk": 2.0, "speed": 1.5, "deviation": 0.5, "keep_ends": True})
     yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
     yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})

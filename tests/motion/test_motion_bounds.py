@@ -15,7 +15,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import AvoidProgress, MethodResult
 from wholebody.motion.measures import jerk_ratio
-from wholebody.motion.motion_bounds import excess
+from wholebody.motion.motion_bounds import excess, resolved
 
 DT = 1 / 30
 FRAMES = 90
@@ -33,7 +33,7 @@ def waves(figure: Figure, size: float) -> wb.Clip:
 
 
 def everywhere(bounds: wb.MotionBounds, count: int = FRAMES) -> wb.MotionBounds:
-    return bounds.resolved(np.ones(count, dtype=bool), np.zeros(count, dtype=bool))
+    return resolved(bounds, np.ones(count, dtype=bool), np.zeros(count, dtype=bool))
 
 
 def test_jerk_speed_and_deviation_of_sines_are_their_ratios(planar_arm: Callable[..., Figure]) -> None:

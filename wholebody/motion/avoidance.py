@@ -21,7 +21,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
-from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.motion.motion_bounds import MotionBounds, excess, resolved
 from wholebody.motion.smoothing import smoothed
 from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
@@ -277,7 +277,7 @@ def _bounds(
     for gap, pair in enumerate(pairwise(clip.q)):
         if any(isinstance(term, Bound) for term in terms.given) and terms.past_speed(gap, *pair, state) > 0.0:
             passed[gap : gap + 2] = True
-    asked = asked.resolved(free, passed)
+    asked = resolved(asked, free, passed)
     return asked, (*(term for term in given if not isinstance(term, MotionBounds)), asked)
 
 

@@ -73,19 +73,6 @@ class MotionBounds:
                 checks.number(getattr(self, name), f"MotionBounds: {name}", least, LARGEST)
         checks.flag(self.keep_ends, "MotionBounds: keep_ends")
 
-    def resolved(self, free: Mask, passed: Mask) -> MotionBounds:
-        """With the largest deviation of each frame.
-
-        Args:
-            free: (n,) original postures that need not change.
-            passed: (n,) those beside a motion to the next frame, or from the one before, that passes through something.
-        """
-        most = np.inf if self.deviation is None else self.deviation
-        largest = np.where(free & ~passed, most, np.inf)
-        if self.keep_ends:
-            largest[[0, -1]] = np.where(free[[0, -1]], 0.0, largest[[0, -1]])
-        return filled(self, largest=largest)
-
 
 class Excess(NamedTuple):
     """What a changed clip has of jerk, speed and deviation, and where that is beyond its bounds.
@@ -103,6 +90,21 @@ class Excess(NamedTuple):
     deviation: float
     beyond: Mask
     said: tuple[str, ...]
+
+
+def resolved(bounds: MotionBounds, free: Mask, passed: Mask) -> MotionBounds:
+    """Bounds with the largest deviation of each frame.
+
+    Args:
+        bounds: as they were given.
+        free: (n,) original postures that need not change.
+        passed: (n,) those beside a motion to the next frame, or from the one before, that passes through something.
+    """
+    most = np.inf if bounds.deviation is None else bounds.deviation
+    largest = np.where(free & ~passed, most, np.inf)
+    if bounds.keep_ends:
+        largest[[0, -1]] = np.where(free[[0, -1]], 0.0, largest[[0, -1]])
+    return filled(bounds, largest=largest)
 
 
 def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
