@@ -46,7 +46,8 @@ def written_pairs(rng: np.random.Generator) -> Written:
     """Write a scene of things that may overlap each other."""
     figure = body(rng)
     start = figure.figure.clamp(figure.figure.posture(figure.figure.postures[0]))
-    placed, things = Occupied(figure.figure, [start]), []
+    placed = Occupied(figure.figure, [start])
+    things: list[Thing] = []
     for _ in range(int(rng.integers(2, 9))):
         made, call = shape(rng, figure.size)
         at = somewhere(rng, placed, figure.size)
