@@ -24,7 +24,7 @@ from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks import Frame, Point, StepLimit
+from wholebody.tasks import Frame, Point
 from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
@@ -110,7 +110,7 @@ class ProblemDrag:
             elif np.isfinite(move):
                 continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
-            spent, q = spent + step.iterations, self._bounded(step.q)
+            spent, q = spent + step.iterations, step.q
             if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
                 break
@@ -126,19 +126,6 @@ class ProblemDrag:
             return self._motion.first_contact(self.q, q, GRAZE) is None
         return is_free(self._workspace, self.q, q, unswept)
 
-    def _bounded(self, q: Array) -> Array:
-        """The motion towards the posture q (nq,), as far as the velocity bounds allow in a frame."""
-        limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
-        if not limits:
-            return q
-        model, state = self._workspace.model, self._workspace.state.update(self.q)
-        way = pin.difference(model, self.q, q)
-        most = np.min(
-            [np.where(way > 0.0, high, -low) for low, high in (b.bounds(state, self.dt) for b in limits)], axis=0
-        )
-        share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
-        return q if share >= 1.0 else np.asarray(pin.integrate(model, self.q, share * way))
-
     def _came_in(self) -> float:
         """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
         deep = 0.0 if self.tracker.leaves_overlap else _depth(self._workspace, self.q)
@@ -150,7 +137,7 @@ class ProblemDrag:
         The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
         one that gets deeper first; among these the shallower end is better.
         """
-        ends = [*(self._bounded(q) for q in self.tracker.overlap_resolutions(self.q)), *tried]
+        ends = [*self.tracker.overlap_resolutions(self.q), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [
             (not self._is_free(q, 0.0), depth, number)

@@ -35,8 +35,9 @@ def sort_rows(
     The first nine arguments are the linearisation's, `number` being that of its contacts. `kind` (c,) says of each
     value whether it is an equality (0), has a lower bound (1), an upper bound (2) or both (3); `bound` (2, c) are the
     bounds. `share` (g,) are the goals' shares of the largest weight, `force` the force of all goals with these weights,
-    the least and the largest factor of their weights and the weight of equalities. A contact has fewer rows than `most_rows`. The other
-    arguments are room: `soft_values` (2, m) for errors and weights, `labels` (2, k) for contacts and keys.
+    the least and the largest factor of their weights and the weight of equalities. A contact has fewer rows than
+    `most_rows`. The other arguments are room: `soft_values` (2, m) for errors and weights, `labels` (2, k) for contacts
+    and keys.
     """
     nv, goals, values = soft.shape[1], len(goal_error), len(value)
     square = 0.0

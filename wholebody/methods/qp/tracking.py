@@ -27,7 +27,7 @@ from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
-from wholebody.tasks.bounds import StepLimit, allowed, at_speeds
+from wholebody.tasks.bounds import StepLimit, allowed, at_speeds, clipped
 from wholebody.workspace import NotCopyable
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
@@ -223,12 +223,12 @@ class QPTracker(NotCopyable):
             self._left = None if most is None else most - pin.difference(model, q, here)
             self._program.take((following - share) * self.dt)
             steps.append(self._step(here, measures and following > share))
-            path.append((following, steps[-1].q))
+            path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
         if depth > OUT:
             free = free_end(model, q, OUT, self._projection_rows)
             if free is not None:
-                path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
+                path = [(0.0, q), (1.0, free)]
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
@@ -390,6 +390,7 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
     return with_values(
         steps[-1],
+        q=path[-1][1],
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),
