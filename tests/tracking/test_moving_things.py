@@ -301,3 +301,38 @@ def test_an_overlap_that_an_escape_leaves_is_named_until_it_is_gone():
             alone += not frame.collisions
     assert alone
     assert not frame.note
+
+
+@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+def test_a_frame_says_so_where_a_thing_was_put_into_the_figure(overlap: str) -> None:
+    """The board jumps over the figure and into it; what is true is asked of all pairs of the scene."""
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.02, 0.5, 0.5)), name="board", at=(2.0, 0.0, 1.2))
+    q = scene.figure.posture("standing")
+    loop, rng, inside, free = FrameLoop(scene, q, overlap=overlap), np.random.default_rng(0), 0, 0
+    for number in range(30):
+        if number % 5 == 0:
+            scene.move("board", at=rng.uniform((-0.15, -0.3, 0.9), (0.15, 0.3, 1.4)))
+        frame = loop.frame(q)
+        overlaps = scene.contacts(frame.q, within=-1.2e-4)
+        assert not len(overlaps.distance) or "board" in frame.note
+        assert bool(frame.note) <= bool(len(scene.contacts(frame.q, within=-1e-5).distance) or frame.collisions)
+        inside, free = inside + bool(len(overlaps.distance)), free + (not len(overlaps.distance))
+    assert inside
+    assert free
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_a_step_names_what_was_put_into_the_figure(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.05)])
+    for moved in (as_method(method).tracker(problem, DT).step, wb.Drag(problem, method, dt=DT).to):
+        scene.move("ball", at=(0.7, 2.0, 0.0))
+        drags = moved.__name__ == "to"
+        assert not moved(tip if drags else start).collisions
+        scene.move("ball", at=tip + (-0.15, 0.02, 0.0))
+        answer = moved(tip if drags else start)
+        assert [one.second for one in answer.collisions] == ["ball"]
+        assert answer.collisions[0].inside
+        assert answer.collisions[0].depth == pytest.approx(-scene.contacts(answer.q, 0.0).distance[0], abs=1e-5)

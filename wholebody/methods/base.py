@@ -204,7 +204,7 @@ class SolvingTracker(NotCopyable):
     def step(self, q: Array) -> SolvedStep:
         """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
         self.workspace.refresh()
-        motion, step = self.workspace.next_frame(), self.frame(q)
+        motion, step = self.workspace.next_frame(q), self.frame(q)
         if motion is None:
             return step
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))

@@ -75,7 +75,7 @@ class ProblemDrag:
                 step = self.tracker.frame(self.q)
                 self.q, iterations, collisions = step.q, step.iterations, getattr(step, "collisions", ())
             else:
-                before, self._motion = self.q, self._workspace.next_frame()
+                before, self._motion = self.q, self._workspace.next_frame(self.q)
                 iterations = self._followed()
                 if self._motion is not None:
                     collisions = judged(self._workspace, self._motion, before, self.q)

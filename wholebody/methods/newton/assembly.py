@@ -291,7 +291,7 @@ class Assembly(AssemblyJoints):
         with self._alone:
             active = self._ready(None).active
             start = active.begin(self.variables(), self._goal_batches())
-            motion = None if active.contacts is None else active.workspace.next_frame()
+            motion = None if active.contacts is None else active.workspace.next_frame(self.q)
             if motion is None:
                 return self._newton_frame(active, start, tolerance)
             return self._among_moving(active, start, tolerance, motion)

@@ -155,7 +155,7 @@ class QPTracker(NotCopyable):
             self.problem.check_fresh()
             self.workspace.refresh()
             self._renew()
-            motion = self.workspace.next_frame()
+            motion = self.workspace.next_frame(q)
             return self._step(q, measures) if motion is None else self._among_moving(q, measures, motion)
 
     def frame(self, q: Array, tolerance: float | None = None) -> FrameStep:
@@ -225,7 +225,7 @@ class QPTracker(NotCopyable):
             steps.append(self._step(here, measures and following > share))
             path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
-        if depth > OUT:
+        if depth > OUT and not motion.still:
             free = free_end(model, q, OUT, self._projection_rows)
             if free is not None:
                 path = [(0.0, q), (1.0, free)]
