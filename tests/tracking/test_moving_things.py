@@ -336,3 +336,38 @@ def test_a_step_names_what_was_put_into_the_figure(planar_arm, method: str) -> N
         assert [one.second for one in answer.collisions] == ["ball"]
         assert answer.collisions[0].inside
         assert answer.collisions[0].depth == pytest.approx(-scene.contacts(answer.q, 0.0).distance[0], abs=1e-5)
+
+
+def test_a_frame_of_a_drag_shows_the_way_that_was_found_free() -> None:
+    """Straight between its frames the figure goes through the board; along the paths it does not."""
+    straight = inner = 0.0
+    for seed in range(1):
+        throw = Thrown(seed, "board", 2.5, 3.0)
+        limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+        problem = problem_of(throw.scene, constraints=[limits])
+        drag = wb.Drag(problem, "qp", dt=DT)
+        for _ in range(throw.frames):
+            before, way = drag.q, throw.next()
+            frame = drag.to(problem.goals[0].target)
+            assert frame.path[0] == (0.0, pytest.approx(before))
+            assert frame.path[-1] == (1.0, pytest.approx(frame.q))
+            if not frame.collisions and len(frame.path) > 2:
+                inner = max(inner, throw.deepest(frame.path, way))
+                straight = max(straight, throw.deepest(((0.0, before), (1.0, frame.q)), way, 40))
+    assert inner < 4e-4
+    assert straight > 2.0 * inner
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_drags_by_all_methods_have_paths_where_things_moved(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    drag = wb.Drag(wb.Problem(scene, start, goals=[wb.Point("tip", tip)]), method, dt=DT)
+    assert drag.to(tip).path == ()
+    before = drag.q
+    scene.move("ball", at=(0.7, 1.5, 0.0), over=DT)
+    frame = drag.to(tip)
+    assert frame.path[0][1] == pytest.approx(before)
+    assert frame.path[-1][1] == pytest.approx(frame.q)
+    assert [share for share, _ in frame.path] == sorted(share for share, _ in frame.path)

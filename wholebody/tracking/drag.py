@@ -10,7 +10,6 @@ import time
 from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import posture, shown, time_step
@@ -70,17 +69,19 @@ class ProblemDrag:
         with self._alone:
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
-            collisions: tuple[Collision, ...] = ()
+            collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q)
-                self.q, iterations, collisions = step.q, step.iterations, getattr(step, "collisions", ())
+                self.q, iterations = step.q, step.iterations
+                collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
                 before, self._motion = self.q, self._workspace.next_frame(self.q)
                 iterations = self._followed()
                 if self._motion is not None:
                     collisions = judged(self._workspace, self._motion, before, self.q)
+                    path = ((0.0, before), (1.0, self.q))
             error = goal_error(self.problem, self._workspace, self.q)
-            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions)
+            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> Solution:
         """Meet the present goal with the method's full accuracy, and assess the posture."""

@@ -73,6 +73,7 @@ class AssemblyStep(NamedTuple):
         systems: linear systems solved.
         taken: whether the bodies moved there.
         collisions: what things that move passed through, or are inside of; empty if nothing.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
     """
 
     goal_error: float
@@ -81,6 +82,7 @@ class AssemblyStep(NamedTuple):
     systems: int
     taken: bool
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class Assembly(AssemblyJoints):
@@ -329,7 +331,9 @@ class Assembly(AssemblyJoints):
         counts = [(step.iterations, step.systems) for step in steps]
         iterations, systems = (sum(column) for column in zip(*counts, strict=True))
         taken = any(step.taken for step in steps)
-        return AssemblyStep(steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions)
+        return AssemblyStep(
+            steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions, tuple(path)
+        )  # fmt: skip
 
     def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
         """Whether the motion of a frame passes through nothing."""

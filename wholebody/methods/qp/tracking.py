@@ -82,12 +82,13 @@ class FrameStep(NamedTuple):
     Attributes:
         q: (nq,) the next posture.
         iterations: programs.
-        collisions: see `QPStep`.
+        collisions, path: see `QPStep`.
     """
 
     q: Array
     iterations: int
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class QPTracker(NotCopyable):
@@ -174,7 +175,7 @@ class QPTracker(NotCopyable):
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS[exact]
         last, error, way = self.step(q), np.inf, np.inf
         if last.path:
-            return FrameStep(last.q, len(last.path) - 1, last.collisions)
+            return FrameStep(last.q, len(last.path) - 1, last.collisions, last.path)
         for spent in range(1, most):
             before, error = error, goal_error(self.problem, self.workspace, last.q)
             longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
@@ -225,10 +226,8 @@ class QPTracker(NotCopyable):
             steps.append(self._step(here, measures and following > share))
             path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
-        if depth > OUT and not motion.still:
-            free = free_end(model, q, OUT, self._projection_rows)
-            if free is not None:
-                path = [(0.0, q), (1.0, free)]
+        free = None if depth <= OUT or motion.still else free_end(model, q, OUT, self._projection_rows)
+        path = path if free is None else [(0.0, q), (1.0, free)]
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
