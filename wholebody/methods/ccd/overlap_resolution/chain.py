@@ -154,7 +154,7 @@ class ChainResolver:
         first = limbs.frame(own[-1])
         there = _columns(limbs.frames[link.node]).copy()
         if tracked is not None:
-            wanted = np.asarray(tracked.oMi[limbs.joints[link.node]].rotation).T
+            wanted = np.ascontiguousarray(tracked.oMi[limbs.joints[link.node]].rotation.T)
             if np.abs(wanted - there).max() < PARALLEL:  # otherwise it is another way that the tracked limb takes
                 there = wanted
                 self.translated.update(limbs.joints[node] for node in link.nodes)
