@@ -10,6 +10,7 @@ import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.errors import InputError
+from wholebody.records import with_values
 
 APART = 1e-3  # share of a frame: postures that follow each other at once are shown this far apart
 
@@ -62,4 +63,4 @@ def timed(postures: Sequence[Array], paths: Sequence[Sequence[tuple[float, Array
         found.shares.extend([*reversed(shares), 1.0])
         found.frames.extend([frame] * (len(inner) + 1))
     times = (np.array(found.frames) - 1.0 + np.array(found.shares)) * dt
-    return found._replace(times=times)
+    return with_values(found, times=times)
