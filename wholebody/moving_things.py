@@ -83,6 +83,7 @@ class FrameMotion:
     Attributes:
         names: of the things.
         way: (n,) longest way of any point of each piece that moves by itself, metres; 0 for all others.
+        still: whether nothing moves: things were put into the figure, or are still in it.
     """
 
     def __init__(self, both: _BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
@@ -95,6 +96,7 @@ class FrameMotion:
         )
         self.way = self._ways(moved)
         self._fastest = float(self.way.max(initial=0.0))
+        self.still = self._fastest == 0.0
 
     def placements(self, share: float) -> dict[str, pin.SE3]:
         """Where each thing is after a share of the frame, in the frame of the joint that carries it."""

@@ -133,7 +133,7 @@ class SceneGeometry:
         Args:
             proximity: of a run.
             seen: number of moves that it has seen.
-            moved: takes the objects that moved, and were not put, with their placements before and after.
+            moved: takes the objects that moved, with their placements before and after; of those put, after as both.
         """
         if seen == self.moves:
             return seen
@@ -149,13 +149,13 @@ class SceneGeometry:
             if not pieces or self._moved_at[pieces[0][0]] <= seen:
                 continue
             index, local = pieces[0]
-            if self._put_at.get(name, 0) > seen:
-                moved.pop(name, None)
-                continue
             before, after = (
                 model.geometryObjects[index].placement * local.inverse()
                 for model in (proximity.geometry, self.geometry)
             )
+            if self._put_at.get(name, 0) > seen:
+                moved[name] = (after, after)
+                continue
             moved[name] = (moved[name][0] if name in moved else before, after)
 
     def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:

@@ -15,6 +15,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.approach import largest_approach
+from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene_geometry import SceneGeometry
 
@@ -52,8 +53,8 @@ class Workspace(NotCopyable):
         owners: the segment or object that each piece is part of.
         state: moves from posture to posture.
         proximity: distances between the pieces.
-        moved: things that moved since the last `next_frame`, with their placements before and after; what was put
-            somewhere did not move.
+        moved: things that moved since the last `next_frame`, with their placements before and after; those that were
+            put somewhere did not move, and have where they are as both.
     """
 
     def __init__(self, built: SceneGeometry) -> None:
@@ -94,11 +95,21 @@ class Workspace(NotCopyable):
         index, local = self._built.pieces_of[name][0]
         return self.geometry.geometryObjects[index].placement * local.inverse()
 
-    def next_frame(self) -> FrameMotion | None:
+    def next_frame(self, q: Array) -> FrameMotion | None:
         """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
 
-        Things are where it ends.
+        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told.
+
+        Args:
+            q: (nq,) posture of the figure at the beginning.
         """
+        still = [name for name, (before, after) in self.moved.items() if before == after]
+        if still:
+            overlapping = self.near(q, -INSIDE).pair
+            inside = {self.owners[piece] for piece in overlapping.ravel().tolist()}
+            for name in still:
+                if name not in inside:
+                    del self.moved[name]
         if not (self.moved or self._inside):
             return None
         moved = {name: (self.where(name),) * 2 for name in self._inside} | self.moved

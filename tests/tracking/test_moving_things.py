@@ -301,3 +301,73 @@ def test_an_overlap_that_an_escape_leaves_is_named_until_it_is_gone():
             alone += not frame.collisions
     assert alone
     assert not frame.note
+
+
+@pytest.mark.parametrize("overlap", ["qp", "ccd"])
+def test_a_frame_says_so_where_a_thing_was_put_into_the_figure(overlap: str) -> None:
+    """The board jumps over the figure and into it; what is true is asked of all pairs of the scene."""
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.02, 0.5, 0.5)), name="board", at=(2.0, 0.0, 1.2))
+    q = scene.figure.posture("standing")
+    loop, rng, inside, free = FrameLoop(scene, q, overlap=overlap), np.random.default_rng(0), 0, 0
+    for number in range(30):
+        if number % 5 == 0:
+            scene.move("board", at=rng.uniform((-0.15, -0.3, 0.9), (0.15, 0.3, 1.4)))
+        frame = loop.frame(q)
+        overlaps = scene.contacts(frame.q, within=-1.2e-4)
+        assert not len(overlaps.distance) or "board" in frame.note
+        assert bool(frame.note) <= bool(len(scene.contacts(frame.q, within=-1e-5).distance) or frame.collisions)
+        inside, free = inside + bool(len(overlaps.distance)), free + (not len(overlaps.distance))
+    assert inside
+    assert free
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_a_step_names_what_was_put_into_the_figure(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    problem = wb.Problem(scene, start, goals=[wb.Point("tip", tip)], constraints=[wb.StepLimit(0.05)])
+    for moved in (as_method(method).tracker(problem, DT).step, wb.Drag(problem, method, dt=DT).to):
+        scene.move("ball", at=(0.7, 2.0, 0.0))
+        drags = moved.__name__ == "to"
+        assert not moved(tip if drags else start).collisions
+        scene.move("ball", at=tip + (-0.15, 0.02, 0.0))
+        answer = moved(tip if drags else start)
+        assert [one.second for one in answer.collisions] == ["ball"]
+        assert answer.collisions[0].inside
+        assert answer.collisions[0].depth == pytest.approx(-scene.contacts(answer.q, 0.0).distance[0], abs=1e-5)
+
+
+def test_a_frame_of_a_drag_shows_the_way_that_was_found_free() -> None:
+    """Straight between its frames the figure goes through the board; along the paths it does not."""
+    straight = inner = 0.0
+    for seed in range(1):
+        throw = Thrown(seed, "board", 2.5, 3.0)
+        limits = wb.StepLimit(12.0, root_velocity=4.0, root_turn=6.0)
+        problem = problem_of(throw.scene, constraints=[limits])
+        drag = wb.Drag(problem, "qp", dt=DT)
+        for _ in range(throw.frames):
+            before, way = drag.q, throw.next()
+            frame = drag.to(problem.goals[0].target)
+            assert frame.path[0] == (0.0, pytest.approx(before))
+            assert frame.path[-1] == (1.0, pytest.approx(frame.q))
+            if not frame.collisions and len(frame.path) > 2:
+                inner = max(inner, throw.deepest(frame.path, way))
+                straight = max(straight, throw.deepest(((0.0, before), (1.0, frame.q)), way, 40))
+    assert inner < 4e-4
+    assert straight > 2.0 * inner
+
+
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+def test_drags_by_all_methods_have_paths_where_things_moved(planar_arm, method: str) -> None:
+    scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
+    start = np.array([0.1, 0.2, 0.2])
+    tip = scene.state(start).frame(scene.frame_id("tip")).translation.copy()
+    drag = wb.Drag(wb.Problem(scene, start, goals=[wb.Point("tip", tip)]), method, dt=DT)
+    assert drag.to(tip).path == ()
+    before = drag.q
+    scene.move("ball", at=(0.7, 1.5, 0.0), over=DT)
+    frame = drag.to(tip)
+    assert frame.path[0][1] == pytest.approx(before)
+    assert frame.path[-1][1] == pytest.approx(frame.q)
+    assert [share for share, _ in frame.path] == sorted(share for share, _ in frame.path)

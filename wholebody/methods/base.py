@@ -20,6 +20,7 @@ from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
+from wholebody.tasks.bounds import at_speeds, shortened
 from wholebody.workspace import NotCopyable, Workspace
 
 
@@ -61,7 +62,7 @@ class Tracker(Protocol):
         """One step from the posture q (nq,) towards the goals, within the velocity bounds."""
 
     def frame(self, q: Array, tolerance: float | None = None) -> Step:
-        """One frame of a motion: a few steps from q (nq,) until the goals are within a tolerance.
+        """One frame of a motion, within the velocity bounds: steps from q (nq,) until the goals are within a tolerance.
 
         Args:
             q: posture at the beginning of the frame.
@@ -167,7 +168,9 @@ class SolvedStep(NamedTuple):
 
 
 class SolvingTracker(NotCopyable):
-    """Follows goals by solving the problem anew at every step from the present posture, without velocity bounds.
+    """Follows goals by solving the problem anew at every step from the present posture.
+
+    A step goes towards the answer as far as bounds on velocities allow.
 
     Attributes:
         problem: the problem whose goals it follows.
@@ -201,7 +204,7 @@ class SolvingTracker(NotCopyable):
     def step(self, q: Array) -> SolvedStep:
         """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
         self.workspace.refresh()
-        motion, step = self.workspace.next_frame(), self.frame(q)
+        motion, step = self.workspace.next_frame(q), self.frame(q)
         if motion is None:
             return step
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
@@ -211,7 +214,7 @@ class SolvingTracker(NotCopyable):
         if tolerance is not None:
             tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
-        return SolvedStep(np.asarray(solution.q, dtype=float), solution.iterations, solution.assessment.seconds)
+        return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, from the start q (nq,)."""
@@ -225,6 +228,11 @@ class SolvingTracker(NotCopyable):
         """No postures."""
         posture(q, self.workspace.model.nq)
         return ()
+
+    def bounded(self, q: Array, end: Array) -> Array:
+        """The motion from q to `end`, both (nq,), as far as bounds on velocities allow in a step."""
+        most = at_speeds(self.problem.bounds, self.workspace.state.update(q), self.dt)
+        return shortened(self.workspace.model, q, np.asarray(end, dtype=float), most)
 
     def _begun(self, q: Array) -> Problem:
         """The present problem with the start q (nq,)."""

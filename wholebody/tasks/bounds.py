@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import instance, number, shown
@@ -118,6 +119,29 @@ def at_speeds(bounds: Sequence[Bound], state: State, dt: float | None) -> Array 
     """Displacements (2, nv) from a state that bounds on velocities allow in dt seconds; None without such bounds."""
     ranges = np.array([bound.bounds(state, dt) for bound in bounds if isinstance(bound, StepLimit)])
     return np.array([ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0)]) if len(ranges) else None
+
+
+def clipped(model: pin.Model, begin: Array, q: Array, most: Array | None) -> Array:
+    """The posture q, or the nearest one whose displacement from `begin`, both (nq,), is within `most` (2, nv).
+
+    Displacements of a root that turns do not add: parts of a motion that are each within bounds may exceed them
+    together.
+    """
+    if most is None:
+        return q
+    gone = pin.difference(model, begin, q)
+    kept = np.clip(gone, *most)
+    return q if np.array_equal(gone, kept) else np.asarray(pin.integrate(model, begin, kept))
+
+
+def shortened(model: pin.Model, begin: Array, q: Array, most: Array | None) -> Array:
+    """The motion from `begin` towards q, both (nq,), as far as its displacement is within `most` (2, nv)."""
+    if most is None:
+        return q
+    way = pin.difference(model, begin, q)
+    bound = np.where(way > 0.0, most[1], -most[0])
+    share = float(np.min(np.where(np.abs(way) > bound, bound / np.maximum(np.abs(way), 1e-12), 1.0)))
+    return q if share >= 1.0 else np.asarray(pin.integrate(model, begin, share * way))
 
 
 def allowed(bounds: Sequence[Bound], limits: Limits, state: State, dt: float | None) -> Array:

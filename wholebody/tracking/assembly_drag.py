@@ -24,6 +24,8 @@ class DragFrame(NamedTuple):
         iterations: iterations of the method.
         seconds: wall time.
         collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight
+            from one to the next nothing was passed but the collisions.
     """
 
     q: Array
@@ -31,6 +33,7 @@ class DragFrame(NamedTuple):
     iterations: int
     seconds: float
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
 
     def __repr__(self) -> str:
         hit = f", {len(self.collisions)} collisions" if self.collisions else ""
@@ -65,6 +68,7 @@ class AssemblyDrag:
             InputError: the target is not one.
         """
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
+        path: tuple[tuple[float, Array], ...] = ()
         made, goal = self.assembly, self._goal
         made.retarget(goal, target)
         error = made.goal_error(goal)
@@ -76,12 +80,15 @@ class AssemblyDrag:
                     continue  # the goal is nearer than that, and was tried already
                 step = made.step()
                 spent, collisions = spent + step.iterations, collisions or step.collisions
+                path = step.path or path
                 if step.taken:
                     break
         finally:
             made.retarget(goal, target)
         left = max(made.goal_error(number) for number in range(len(made.goals)))
-        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions)
+        if path and not np.array_equal(path[-1][1], made.q):
+            path = (*path, (1.0, made.q))
+        return DragFrame(made.q, left, spent, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> AssemblySolution:
         """Meet the present goals with full accuracy."""

@@ -11,6 +11,7 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Bound
+from wholebody.tasks.bounds import clipped
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
 
@@ -48,6 +49,10 @@ class FrameMotionLimit(Bound):
     def begin(self, q: Array) -> None:
         """Begin a frame at the posture q (nq,)."""
         self._begin = np.array(q)
+
+    def kept(self, model: pin.Model, q: Array) -> Array:
+        """The posture q (nq,), or the nearest one within the motion of a frame."""
+        return clipped(model, self._begin, q, np.stack([-self._limit, self._limit]))
 
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
         """The remaining motion of the frame."""

@@ -10,7 +10,6 @@ import time
 from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.arrays import Array
 from wholebody.checks import posture, shown, time_step
@@ -24,7 +23,7 @@ from wholebody.moving_things import Collision, FrameMotion
 from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.solution import Solution
-from wholebody.tasks import Frame, Point, StepLimit
+from wholebody.tasks import Frame, Point
 from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
@@ -70,17 +69,19 @@ class ProblemDrag:
         with self._alone:
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
-            collisions: tuple[Collision, ...] = ()
+            collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
                 step = self.tracker.frame(self.q)
-                self.q, iterations, collisions = step.q, step.iterations, getattr(step, "collisions", ())
+                self.q, iterations = step.q, step.iterations
+                collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
-                before, self._motion = self.q, self._workspace.next_frame()
+                before, self._motion = self.q, self._workspace.next_frame(self.q)
                 iterations = self._followed()
                 if self._motion is not None:
                     collisions = judged(self._workspace, self._motion, before, self.q)
+                    path = ((0.0, before), (1.0, self.q))
             error = goal_error(self.problem, self._workspace, self.q)
-            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions)
+            return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> Solution:
         """Meet the present goal with the method's full accuracy, and assess the posture."""
@@ -110,7 +111,7 @@ class ProblemDrag:
             elif np.isfinite(move):
                 continue  # the goal is nearer than that, and was tried already
             step = self.tracker.frame(self.q)
-            spent, q = spent + step.iterations, self._bounded(step.q)
+            spent, q = spent + step.iterations, step.q
             if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
                 break
@@ -126,19 +127,6 @@ class ProblemDrag:
             return self._motion.first_contact(self.q, q, GRAZE) is None
         return is_free(self._workspace, self.q, q, unswept)
 
-    def _bounded(self, q: Array) -> Array:
-        """The motion towards the posture q (nq,), as far as the velocity bounds allow in a frame."""
-        limits = [bound for bound in self.problem.bounds if isinstance(bound, StepLimit)]
-        if not limits:
-            return q
-        model, state = self._workspace.model, self._workspace.state.update(self.q)
-        way = pin.difference(model, self.q, q)
-        most = np.min(
-            [np.where(way > 0.0, high, -low) for low, high in (b.bounds(state, self.dt) for b in limits)], axis=0
-        )
-        share = float(np.min(np.where(np.abs(way) > most, most / np.maximum(np.abs(way), 1e-12), 1.0)))
-        return q if share >= 1.0 else np.asarray(pin.integrate(model, self.q, share * way))
-
     def _came_in(self) -> float:
         """Depth of overlap of the figure, metres; 0 if it is small, or if the tracker itself leads out."""
         deep = 0.0 if self.tracker.leaves_overlap else _depth(self._workspace, self.q)
@@ -150,7 +138,7 @@ class ProblemDrag:
         The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
         one that gets deeper first; among these the shallower end is better.
         """
-        ends = [*(self._bounded(q) for q in self.tracker.overlap_resolutions(self.q)), *tried]
+        ends = [*self.tracker.overlap_resolutions(self.q), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
         out = [
             (not self._is_free(q, 0.0), depth, number)

@@ -47,6 +47,7 @@ class Dragged:
         seconds, cpu_seconds: (n,) of each frame: wall time, and the processor's for this thread.
         iterations: (n,) of the method in each frame.
         end: the solution at the end.
+        paths: the way to each posture, as in `DragFrame`; empty where it is straight.
     """
 
     q: Array
@@ -57,6 +58,7 @@ class Dragged:
     cpu_seconds: Array
     iterations: Counts
     end: Solution
+    paths: tuple[tuple[tuple[float, Array], ...], ...] = ()
 
     def __len__(self) -> int:
         """Return the number of frames, without start and end."""
@@ -138,6 +140,7 @@ def drag_along(
     wall: list[float] = []
     cpu: list[float] = []
     iterations: list[int] = []
+    paths: list[tuple[tuple[float, Array], ...]] = [()]
     while len(wall) < len(aims) or _lags(left, len(wall) - len(aims)):
         began = time.thread_time()
         frame = drag.to(aims[min(len(wall), len(aims) - 1)])
@@ -145,6 +148,7 @@ def drag_along(
         wall.append(frame.seconds)
         postures.append(frame.q)
         iterations.append(frame.iterations)
+        paths.append(frame.path)
         left.append(frame.error)
         if progress is not None:
             progress(min(len(wall), len(aims)))
@@ -159,6 +163,7 @@ def drag_along(
         cpu_seconds=np.array(cpu),
         iterations=np.array(iterations, dtype=np.intp),
         end=end,
+        paths=(*paths, ()),
     )
 
 

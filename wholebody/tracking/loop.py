@@ -22,6 +22,7 @@ from wholebody.errors import InputError
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
+from wholebody.methods.base import judged
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
 from wholebody.moving_things import Collision, FrameMotion
@@ -55,7 +56,8 @@ class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
     Things may be moved between frames. One that moves during a frame (`Scene.move` with `over`) is met on its way: with
-    "qp" the figure gets out of its way as it comes. What could not be avoided is named in the frame.
+    "qp" the figure gets out of its way as it comes. One that was put into the figure is left as fast as joints may
+    move. What could not be avoided, and what the figure is still inside of, is named in the frame.
 
     Attributes:
         scene: the figure among things.
@@ -123,16 +125,21 @@ class FrameLoop(NotCopyable):
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
         reason = invalid_reason(self.scene, goal)
         self._workspace.refresh()
-        motion = self._workspace.next_frame()
+        motion = self._workspace.next_frame(self.shown)
         if reason:
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
             self._said = self._said or self.scene.figure.warn_of_angles(goal, "tracked")  # once for all frames
             resolution = self._strategy.resolve(self.shown, self._within_limits(goal))
-        if motion is not None:
+        if motion is None:
+            return self._shown(self._kept_from_passing(resolution), began=began)
+        if not motion.still:
             resolution, collisions = self._kept_from_moving(resolution, motion)
             return self._shown(resolution, collisions, resolution.path, began=began)
-        return self._shown(self._kept_from_passing(resolution), began=began)
+        resolution = self._kept_from_passing(resolution)
+        collisions = judged(self._workspace, motion, self.shown, resolution.candidates[0])
+        note = "; ".join(part for part in (resolution.note, *map(str, collisions)) if part)
+        return self._shown(with_values(resolution, note=note), collisions, began=began)
 
     def _shown(
         self,

@@ -88,7 +88,8 @@ class QPStrategy:
         path: list[tuple[float, Array]] = []
         while len(candidates) < STEPS:
             step = self._tracker.step(q)
-            q = self._into_cones(step.q)  # rows are exact to first order only, and have one edge at a corner of a cone
+            # steps of a root that turns do not add, and rows of cones are exact to first order only
+            q = self._into_cones(self._motion_limit.kept(self.scene.model, step.q))
             candidates.append(q)
             path += [*step.path[:-1], (1.0, q)] if step.path else [(1.0, q)] if path else []
             if np.abs(step.displacement).max() < SETTLED or not step.rows:

@@ -27,6 +27,7 @@ class Recording:
         seconds, cpu_seconds, contact_seconds, solve_seconds: (n,) as in `Frame`.
         iterations, joints, pairs: (n,) as in `Frame`.
         notes: a note for each frame, mostly empty.
+        paths: the way to each posture, as in `Frame`; empty where it is straight.
         moves: things that moved, with their placements at the ends of the frames.
     """
 
@@ -42,6 +43,7 @@ class Recording:
     joints: Counts
     pairs: Counts
     notes: tuple[str, ...]
+    paths: tuple[tuple[tuple[float, Array], ...], ...] = ()
     moves: Mapping[str, Sequence[pin.SE3]] = field(default_factory=dict)
 
     @classmethod
@@ -67,6 +69,7 @@ class Recording:
             joints=np.array([frame.joints for frame in frames], dtype=np.intp),
             pairs=np.array([frame.pairs for frame in frames], dtype=np.intp),
             notes=tuple(frame.note for frame in frames),
+            paths=tuple(frame.path for frame in frames),
             moves={} if moves is None else dict(moves),
         )
 

@@ -144,16 +144,14 @@ class Track(NamedTuple):
         return track
 
 
-def set_animation(tracks: Sequence[Track], dt: float, frames: int, repetitions: float) -> Command:
+def set_animation(tracks: Sequence[Track], times: Array, repetitions: float) -> Command:
     """Let the page play a motion by its own clock.
 
     Args:
         tracks: the changing properties.
-        dt: seconds from frame to frame.
-        frames: number of frames.
+        times: (n,) of the frames, seconds, ascending.
         repetitions: number of times it is played; infinity for ever.
     """
-    times = np.asarray(np.arange(frames) * dt, dtype=float)
     clips: dict[str, list[dict[str, Any]]] = {}
     for track in tracks:
         clips.setdefault(track.path, []).append(track.lower(times))

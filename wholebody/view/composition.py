@@ -19,6 +19,7 @@ from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
 from wholebody.view.contact_markers import color_contacts, mark_contacts, mark_overlaps
 from wholebody.view.goal_markers import Goals, mark_frames
+from wholebody.view.inner_paths import Timed
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.viewed_scene import ViewedScene
@@ -117,17 +118,19 @@ class Composition:
         for number, q in enumerate(postures):
             self.bodies.ghost(self._graph, number, self._state.update(q).data, color)
 
-    def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: style.Color) -> list[Array]:
-        """Add a moving ghost to a motion's keyframes; return its first posture.
+    def moving_ghost(
+        self, keyframes: Sequence[Keyframe], postures: Any, color: style.Color, played: Timed
+    ) -> list[Array]:
+        """Add a moving ghost, one posture a frame, to a motion's keyframes; return its first posture.
 
         Raises:
             InputError: not as many postures as keyframes, or one has the wrong shape or is not finite.
         """
-        checked = [self.checked(q) for q in postures]
-        if len(checked) != len(keyframes):
-            raise InputError(f"the ghost has {len(checked)} postures and the motion {len(keyframes)}; give as many")
+        checked, count = [self.checked(q) for q in postures], played.frames[-1] + 1
+        if len(checked) != count:
+            raise InputError(f"the ghost has {len(checked)} postures and the motion {count}; give as many")
         self.ghosts(checked[:1], color)
-        for keyframe, q in zip(keyframes, checked, strict=True):
+        for keyframe, q in zip(keyframes, played.between(self.scene.model, checked), strict=True):
             self.bodies.pose_ghost(keyframe, 0, self._state.update(q).data)
         return checked[:1]
 

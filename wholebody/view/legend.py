@@ -45,15 +45,16 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
     return list(found.items())
 
 
-def status(keyframes: Sequence[Keyframe], dt: float, found: Assessment | None) -> str:
+def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessment | None) -> str:
     """One line about what is shown.
 
     Args:
-        keyframes: of the postures that are shown.
+        keyframes: of the postures that are shown, and of the ways between them.
+        count: number of the postures.
         dt: seconds from one to the next.
         found: assessment of the only posture, where a problem is shown.
     """
-    said = [f"{len(keyframes)} postures, {(len(keyframes) - 1) * dt:.2f} s"] if len(keyframes) > 1 else []
+    said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:
         angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > SMALLEST_ANGLE else ""
         said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
@@ -66,8 +67,8 @@ def status(keyframes: Sequence[Keyframe], dt: float, found: Assessment | None) -
     return "; ".join(said)
 
 
-def panel(title: str, keyframes: Sequence[Keyframe], dt: float, found: Assessment | None = None) -> Command:
+def panel(title: str, keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessment | None = None) -> Command:
     """The command that puts the panel on the page; the arguments are those of `status`, and the page's title."""
     rows = [[meaning, *(round(255 * float(part)) for part in color)] for meaning, color in legend(keyframes)]
-    message = {"type": "panel", "title": title, "status": status(keyframes, dt, found), "legend": rows}
+    message = {"type": "panel", "title": title, "status": status(keyframes, count, dt, found), "legend": rows}
     return Command(OBJECT, NODE, "", pack(message))

@@ -116,8 +116,8 @@ class SceneGraph:
                 self.place(path, keyframe.markers[path][1])
         self.flush()
 
-    def play(self, keyframes: Sequence[Keyframe], dt: float, repetitions: float) -> None:
-        """Let the page play these keyframes, dt seconds apart. A marker that changes its appearance is left out."""
+    def play(self, keyframes: Sequence[Keyframe], times: Array, repetitions: float) -> None:
+        """Let the page play keyframes at times (n,), seconds. A marker that changes its appearance is left out."""
         later: set[str] = set()
         for keyframe in keyframes[1:]:
             for path, (marker, place) in keyframe.markers.items():
@@ -128,7 +128,7 @@ class SceneGraph:
                         later.add(path)
         self.show(keyframes[0])
         tracks = [*_placements(keyframes), *_colors(keyframes), *self._appearances(keyframes)]
-        self.do(commands.set_animation(tracks, dt, len(keyframes), repetitions))
+        self.do(commands.set_animation(tracks, times, repetitions))
         self.flush()
 
     def do(self, command: Command) -> None:

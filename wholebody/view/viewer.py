@@ -28,6 +28,7 @@ from wholebody.view.camera import look
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.gltf import posture_glb
+from wholebody.view.inner_paths import timed
 from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, static_page
@@ -130,7 +131,7 @@ class Viewer:
         self._seen, self._motion, self._shown = [posture], None, (posture, problem, marked)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
-        self._graph.do(panel(self.title, [keyframe], DEFAULT_DT, found))
+        self._graph.do(panel(self.title, [keyframe], 1, DEFAULT_DT, found))
         self._graph.show(keyframe)
 
     def play(
@@ -140,7 +141,7 @@ class Viewer:
         """Let the page play a motion; returns at once. The page has a bar to pause and scrub.
 
         Args:
-            motion: postures, (n, nq) or a list of (nq,), or a clip with `q` and `dt`.
+            motion: postures, (n, nq) or a list of (nq,), or a clip with `q` and `dt`, and maybe `paths` within frames.
             dt: seconds from posture to posture; by default the clip's own, or 1/30.
             problem: a `wholebody.Problem` whose goals are drawn.
             ghost: the same number of postures, shown transparent; they replace earlier ghosts.
@@ -149,8 +150,7 @@ class Viewer:
             overlaps: overlaps of whole objects at each posture; see `show`.
 
         Raises:
-            InputError: there is no posture, one has the wrong shape, the time step or the repeats are not positive, or
-                there are not as many overlaps as postures.
+            InputError: no posture, one of a wrong shape, a time step or repeats that are not positive, or other counts.
         """
         self._composition.pieces = checks.flag(pieces, "pieces")
         given = checks.listed(getattr(motion, "q", motion), "motion", "postures, each of shape (nq,)")
@@ -166,17 +166,17 @@ class Viewer:
                 f"overlaps has {len(marked)} entries and the motion {len(postures)} postures; give as many"
             )
         marked = [checked_overlaps(one, f"overlaps[{number}]") for number, one in enumerate(marked)]
-        made = self._composition.keyframe
-        keyframes = [made(q, problem, overlaps=here) for q, here in zip(postures, marked, strict=True)]
+        made, played = self._composition.keyframe, timed(postures, getattr(motion, "paths", ()), step)
+        keyframes = [made(q, problem, overlaps=marked[k]) for q, k in zip(played.q, played.frames, strict=True)]
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
-            self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST)
+            self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST, played)
         self._motion, self._shown = (len(postures), step), None
         chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
         self._seen = [postures[index] for index in chosen]
         self._graph.do(self._camera_command())
-        self._graph.do(panel(self.title, keyframes, step))
-        self._graph.play(keyframes, step, repeat)
+        self._graph.do(panel(self.title, keyframes, len(postures), step))
+        self._graph.play(keyframes, played.times, repeat)
 
     def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
         """Show more postures of the figure, transparent; they replace earlier ghosts.

@@ -197,3 +197,11 @@ def test_aims_go_along_with_their_nodes_and_errors_are_distances_and_angles() ->
         found = kernel.greatest_error(here, there, points)
         assert found == pytest.approx(max(float(np.linalg.norm(off)), angle), abs=1e-7)
         assert kernel.greatest_error(here[1:], there[1:], points[1:]) == pytest.approx(angle, abs=1e-7)
+
+
+def test_a_slide_stays_where_there_are_directions_alone() -> None:
+    from wholebody.methods.ccd.sweep import carried, moving_all
+
+    _, limbs = _one_joint(pin.JointModelPrismaticUnaligned(np.array([1.0, 0.0, 0.0])), -1.0, 1.0)
+    there = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    assert carried(limbs, np.eye(3), there, np.ones(3), moving_all((0,), 3, 0)) == 0.0

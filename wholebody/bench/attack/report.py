@@ -19,6 +19,8 @@ from wholebody.bench.tables import write_text
 
 ATTACKED = {
     "solve": "solves, judged by coal over all pairs and by Pinocchio",
+    "weights": "goals of one frame with weights from 1 to 1e6, met as soon as with equal ones",
+    "put": "things that are put into a figure that is shown, every frame free or told",
     "stream": "streams of moving goals and things, every step and the way between two",
     "sweep": "sweeps against a fine subdivision",
     "pairs": "things in each other, against every two pieces",

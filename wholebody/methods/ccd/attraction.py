@@ -97,7 +97,11 @@ class Attraction:
     def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
         """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
         gained = False
+        chains = list(self._resolver.chains.values())
+        held = {self._model.joints[joint].idx_v for joint in (chains[part].translated if part < len(chains) else ())}
         for dof, reach in zip(*self.parts[part], strict=True):
+            if dof in held:  # it would turn a link that was moved out by translation
+                continue
             way = float(pin.difference(self._model, q, wanted)[dof])
             if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
                 continue

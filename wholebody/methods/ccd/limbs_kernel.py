@@ -226,6 +226,8 @@ def _slide(
         for axis in range(3):
             total += weights[k] * line[axis] * (there[k, axis] - here[k, axis])
         weight += weights[k]
+    if weight == 0.0:  # axes alone, which no slide moves
+        return 0.0
     old = values[node]
     new = min(max(old + total / weight, lower[node]), upper[node])
     values[node] = new

@@ -164,8 +164,8 @@ class _CCDTracker(SolvingTracker):
         self._ccd = method
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
-        """The result of overlap resolution at the posture q (nq,)."""
-        return (self._ccd.pushed_out(self.problem, q),)
+        """The result of overlap resolution at the posture q (nq,), as far as bounds on velocities allow."""
+        return (self.bounded(q, self._ccd.pushed_out(self.problem, q)),)
 
 
 class _Search:

@@ -73,6 +73,7 @@ class AssemblyStep(NamedTuple):
         systems: linear systems solved.
         taken: whether the bodies moved there.
         collisions: what things that move passed through, or are inside of; empty if nothing.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
     """
 
     goal_error: float
@@ -81,6 +82,7 @@ class AssemblyStep(NamedTuple):
     systems: int
     taken: bool
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class Assembly(AssemblyJoints):
@@ -291,7 +293,7 @@ class Assembly(AssemblyJoints):
         with self._alone:
             active = self._ready(None).active
             start = active.begin(self.variables(), self._goal_batches())
-            motion = None if active.contacts is None else active.workspace.next_frame()
+            motion = None if active.contacts is None else active.workspace.next_frame(self.q)
             if motion is None:
                 return self._newton_frame(active, start, tolerance)
             return self._among_moving(active, start, tolerance, motion)
@@ -328,7 +330,9 @@ class Assembly(AssemblyJoints):
         counts = [(step.iterations, step.systems) for step in steps]
         iterations, systems = (sum(column) for column in zip(*counts, strict=True))
         taken = any(step.taken for step in steps)
-        return AssemblyStep(steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions)
+        return AssemblyStep(
+            steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions, tuple(path)
+        )  # fmt: skip
 
     def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
         """Whether the motion of a frame passes through nothing."""

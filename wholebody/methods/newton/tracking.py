@@ -90,7 +90,7 @@ class NewtonTracker(NotCopyable):
             InputError: as for `frame`.
         """
         self.workspace.refresh()
-        motion, step = self.workspace.next_frame(), self.frame(q, tolerance)
+        motion, step = self.workspace.next_frame(q), self.frame(q, tolerance)
         if motion is None:
             return step
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))

@@ -50,6 +50,7 @@ LITTLE = 0.01  # damping that makes no difference to how a step looks
 WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
 BENT = 5e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
 STRAIGHT = 1.5e-6  # m, rad: by which what is held may be curved other than as foreseen without another program
+TRADED = 0.5  # see `StepProgram.solve`: greater = weights count in more steps, and light goals wait in more
 AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
@@ -102,6 +103,8 @@ class StepProgram:
         self._workspace, self._subproblem = workspace, Subproblem(problem, state)
         self._kernel, self._motion = compiled_kernel(), compiled_subproblem().motion
         self.goals = len(self._subproblem.goal_share)
+        self._share = self._even = np.ones(self.goals)
+        self._mixed = bool((self._subproblem.goal_share < 1.0).any())
         self._soft = self.goals + int((self._subproblem.kind == 0).sum())
         self._variables, self._columns, self._elastic = state.model.nv, len(state.column_joint), 0
         self._settled, self._curving, self._bend = False, False, 0.0
@@ -140,15 +143,18 @@ class StepProgram:
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
 
+        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would lessen light ones at the
+        expense of heavy ones, which conflict then, weights count.
+
         Args:
             at: linearisation there.
             measures: whether the measures count; without them the nearest posture to the goals is sought.
         """
-        answer, damping, asked = self._once(at, measures, 0.0)
-        for _ in range(AGAIN):
-            if asked <= WORSE * max(damping, LITTLE):
-                break
-            answer, damping, asked = self._once(at, measures, asked)
+        self._share = self._even
+        answer, damping = self._damped(at, measures)
+        if self._mixed and self._trades(answer.x):
+            self._share = self._subproblem.goal_share
+            answer, damping = self._damped(at, measures)
         bend, self._bend = self._bend, answer.motion * answer.turn
         if len(self._held) and (self._curving or abs(self._bend - bend) > BENT):
             self._curving = self._foresee(at, answer.x)
@@ -214,6 +220,25 @@ class StepProgram:
         )  # fmt: skip
         return way, turn
 
+    def _damped(self, at: PackedLinearisation, measures: bool) -> tuple[Answer, float]:
+        """An answer with as much damping as it asks for itself, and the damping."""
+        answer, damping, asked = self._once(at, measures, 0.0)
+        for _ in range(AGAIN):
+            if asked <= WORSE * max(damping, LITTLE):
+                break
+            answer, damping, asked = self._once(at, measures, asked)
+        return answer, damping
+
+    def _trades(self, x: Array) -> bool:
+        """Whether the displacement x (nv,) lessens light goals at the expense of heavy ones.
+
+        It does where the weighted error lessens by a smaller share than half of that of the error without weights.
+        """
+        error = self._soft_values[0, : self.goals]
+        after, share = error + self._soft_rows[: self.goals] @ x, self._subproblem.goal_share
+        even, weighted = (sqrt(by @ after**2) / max(sqrt(by @ error**2), RESTING) for by in (self._even, share))
+        return 1.0 - weighted < TRADED * (1.0 - even)
+
     def _once(self, at: PackedLinearisation, measures: bool, least_damping: float) -> tuple[Answer, float, float]:
         """An answer, the damping of its program, and what it asks for.
 
@@ -228,7 +253,7 @@ class StepProgram:
         held = working.held if working.hot else self._unknown
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
             at.value, at.jacobian, at.gap, at.gap_contact, at.clearance, at.contacts.number, at.measure, at.box, at.q,
-            self._before, self._after, own.kind, own.bound, own.goal_share, held, working.pushing,
+            self._before, self._after, own.kind, own.bound, self._share, held, working.pushing,
             workspace.state.columns, self._joints, at.contacts.placements, workspace.table.reach, self._twist,
             self._floats, self._integers, self._masks, self._numbers, measures, working.hot, least_damping,
         )  # fmt: skip

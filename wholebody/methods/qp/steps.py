@@ -49,9 +49,10 @@ class FrameStep(NamedTuple):
     Attributes:
         q: (nq,) the next posture.
         iterations: programs.
-        collisions: see `QPStep`.
+        collisions, path: see `QPStep`.
     """
 
     q: Array
     iterations: int
     collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()

@@ -213,7 +213,7 @@ class Subproblem:
             radius: about the largest entry that the displacement should have, radians and metres.
             pull: of goals farther away only so much is asked for, metres and radians; None asks for all of it.
             damping: how much of the goals' neglected second derivative to add, bounded by |pull| times lever; where all
-                is asked for, how much of the squared error (Sugihara 2011, as in `DampedLeastSquares`).
+                is asked for, how much of the weighted squared error (Sugihara 2011, as in `DampedLeastSquares`).
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought. The squares
                 that they are the sum of are soft rows, after those of `rows`.

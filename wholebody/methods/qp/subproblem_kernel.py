@@ -34,14 +34,15 @@ def sort_rows(
 
     The first nine arguments are the linearisation's, `number` being that of its contacts. `kind` (c,) says of each
     value whether it is an equality (0), has a lower bound (1), an upper bound (2) or both (3); `bound` (2, c) are the
-    bounds. `share` (g,) are the goals' shares of the largest weight, `force` the force of all goals, the least and the
-    largest factor of their weights and the weight of equalities. A contact has fewer rows than `most_rows`. The other
-    arguments are room: `soft_values` (2, m) for errors and weights, `labels` (2, k) for contacts and keys.
+    bounds. `share` (g,) are the goals' shares of the largest weight, `force` the force of all goals with these weights,
+    the least and the largest factor of their weights and the weight of equalities. A contact has fewer rows than
+    `most_rows`. The other arguments are room: `soft_values` (2, m) for errors and weights, `labels` (2, k) for contacts
+    and keys.
     """
     nv, goals, values = soft.shape[1], len(goal_error), len(value)
     square = 0.0
     for r in range(goals):
-        square += goal_error[r] * goal_error[r]
+        square += (share[r] * goal_error[r]) ** 2
     pull = min(max(force[0] / max(np.sqrt(square), 1e-12), force[1]), force[2])
     for r in range(goals):
         soft_values[0, r], soft_values[1, r] = goal_error[r], pull * share[r]
@@ -152,7 +153,7 @@ def program(
     for r in range(len(target)):
         error = soft_error[r]
         if r < goals:
-            square += error * error
+            square += soft_weight[r] * error * error
             error *= factor
             heaviest = max(heaviest, soft_weight[r])
             heaviest_error = max(heaviest_error, soft_weight[r] * abs(error))
@@ -170,7 +171,7 @@ def program(
         # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
         middle = _middle(columns[0])
         for i in range(nv):
-            columns[0, i] += damping * square * heaviest * np.sqrt(columns[0, i] / middle)
+            columns[0, i] += damping * square * np.sqrt(columns[0, i] / middle)
     for r in range(len(least)):
         least[r] = min(violated[r], most)
 

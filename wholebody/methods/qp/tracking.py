@@ -28,7 +28,7 @@ from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
 from wholebody.records import with_values
 from wholebody.solution import Solution
-from wholebody.tasks.bounds import StepLimit, allowed, at_speeds
+from wholebody.tasks.bounds import StepLimit, allowed, at_speeds, clipped
 from wholebody.workspace import NotCopyable
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
@@ -111,7 +111,7 @@ class QPTracker(NotCopyable):
             self.problem.check_fresh()
             self.workspace.refresh()
             self._renew()
-            motion = self.workspace.next_frame()
+            motion = self.workspace.next_frame(q)
             try:
                 return self._step(q, measures) if motion is None else self._among_moving(q, measures, motion)
             except TermError as error:
@@ -133,7 +133,7 @@ class QPTracker(NotCopyable):
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS[exact]
         last, error, way = self.step(q), np.inf, np.inf
         if last.path:
-            return FrameStep(last.q, len(last.path) - 1, last.collisions)
+            return FrameStep(last.q, len(last.path) - 1, last.collisions, last.path)
         for spent in range(1, most):
             before, error = error, goal_error(self.problem, self.workspace, last.q)
             longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
@@ -182,12 +182,11 @@ class QPTracker(NotCopyable):
             self._left = None if most is None else most - pin.difference(model, q, here)
             self._program.take((following - share) * self.dt)
             steps.append(self._step(here, measures and following > share))
-            path.append((following, steps[-1].q))
+            path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
-        if depth > OUT:
-            free = free_end(model, q, OUT, self._projection_rows)
-            if free is not None and self._lineariser.undefined(free) is None:
-                path, steps = [(0.0, q), (1.0, free)], [with_values(steps[-1], q=free)]
+        free = None if depth <= OUT or motion.still else free_end(model, q, OUT, self._projection_rows)
+        if free is not None and self._lineariser.undefined(free) is None:
+            path = [(0.0, q), (1.0, free)]
         self._program.take(self.dt)
         collisions = motion.collisions(path)
         workspace.keep(motion, collisions)
@@ -364,6 +363,7 @@ def _together(model: pin.Model, path: Sequence[tuple[float, Array]], steps: Sequ
     displacement = np.asarray(pin.difference(model, path[0][1], path[-1][1]))
     return with_values(
         steps[-1],
+        q=path[-1][1],
         displacement=displacement,
         velocity=displacement / dt,
         exact=all(step.exact for step in steps),

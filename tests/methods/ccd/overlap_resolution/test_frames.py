@@ -155,3 +155,28 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
 def test_postures_that_are_none_are_refused(bad: Any, avatar: wb.Figure) -> None:
     with pytest.raises(wb.InputError, match="q_wanted"):
         resolve_overlap(wb.Scene(avatar), avatar.neutral, bad, np.random.default_rng(0))
+
+
+def test_a_forearm_that_lies_on_a_table_keeps_its_direction_while_it_is_held_there(avatar: wb.Figure) -> None:
+    """It is moved out by translation, A8 of Schmidl and Lin: the elbow is lifted as much as the wrist, and stays so."""
+    start = avatar.posture("standing").copy()
+    for joint in ("right_shoulder_flexion", "right_elbow_flexion"):
+        start[avatar.model.joints[avatar.joint_id(joint)].idx_q] = np.pi / 4
+    elbow = avatar.placement(start, "right_forearm").translation
+    scene = wb.Scene(avatar).add(wb.Box((0.7, 0.5, 0.04)), name="table", at=(elbow[0] + 0.4, elbow[1], 1.0))
+    low, high = 0.95, 1.25
+    for _ in range(30):
+        scene.move("table", at=(elbow[0] + 0.4, elbow[1], 0.5 * (low + high)))
+        touches = len(scene.contacts(start, 1e-4).distance) > 0
+        low, high = (low, 0.5 * (low + high)) if touches else (0.5 * (low + high), high)
+    scene.move("table", at=(elbow[0] + 0.4, elbow[1], low - 0.002))
+    turns, q, rng = [], start, np.random.default_rng(0)
+    for frame in range(45):
+        wanted = start.copy()
+        wanted[2] -= 0.04 * min(frame / 30, 1.0)
+        q = resolve_overlap(scene, q, wanted, rng).q
+        shown, tracked = (avatar.placement(posture, "right_forearm") for posture in (q, wanted))
+        turns.append(np.degrees(np.linalg.norm(pin.log3(shown.rotation.T @ tracked.rotation))))
+    assert shown.translation[2] - tracked.translation[2] > 0.03
+    assert max(turns) < 3.0
+    assert np.ptp(turns[-10:]) < 0.01

@@ -31,6 +31,7 @@ class ChainResolver:
         name: the chain's name.
         limbs: its joints.
         reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
+        translated: joints that hold the orientation of links that were moved out by translation, since it was cleared.
     """
 
     def __init__(
@@ -57,6 +58,7 @@ class ChainResolver:
             exact: see `LinkFinder`.
         """
         self.name = name
+        self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, cones)
@@ -107,8 +109,14 @@ class ChainResolver:
         """The link that is deepest inside; see `LinkFinder.deepest`."""
         return self._finder.deepest(overlaps)
 
-    def push(self, link: Link, margin: float = MARGIN) -> tuple[int, ...]:
-        """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first."""
+    def push(self, link: Link, margin: float = MARGIN, tracked: Any = None) -> tuple[int, ...]:
+        """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first.
+
+        Args:
+            link: of the chain.
+            margin: metres.
+            tracked: joint placements whose orientation a link that is translated takes; None for its present one.
+        """
         x, y, z = link.push
         length = (x * x + y * y + z * z) ** 0.5
         if length < 1e-9:
@@ -117,7 +125,7 @@ class ChainResolver:
         push = (grow * x, grow * y, grow * z)
         inner = self._inner(link)
         if inner and self._parallel(link, push):
-            self._translate(link, push, inner)
+            self._translate(link, push, inner, tracked)
             return link.nodes
         self._reach_out(link.node, link.nodes, link.effector, push)
         return link.nodes
@@ -139,12 +147,17 @@ class ChainResolver:
             if left < CLOSE or left > SLOW * before:
                 return
 
-    def _translate(self, link: Link, push: Vector, inner: Sequence[int]) -> None:
+    def _translate(self, link: Link, push: Vector, inner: Sequence[int], tracked: Any) -> None:
         """Move the link by pure translation: its joint's origin moves, and its own joints keep its orientation."""
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
         first = limbs.frame(own[-1])
         there = _columns(limbs.frames[link.node]).copy()
+        if tracked is not None:
+            wanted = np.ascontiguousarray(tracked.oMi[limbs.joints[link.node]].rotation.T)
+            if np.abs(wanted - there).max() < PARALLEL:  # otherwise it is another way that the tracked limb takes
+                there = wanted
+                self.translated.update(limbs.joints[node] for node in link.nodes)
         self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
         plan = moving_all(own, 3, 0)
         for _ in range(SWEEPS):

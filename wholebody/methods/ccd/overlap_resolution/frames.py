@@ -94,6 +94,7 @@ class FrameResolver:
         """Prepare the chains and their degrees of freedom."""
         self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
         self._resolver = OverlapResolver(scene, self._workspace, exact=False)
+        self._tracked = scene.model.createData()
         self._attraction = Attraction(scene, self._resolver)
         self._parts = self._attraction.parts
 
@@ -104,7 +105,7 @@ class FrameResolver:
         self._workspace.begin()
         self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
-        resolver.counts, resolver.margin = Counts(), MARGIN
+        resolver.counts, resolver.margin, resolver.tracked = Counts(), MARGIN, None
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
         self._swept = False
         q, overlaps = resolver.resolve(q_free, rng, OVERRUN)
@@ -117,7 +118,8 @@ class FrameResolver:
         if overlaps:
             return self._result(q if resolver.query(wanted) else wanted)
         before = self._resolver.placed
-        shown = None
+        pin.forwardKinematics(self._model, self._tracked, wanted)
+        resolver.tracked, shown = self._tracked, None
         self._attraction.free = not resolver.query(wanted)
         resolver.margin = WIDE if self._attraction.free else MARGIN
         if self._attraction.free and not self._passes_through(before, q, wanted):
@@ -151,6 +153,8 @@ class FrameResolver:
                 moved = self._attraction.step(q, wanted, settled)
             if moved is None:
                 break
+            for chain in resolver.chains.values():
+                chain.translated.clear()
             trial, overlaps = resolver.resolve(moved[0], rng, self._attraction.limit)
             if overlaps:
                 trial = self._interpolate(q, trial)

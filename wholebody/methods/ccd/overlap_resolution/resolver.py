@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -57,6 +58,7 @@ class OverlapResolver:
         counts: the work since it was last set.
         deepest: largest shortfall of a pair from its clearance in the last query, metres.
         margin: distance by which links end outside, metres.
+        tracked: joint placements whose orientation links that are translated take; None for that which they have.
     """
 
     def __init__(
@@ -84,6 +86,7 @@ class OverlapResolver:
         """
         self.control = Control(np.inf) if control is None else control
         self.exact, self.margin = exact, MARGIN
+        self.tracked: Any = None
         self.scene, self.workspace, self.clearances, self.tolerance = scene, workspace, clearances, tolerance
         self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self._data = scene.model.createData()
@@ -175,7 +178,7 @@ class OverlapResolver:
             worst, node = link.depth, link.node
             began = time.perf_counter()
             chain.read(q, self._data)
-            nodes = chain.push(link, self.margin)
+            nodes = chain.push(link, self.margin, self.tracked)
             chain.limbs.write(q)
             self.counts.ik_seconds += time.perf_counter() - began
             self.counts.iterations += 1
