@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.state import State, Wrench
 
 if TYPE_CHECKING:
@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 
 _T = TypeVar("_T")
+
+MOST_PLANES = 4096  # more than one term ever has
 
 
 class Surroundings(Protocol):
@@ -52,6 +54,20 @@ def filled(term: _T, **values: object) -> _T:
     for name, value in values.items():
         object.__setattr__(result, name, value)
     return result
+
+
+class SupportingPlanes(NamedTuple):
+    """Inequalities ``value <= 0`` about a posture.
+
+    Attributes:
+        value: (k,) [m].
+        jacobian: (k, nv) their derivative.
+        key: (k,) numbers that name a plane from one posture to the next, each less than `MOST_PLANES`.
+    """
+
+    value: Array
+    jacobian: Array
+    key: Indices
 
 
 class Term:
@@ -89,6 +105,14 @@ class Goal(Term, ABC):
         """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
         return np.zeros((), dtype=bool)
 
+    def supporting_planes(self, state: State) -> SupportingPlanes | None:
+        """Inequalities that hold wherever the goal is met, and that its own rows do not tell of to first order.
+
+        An error with kinks, such as the distance to a thing with edges, has one derivative on each side of a kink. The
+        planes on both sides of it say where the kink is. None, as here, for a smooth error.
+        """
+        return None
+
     @abstractmethod
     def error(self, state: State) -> Array:
         """(m,) remaining error, in metres and radians; zero when the goal is met."""
@@ -115,6 +139,10 @@ class Constraint(Term, ABC):
     def angular(self) -> Mask:
         """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
         return np.zeros((), dtype=bool)
+
+    def supporting_planes(self, state: State) -> SupportingPlanes | None:
+        """Inequalities that hold wherever the constraint does; see `Goal.supporting_planes`."""
+        return None
 
     @abstractmethod
     def value(self, state: State) -> Array:

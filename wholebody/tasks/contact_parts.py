@@ -12,12 +12,14 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Surface, nearest
+from wholebody.tasks.surfaces import MOST_FACES, Face, Surface, faces_met, nearest
+
+PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
 
 class Part(Protocol):
@@ -47,6 +49,24 @@ class Gap(NamedTuple):
         near = nearest(self.first, self.second, state)
         wrench = through(near.point, near.normal[None])
         return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
+
+    def planes(self, state: State) -> tuple[Array, Array, Indices]:
+        """Values (k,), derivatives (k, nv) and keys (k,) of faces that a touching point is not beyond; all <= 0."""
+        near = nearest(self.first, self.second, state)
+        if near.distance > PLANES_WITHIN:
+            return np.zeros(0), np.zeros((0, state.model.nv)), np.zeros(0, dtype=np.intp)
+        found = [*faces_met(self.first, self.second, near.pieces, state)]
+        back = faces_met(self.second, self.first, near.pieces[::-1], state)
+        joints = [(near.against, near.joint)] * len(found)
+        found += [plane._replace(key=plane.key + MOST_FACES) for plane in back]
+        joints += [(near.joint, near.against)] * (len(found) - len(joints))
+        wrench = np.vstack([np.zeros((0, 6)), *(through(plane.point, plane.normal[None]) for plane in found)])
+        of, against = np.array(joints, dtype=np.intp).reshape(-1, 2).T
+        return (
+            np.array([plane.value for plane in found]),
+            state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against)),
+            np.array([plane.key for plane in found], dtype=np.intp),
+        )
 
 
 class Near(NamedTuple):
@@ -202,6 +222,20 @@ class ContactTerm(Goal, Constraint):
     def jacobian(self, state: State) -> Array:
         """(m, nv) the derivative."""
         return np.vstack([part.rows(state)[1] for part in self.parts])
+
+    def supporting_planes(self, state: State) -> SupportingPlanes:
+        """Planes of the faces about every gap: past an edge there is no surface left to slide on."""
+        return planes_of(self.parts, state)
+
+
+def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
+    """The supporting planes of all gaps among some parts."""
+    found = [(number, *part.planes(state)) for number, part in enumerate(parts) if isinstance(part, Gap)]
+    return SupportingPlanes(
+        np.concatenate([np.zeros(0), *(value for _, value, _, _ in found)]),
+        np.vstack([np.zeros((0, state.model.nv)), *(rows for _, _, rows, _ in found)]),
+        np.concatenate([np.zeros(0, dtype=np.intp), *(key + 2 * MOST_FACES * number for number, _, _, key in found)]),
+    )
 
 
 def owner_pairs(first: Iterable[str], second: Iterable[str]) -> tuple[tuple[str, str], ...]:

@@ -23,6 +23,9 @@ from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
+FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
+MOST_FACES = 256  # more than a piece ever has
+GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
 TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
 
 
@@ -64,6 +67,7 @@ class Nearest(NamedTuple):
         point: (3,) a point on the line of both nearest points [m].
         joint: joint that carries the piece of the second surface.
         against: joint that carries the piece of the first.
+        pieces: number of the piece of the first surface, and of the second.
     """
 
     distance: float
@@ -71,6 +75,23 @@ class Nearest(NamedTuple):
     point: Array
     joint: int
     against: int
+    pieces: tuple[int, int]
+
+
+class FacePlane(NamedTuple):
+    """The plane of a face of one piece, and the point of another piece that is farthest behind it.
+
+    Attributes:
+        value: how far in front of the plane that point is [m]; not positive where the pieces touch.
+        normal: (3,) outward.
+        point: (3,) [m].
+        key: number of the face.
+    """
+
+    value: float
+    normal: Array
+    point: Array
+    key: int
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
@@ -157,7 +178,47 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     if not np.linalg.norm(normal) > 0.5:
         normal = _between(ours[i].translation, theirs[j].translation)
     middle = 0.5 * (np.array(result.getNearestPoint1()) + np.array(result.getNearestPoint2()))
-    return Nearest(distance, normal, middle, second.joints[j], first.joints[i])
+    return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
+
+
+def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: State) -> list[FacePlane]:
+    """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
+
+    Faces that another piece of the second surface goes on beyond are no end of it, and are left out.
+    """
+    i, j = pieces
+    swept = swept_points(second.shapes[j])
+    if swept.radius or len(swept.faces) < 2:
+        return []
+    ours, theirs = first.placed(i, state), second.placed(j, state)
+    normals = swept.faces[:, :3] @ theirs.rotation.T
+    offsets = swept.faces[:, 3] + normals @ theirs.translation
+    points = np.array([_behind(first.shapes[i], ours, normal) for normal in normals])
+    values = np.einsum("ij,ij->i", normals, points) - offsets
+    found = []
+    for key in np.argsort(-values)[:FACES].tolist():
+        if not _goes_on(second, j, normals[key], offsets[key], points[key], state):
+            found.append(FacePlane(float(values[key]), normals[key], points[key], key))
+    return found
+
+
+def _behind(shape: Any, placement: pin.SE3, normal: Array) -> Array:
+    """The point (3,) of a piece that is farthest against a direction (3,)."""
+    points = outermost(shape, placement, -normal)
+    return np.asarray(points[int(np.argmin(points @ normal))])
+
+
+def _goes_on(thing: Surface, number: int, normal: Array, offset: float, point: Array, state: State) -> bool:
+    """Whether another piece than `number` reaches beyond a plane near a point (3,)."""
+    for other, shape in enumerate(thing.shapes):
+        if other != number:
+            place = thing.placed(other, state)
+            if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + GOES_ON:
+                if not np.isfinite(thing.reach[other]):
+                    return True
+                if float((outermost(shape, place, normal) @ normal).max()) > offset + ACCURACY:
+                    return True
+    return False
 
 
 def _between(first: Array, second: Array) -> Array:
