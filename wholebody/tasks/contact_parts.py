@@ -17,8 +17,10 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import MOST_FACES, Face, Surface, faces_met, nearest
+from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, faces_met, foot, nearest
 
+FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
+ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance, for the rest is rounding
 PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
 
@@ -33,11 +35,41 @@ class Part(Protocol):
         """Values (m,) and their derivative (m, nv)."""
 
 
+class RoundEnd(NamedTuple):
+    """A point on the round surface of its own piece, which touches there only where the two normals are opposed.
+
+    With c the centre of curvature, p the point and P(c) the point of the other surface nearest to c, they are where
+    p = P(c). The distance of the piece says so to second order alone, by r (1 - cos t) for an angle t: its derivative
+    vanishes there. The two rows t_k . (p - P(c)) do not.
+
+    Attributes:
+        center: (3,) c in the axes of the joint [m].
+        across: (2, 3) t_k, two directions in the axes of the joint, along the surface at the point.
+        room: what the rows may be for the piece to be inside by `ROUND_DEPTH` [m].
+    """
+
+    center: Array
+    across: Array
+    room: float
+
+    def rows(self, point: Surface, other: Surface, near: Nearest, state: State) -> tuple[Array, Array]:
+        """Values (2,) and derivatives (2, nv)."""
+        place = state.data.oMi[near.against]
+        tip, center, across = point.placed(0, state).translation, place.act(self.center), self.across @ place.rotation.T
+        there = foot(other, near.pieces[1], center, state)
+        moves = np.array([foot(other, near.pieces[1], center + FOOT_STEP * way, state) - there for way in across])
+        arm = tip - there
+        wrench = through(tip, across) - through(center, moves / FOOT_STEP)
+        wrench[:, 3:] += np.cross(across, arm)
+        return across @ arm, _between(state, wrench, near.against, near.joint)
+
+
 class Gap(NamedTuple):
     """The signed distance of two surfaces: one row, zero where they touch [m]."""
 
     first: Surface
     second: Surface
+    end: RoundEnd | None = None
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -62,10 +94,16 @@ class Gap(NamedTuple):
         joints += [(near.joint, near.against)] * (len(found) - len(joints))
         wrench = np.vstack([np.zeros((0, 6)), *(through(plane.point, plane.normal[None]) for plane in found)])
         of, against = np.array(joints, dtype=np.intp).reshape(-1, 2).T
+        value = np.array([plane.value for plane in found])
+        rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
+        key = np.array([plane.key for plane in found], dtype=np.intp)
+        if self.end is None:
+            return value, rows, key
+        upright, turns = self.end.rows(self.first, self.second, near, state)
         return (
-            np.array([plane.value for plane in found]),
-            state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against)),
-            np.array([plane.key for plane in found], dtype=np.intp),
+            np.concatenate([value, upright - self.end.room, -upright - self.end.room]),
+            np.vstack([rows, turns, -turns]),
+            np.concatenate([key, 2 * MOST_FACES + np.arange(4)]),
         )
 
 

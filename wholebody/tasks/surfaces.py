@@ -181,6 +181,19 @@ def nearest(first: Surface, second: Surface, state: State) -> Nearest:
     return Nearest(distance, normal, middle, second.joints[j], first.joints[i], (i, j))
 
 
+def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
+    """The point (3,) of a piece that is nearest to a point (3,) outside of it."""
+    place = surface.placed(number, state)
+    result = coal.DistanceResult()
+    request = coal.DistanceRequest()
+    request.gjk_tolerance = request.epa_tolerance = ACCURACY
+    coal.distance(
+        coal.Sphere(POINT), coal.Transform3s(np.eye(3), point), surface.shapes[number],
+        coal.Transform3s(place.rotation, place.translation), request, result,
+    )  # fmt: skip
+    return np.array(result.getNearestPoint2())
+
+
 def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: State) -> list[FacePlane]:
     """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
 
