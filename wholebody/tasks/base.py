@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 _T = TypeVar("_T")
 
-MOST_PLANES = 4096  # more than one term ever has
+MOST_PLANES = 1 << 16  # more than one term ever has
 
 
 class Surroundings(Protocol):

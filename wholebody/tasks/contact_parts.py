@@ -21,6 +21,7 @@ from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, faces_m
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance, for the rest is rounding
+MOST_OF_PART = 3 * MOST_FACES  # planes: more than one part ever has
 PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
 
@@ -33,6 +34,13 @@ class Part(Protocol):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Values (m,) and their derivative (m, nv)."""
+
+
+class Bounded(Part, Protocol):
+    """A part whose rows have kinks."""
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """What says where the kinks are; keys are less than `MOST_PLANES` of a part."""
 
 
 class RoundEnd(NamedTuple):
@@ -82,11 +90,11 @@ class Gap(NamedTuple):
         wrench = through(near.point, near.normal[None])
         return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
 
-    def planes(self, state: State) -> tuple[Array, Array, Indices]:
-        """Values (k,), derivatives (k, nv) and keys (k,) of faces that a touching point is not beyond; all <= 0."""
+    def planes(self, state: State) -> SupportingPlanes:
+        """Of faces that a touching point is not beyond, and of the angle between the normals at a round end."""
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
-            return np.zeros(0), np.zeros((0, state.model.nv)), np.zeros(0, dtype=np.intp)
+            return no_planes(state)
         found = [*faces_met(self.first, self.second, near.pieces, state)]
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
         joints = [(near.against, near.joint)] * len(found)
@@ -98,9 +106,9 @@ class Gap(NamedTuple):
         rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
         key = np.array([plane.key for plane in found], dtype=np.intp)
         if self.end is None:
-            return value, rows, key
+            return SupportingPlanes(value, rows, key)
         upright, turns = self.end.rows(self.first, self.second, near, state)
-        return (
+        return SupportingPlanes(
             np.concatenate([value, upright - self.end.room, -upright - self.end.room]),
             np.vstack([rows, turns, -turns]),
             np.concatenate([key, 2 * MOST_FACES + np.arange(4)]),
@@ -124,6 +132,11 @@ class Near(NamedTuple):
         value, row = Gap(self.first, self.second).rows(state)
         beyond = value - self.most
         return (beyond, row) if beyond[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The distance that they may be apart."""
+        value, row = Gap(self.first, self.second).rows(state)
+        return one_sided(value - self.most, row)
 
 
 class Facing(NamedTuple):
@@ -203,14 +216,21 @@ class Over(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """How far out it is along each axis."""
+        along, moves = self._along(state)
+        value = along - np.clip(along, self.low, self.high)
+        return value, np.where(((value != 0.0) | (self.low == self.high))[:, None], moves, 0.0)
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The sides of the box."""
+        along, moves = self._along(state)
+        return one_sided(np.concatenate([along - self.high, self.low - along]), np.vstack([moves, -moves]))
+
+    def _along(self, state: State) -> tuple[Array, Array]:
+        """Coordinates (k,) of the origin along the axes, and their derivative (k, nv)."""
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
         point = state.frame(self.place.frame).translation
-        along = axes @ (point - center)
-        value = along - np.clip(along, self.low, self.high)
-        moves = np.where(((value != 0.0) | (self.low == self.high))[:, None], axes, 0.0)
-        wrench = through(point, moves)
-        return value, _between(state, wrench, self.place.joint, self.face.joint)
+        return axes @ (point - center), _between(state, through(point, axes), self.place.joint, self.face.joint)
 
 
 def through(point: Array, forces: Array) -> Array:
@@ -266,14 +286,26 @@ class ContactTerm(Goal, Constraint):
         return planes_of(self.parts, state)
 
 
+def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
+    """Planes of values (k,) that stay at most zero, with their derivative (k, nv); without those that are far beyond."""
+    near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
+    return SupportingPlanes(value[near], jacobian[near], near)
+
+
+def no_planes(state: State) -> SupportingPlanes:
+    """None at all."""
+    return SupportingPlanes(np.zeros(0), np.zeros((0, state.model.nv)), np.zeros(0, dtype=np.intp))
+
+
 def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
-    """The supporting planes of all gaps among some parts."""
-    found = [(number, *part.planes(state)) for number, part in enumerate(parts) if isinstance(part, Gap)]
-    return SupportingPlanes(
-        np.concatenate([np.zeros(0), *(value for _, value, _, _ in found)]),
-        np.vstack([np.zeros((0, state.model.nv)), *(rows for _, _, rows, _ in found)]),
-        np.concatenate([np.zeros(0, dtype=np.intp), *(key + 2 * MOST_FACES * number for number, _, _, key in found)]),
-    )
+    """The supporting planes of all parts that have some."""
+    found = [no_planes(state)]
+    for number, part in enumerate(parts):
+        if hasattr(part, "planes"):
+            bounded: Bounded = part
+            planes = bounded.planes(state)
+            found.append(planes._replace(key=planes.key + MOST_OF_PART * number))
+    return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
 def owner_pairs(first: Iterable[str], second: Iterable[str]) -> tuple[tuple[str, str], ...]:
