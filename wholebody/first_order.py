@@ -135,7 +135,7 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
         signed.rows += [jacobian for _, jacobian, _ in goals]
         for term in (*asked.goals, *asked.constraints):
             if (planes := term.supporting_planes(state)) is not None:
-                near = np.abs(planes.value) <= ACTIVE
+                near = (planes.value >= -ACTIVE - planes.slack) & (planes.value <= ACTIVE)
                 one_sided.add(-planes.jacobian[near], [("constraint", ("",))] * int(near.sum()))
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))

@@ -81,12 +81,16 @@ class TermPlanes(NamedTuple):
         jacobian: (p, nv).
         row: (p,) the first row of the term that a plane is of, goals' before constraints'.
         key: (p,) names a plane from one posture to the next.
+        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
+        bend_row: (b,) the row that a bend is of, goals' before constraints'.
     """
 
     value: Array
     jacobian: Array
     row: Indices
     key: Indices
+    bend: Array
+    bend_row: Indices
 
 
 _NO_CONTACTS = Contacts(
@@ -352,9 +356,11 @@ class Lineariser:
         row = 0
         for term, count in zip((*self.goals, *self.constraints), self.rows(), strict=True):
             planes = term.supporting_planes(self.state)
-            if planes is not None and len(planes.value):
-                rows = np.full(len(planes.value), row, dtype=np.intp)
-                found.append(TermPlanes(planes.value, planes.jacobian, rows, planes.key + row * MOST_PLANES))
+            if planes is not None:
+                rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
+                found.append(
+                    TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row)
+                )
             row += count
         return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
 

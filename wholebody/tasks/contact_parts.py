@@ -17,7 +17,7 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, faces_met, foot, nearest
+from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, faces_met, foot, nearest
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance, for the rest is rounding
@@ -94,7 +94,7 @@ class Gap(NamedTuple):
         """Of faces that a touching point is not beyond, and of the angle between the normals at a round end."""
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
-            return no_planes(state)
+            return no_planes(state.model.nv)
         found = [*faces_met(self.first, self.second, near.pieces, state)]
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
         joints = [(near.against, near.joint)] * len(found)
@@ -105,13 +105,18 @@ class Gap(NamedTuple):
         value = np.array([plane.value for plane in found])
         rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
         key = np.array([plane.key for plane in found], dtype=np.intp)
+        turned = bends(self.first, self.second, near, state)
+        bend = _between(state, through(near.point, turned), near.joint, near.against)
         if self.end is None:
-            return SupportingPlanes(value, rows, key)
+            return SupportingPlanes(value, rows, key, np.zeros(len(value)), bend, np.zeros(len(bend), dtype=np.intp))
         upright, turns = self.end.rows(self.first, self.second, near, state)
         return SupportingPlanes(
             np.concatenate([value, upright - self.end.room, -upright - self.end.room]),
             np.vstack([rows, turns, -turns]),
             np.concatenate([key, 2 * MOST_FACES + np.arange(4)]),
+            np.concatenate([np.zeros(len(value)), np.full(4, 2.0 * self.end.room)]),
+            bend,
+            np.zeros(len(bend), dtype=np.intp),
         )
 
 
@@ -289,22 +294,26 @@ class ContactTerm(Goal, Constraint):
 def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
     """Planes of values (k,) that stay at most zero, with their derivative (k, nv); without those that are far beyond."""
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
-    return SupportingPlanes(value[near], jacobian[near], near)
+    none = no_planes(jacobian.shape[1])
+    return none._replace(value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))
 
 
-def no_planes(state: State) -> SupportingPlanes:
+def no_planes(nv: int) -> SupportingPlanes:
     """None at all."""
-    return SupportingPlanes(np.zeros(0), np.zeros((0, state.model.nv)), np.zeros(0, dtype=np.intp))
+    none, rows, index = np.zeros(0), np.zeros((0, nv)), np.zeros(0, dtype=np.intp)
+    return SupportingPlanes(none, rows, index, none, rows, index)
 
 
 def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
     """The supporting planes of all parts that have some."""
-    found = [no_planes(state)]
+    found = [no_planes(state.model.nv)]
+    row = 0
     for number, part in enumerate(parts):
         if hasattr(part, "planes"):
             bounded: Bounded = part
             planes = bounded.planes(state)
-            found.append(planes._replace(key=planes.key + MOST_OF_PART * number))
+            found.append(planes._replace(key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
+        row += len(part.in_radians)
     return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 

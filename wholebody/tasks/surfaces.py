@@ -25,6 +25,7 @@ POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
 FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
 MOST_FACES = 256  # more than a piece ever has
+SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
 GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
 TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
 
@@ -213,6 +214,42 @@ def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: S
         if not _goes_on(second, j, normals[key], offsets[key], points[key], state):
             found.append(FacePlane(float(values[key]), normals[key], points[key], key))
     return found
+
+
+def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
+
+    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none.
+    """
+    i, j = near.pieces
+    a, b = first.placed(i, state), second.placed(j, state)
+    round_by = _roundness(first, i) + _roundness(second, j)
+    if round_by == 0.0:
+        return np.zeros((0, 3))
+    along, request = across(near.normal)[:2], coal.DistanceRequest()
+    request.gjk_tolerance = request.epa_tolerance = ACCURACY
+    turned, step = np.empty((2, 2)), SLIDE * round_by
+    for row, way in enumerate(along):
+        normals = []
+        for sign in (-step, step):
+            result = coal.DistanceResult()
+            coal.distance(
+                first.shapes[i], coal.Transform3s(a.rotation, a.translation), second.shapes[j],
+                coal.Transform3s(b.rotation, b.translation + sign * way), request, result,
+            )  # fmt: skip
+            normals.append(np.array(result.normal))
+        turned[row] = along @ (normals[1] - normals[0]) / (2.0 * step)
+    values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
+    values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
+    return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
+
+
+def _roundness(surface: Surface, number: int) -> float:
+    """Radius by which a piece is round [m]; 0 for a point and what has flat faces, the least of an ellipsoid."""
+    if surface.fixed is not None:
+        return 0.0
+    swept = swept_points(surface.shapes[number])
+    return float(swept.radius) if len(swept.points) or not np.isfinite(swept.reach) else 0.5 * float(swept.width)
 
 
 def _behind(shape: Any, placement: pin.SE3, normal: Array) -> Array:

@@ -156,7 +156,7 @@ class SQP:
                 break
             count += 1
             program = self.subproblem.program(
-                here.at,
+                self._bent(here),
                 here.rows,
                 self._radius,
                 None if self._full_step else self._pull,
@@ -217,6 +217,17 @@ class SQP:
     def _lagrangian(self, here: Iterate) -> float:
         y = self._multipliers
         return here.at.measure if y is None else y.lagrangian(here.at.measure, here.rows)
+
+    def _bent(self, here: Iterate) -> Linearisation:
+        """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
+
+        The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
+        """
+        planes, y = here.at.planes, self._multipliers
+        if planes is None or y is None or not len(planes.bend) or not self._measures:
+            return here.at
+        pull = np.maximum(y.soft[self.subproblem.soft_row(planes.bend_row)], 0.0)
+        return here.at._replace(squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     @property
     def _pull(self) -> float:

@@ -184,6 +184,11 @@ class Subproblem:
         )  # fmt: skip
         return rows if at.planes is None else _with_planes(rows, at.planes)
 
+    def soft_row(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The soft rows of rows (k,) that are counted with the goals' before all values'; they are equalities."""
+        goals = len(self.goal_share)
+        return np.where(row < goals, row, goals + np.searchsorted(self._equal, row - goals))
+
     def check_rows(self, goals: int, values: int) -> None:
         """Raise InputError where goals and constraints have other numbers of rows than when this was set up."""
         if goals != len(self.goal_share) or values != len(self.kind):
