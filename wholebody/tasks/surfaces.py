@@ -202,7 +202,7 @@ def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: S
     """
     i, j = pieces
     swept = swept_points(second.shapes[j])
-    if swept.radius or len(swept.faces) < 2:
+    if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
         return []
     ours, theirs = first.placed(i, state), second.placed(j, state)
     normals = swept.faces[:, :3] @ theirs.rotation.T

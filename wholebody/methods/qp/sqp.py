@@ -45,6 +45,7 @@ UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the mea
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
+BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
@@ -140,6 +141,7 @@ class SQP:
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0
         self._multipliers: Multipliers | None = None
+        self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
@@ -204,7 +206,7 @@ class SQP:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
         if here.violation.worst > self.tolerance or not self._measures:
             return
-        worth = 10.0 * self.tolerance * (1.0 + abs(here.at.measure))
+        worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
         clearly = self._kept is None or self._lagrangian(self._kept) - self._lagrangian(here) > worth
         self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
@@ -223,10 +225,10 @@ class SQP:
 
         The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
         """
-        planes, y = here.at.planes, self._multipliers
-        if planes is None or y is None or not len(planes.bend) or not self._measures:
+        planes = here.at.planes
+        if planes is None or self._tension is None or not len(planes.bend) or not self._measures:
             return here.at
-        pull = np.maximum(y.soft[self.subproblem.soft_row(planes.bend_row)], 0.0)
+        pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
         return here.at._replace(squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     @property
@@ -242,12 +244,13 @@ class SQP:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
             multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
-            self._multipliers = multipliers
+            self._multipliers, self._tension = multipliers, multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
                 saved -= multipliers.change(program, parts.tangential)
-            flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
+            bent = here.at.planes is not None and len(here.at.planes.bend)
+            flat = saved <= (BENT if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)

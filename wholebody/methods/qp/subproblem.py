@@ -80,7 +80,7 @@ class Rows(NamedTuple):
         contact: (k,) rows of one contact share its number; the worst of them counts.
         contacts: how many numbers there are.
         key: (k,) names a row from one linearisation to the next.
-        elastic_weight: (k,) their weights.
+        elastic_weight: (k,) their weights; None where all have `ELASTIC_WEIGHT`.
     """
 
     soft: Array
@@ -92,7 +92,7 @@ class Rows(NamedTuple):
     contact: NDArray[np.intp]
     contacts: int
     key: NDArray[np.intp]
-    elastic_weight: Array
+    elastic_weight: Array | None = None
 
 
 def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
@@ -107,7 +107,7 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
         elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
         contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),
         key=np.concatenate([rows.key, PLANE_KEYS - planes.key]),
-        elastic_weight=np.concatenate([rows.elastic_weight, weights[np.minimum(planes.row, rows.goals)]]),
+        elastic_weight=np.concatenate([np.full(len(rows.elastic), ELASTIC_WEIGHT), weights[np.minimum(planes.row, rows.goals)]]),
     )
 
 
@@ -180,7 +180,6 @@ class Subproblem:
         contacts = self.one_sided + len(at.contacts.distance)
         rows = Rows(
             soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
-            np.full(elastic, ELASTIC_WEIGHT),
         )  # fmt: skip
         return rows if at.planes is None else _with_planes(rows, at.planes)
 
@@ -270,7 +269,7 @@ class Subproblem:
             weight=weight,
             elastic=rows.elastic,
             least=least,
-            elastic_weight=rows.elastic_weight,
+            elastic_weight=np.full(len(least), ELASTIC_WEIGHT) if rows.elastic_weight is None else rows.elastic_weight,
             lower=columns[2],
             upper=columns[3],
         )
