@@ -17,7 +17,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ROUND_DEPTH, ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
-from wholebody.tasks.surfaces import Surface, carried_by, face, surface
+from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
 
 ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 
@@ -58,6 +58,10 @@ class Touch(ContactTerm):
     def frame(self) -> str:
         """What touches."""
         return self.part
+
+    def nearest_points(self, state: State) -> Array:
+        """(3,) the middle of the two nearest points, once resolved [m]: where they touch."""
+        return nearest(self.parts[0].first, self.parts[0].second, state).point  # type: ignore[attr-defined]
 
     def resolve(self, scene: Surroundings, start: Array) -> Touch:
         """Find the two surfaces.

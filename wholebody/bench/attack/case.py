@@ -20,6 +20,7 @@ PATTERN = (
     + ("file", "sweep", "file", "solve") * 3
     + ("file", "solve", "file", "stream") * 2
     + ("file", "solve", "file", "argument")
+    + ("file", "contact")
 )
 """Kinds of cases in turn: two mutated files for each solve, as the targets of a long run have it."""
 KINDS = tuple(dict.fromkeys(PATTERN))

@@ -21,6 +21,7 @@ ATTACKED = {
     "solve": "solves, judged by coal over all pairs and by Pinocchio",
     "stream": "streams of moving goals and things, every step and the way between two",
     "sweep": "sweeps against a fine subdivision",
+    "contact": "contacts, against the effort of a point or frame at the place found",
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
 }

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack import arguments, files, solves, streams, sweeps
+from wholebody.bench.attack import arguments, contacts, files, solves, streams, sweeps
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
 from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
@@ -90,7 +90,7 @@ def _attacked(case: Case, deadline: float) -> Verdict:
 
 WRITERS = {
     "argument": arguments.written, "file": files.written, "solve": solves.written, "stream": streams.written,
-    "sweep": sweeps.written,
+    "sweep": sweeps.written, "contact": contacts.written,
 }  # fmt: skip
 
 
