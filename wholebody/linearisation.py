@@ -358,9 +358,7 @@ class Lineariser:
             planes = term.supporting_planes(self.state)
             if planes is not None:
                 rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
-                found.append(
-                    TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row)
-                )
+                found.append(TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row))
             row += count
         return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
 

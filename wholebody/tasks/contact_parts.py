@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
@@ -20,7 +20,7 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, faces_met, foot, nearest
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
-ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance, for the rest is rounding
+ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance
 MOST_OF_PART = 3 * MOST_FACES  # planes: more than one part ever has
 PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
@@ -292,7 +292,7 @@ class ContactTerm(Goal, Constraint):
 
 
 def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
-    """Planes of values (k,) that stay at most zero, with their derivative (k, nv); without those that are far beyond."""
+    """Planes of values (k,) that are to be at most zero, with their derivative (k, nv); without those far beyond."""
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
     none = no_planes(jacobian.shape[1])
     return none._replace(value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))

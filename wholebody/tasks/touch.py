@@ -74,7 +74,9 @@ class Touch(ContactTerm):
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
         return filled(
-            self, parts=(Gap(first, second, round_end(scene, first)),), touches=owner_pairs(touched(scene, first), touched(scene, second))
+            self,
+            parts=(Gap(first, second, round_end(scene, first)),),
+            touches=owner_pairs(touched(scene, first), touched(scene, second)),
         )
 
 
@@ -134,7 +136,7 @@ class Lean(ContactTerm):
 
 
 def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
-    """The round piece on whose surface a point is; None for other surfaces, and where the point is within or outside."""
+    """The round piece on whose surface a point is; None for other surfaces and places."""
     if point.fixed is None:
         return None
     own = carried_by(scene, point.name, point.joints[0])

@@ -129,6 +129,8 @@ def verdict(problem: Problem, solution: Solution, frames: Sequence[str], seconds
         return Verdict("right", f"{solution.status}", seconds, solution.status)
     other = wb.solve(at_the_place(problem, solution, frames))
     mine, known = solution.assessment.measure, other.assessment.measure
-    words = f"effort {mine:.4g}, optimality {solution.assessment.optimality:.2g}; at the place {other.status}, {known:.4g}"
+    words = (
+        f"effort {mine:.4g}, optimality {solution.assessment.optimality:.2g}; at the place {other.status}, {known:.4g}"
+    )
     dearer = other.status == "solved" and mine > (1.0 + DEARER) * known + LEAST
     return Verdict("wrong" if dearer else "right", words, seconds, solution.status)

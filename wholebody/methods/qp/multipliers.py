@@ -24,7 +24,6 @@ from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.subproblem import Rows, compiled_kernel
 
-
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
 
 

@@ -107,7 +107,9 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
         elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
         contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),
         key=np.concatenate([rows.key, PLANE_KEYS - planes.key]),
-        elastic_weight=np.concatenate([np.full(len(rows.elastic), ELASTIC_WEIGHT), weights[np.minimum(planes.row, rows.goals)]]),
+        elastic_weight=np.concatenate(
+            [np.full(len(rows.elastic), ELASTIC_WEIGHT), weights[np.minimum(planes.row, rows.goals)]]
+        ),
     )
 
 
