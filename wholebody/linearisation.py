@@ -217,10 +217,11 @@ class Lineariser:
         other.take(self.goals, self.clearances - depth)
         return other
 
-    def at(self, q: Array, within: float) -> Linearisation:
+    def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
 
         Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
+        Supporting planes of the terms are added if they are asked for.
 
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
@@ -241,7 +242,7 @@ class Lineariser:
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
             self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, self._planes(),
+            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, self._planes() if planes else None,
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:

@@ -355,7 +355,7 @@ class SQP:
 
     def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
         within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
-        at = self.lineariser.at(q, within)
+        at = self.lineariser.at(q, within, planes=self.offset is None)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
