@@ -134,6 +134,10 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
         objective = sum((term.weight * term.gradient(state) for term in asked.measures), np.zeros(nv))
         curvature = sum((term.weight * term.curvature(state) for term in asked.measures), np.zeros(nv))
         signed.rows += [jacobian for _, jacobian, _ in goals]
+        for term in (*asked.goals, *asked.constraints):
+            if (planes := term.supporting_planes(state)) is not None:
+                near = (planes.value >= -ACTIVE - planes.slack) & (planes.value <= ACTIVE)
+                one_sided.add(-planes.jacobian[near], [("constraint", ("",))] * int(near.sum()))
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))
         curvature = sum((goal.weight * (jacobian**2).sum(axis=0) for _, jacobian, goal in goals), np.zeros(nv))

@@ -21,7 +21,7 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
 from wholebody.term_plan import OtherTerm, TermPlan, checked_count, checked_rows, make_plan
@@ -51,6 +51,7 @@ class Linearisation(NamedTuple):
         squares: (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative
             S' S.
         squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; zero without rows.
+        planes: supporting planes of the terms; None where no term has any.
     """
 
     q: Array
@@ -70,6 +71,27 @@ class Linearisation(NamedTuple):
     upper: Array
     squares: Array = np.zeros((0, 0))
     squared: Array = np.zeros(0)
+    planes: TermPlanes | None = None
+
+
+class TermPlanes(NamedTuple):
+    """Supporting planes of all terms; see `Goal.supporting_planes`.
+
+    Attributes:
+        value: (p,) not positive where the terms are met.
+        jacobian: (p, nv).
+        row: (p,) the first row of the term that a plane is of, goals' before constraints'.
+        key: (p,) names a plane from one posture to the next.
+        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
+        bend_row: (b,) the row that a bend is of, goals' before constraints'.
+    """
+
+    value: Array
+    jacobian: Array
+    row: Indices
+    key: Indices
+    bend: Array
+    bend_row: Indices
 
 
 _NO_CONTACTS = Contacts(
@@ -196,10 +218,11 @@ class Lineariser:
         other.take(self.goals, self.clearances - depth)
         return other
 
-    def at(self, q: Array, within: float) -> Linearisation:
+    def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
         """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
 
         Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
+        Supporting planes of the terms are added if they are asked for.
 
         Raises:
             InputError: q is no posture, or a term of one's own has another number of rows than at the start.
@@ -220,7 +243,7 @@ class Lineariser:
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
             self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared,
+            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, self._planes() if planes else None,
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
@@ -333,6 +356,20 @@ class Lineariser:
         self._kernel.wrench_rows(
             wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
         )
+
+    def _planes(self) -> TermPlanes | None:
+        """Supporting planes of the terms that have some, where the state is."""
+        if not self._plan.others:
+            return None
+        found: list[TermPlanes] = []
+        row = 0
+        for term, count in zip((*self.goals, *self.constraints), self.rows(), strict=True):
+            planes = term.supporting_planes(self.state)
+            if planes is not None:
+                rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
+                found.append(TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row))
+            row += count
+        return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:

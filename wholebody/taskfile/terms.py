@@ -254,6 +254,11 @@ METHODS = {
             Key("iterations", _number(ITERATIONS), "most iterations of one descent"),
             Key("budget", _number(BUDGET), "quadratic programs for further descents; 1000 if left out"),
             Key("restarts", _number(RESTARTS), "most further descents"),
+            Key(
+                "restarts_for_measure",
+                _number(RESTARTS),
+                "descents for lower measures once goals are met; 0 if left out",
+            ),
             Key("seed", _number(SEED), "of the starts of further descents"),
             Key("measures", kinds.Flag(), "whether to minimise the measures; false is faster, true if left out"),
             _TIME_LIMIT,

@@ -14,7 +14,8 @@ import pinocchio as pin
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.tasks.contact_parts import through
+from wholebody.tasks.base import SupportingPlanes
+from wholebody.tasks.contact_parts import one_sided, through
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, outermost
 
@@ -105,19 +106,29 @@ class Crossing(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The two rows, and wrenches."""
+        value, rows = self._all(state)
+        excess = value[1] - float(np.clip(value[1], -self.high, -self.low))
+        held = bool(excess) or self.low == self.high
+        return np.array([value[0], excess]), np.array([rows[0], rows[1] if held else np.zeros_like(rows[1])])
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The ends of the room along the bar."""
+        value, rows = self._all(state)
+        return one_sided(np.array([value[1] + self.low, -value[1] - self.high]), np.array([rows[1], -rows[1]]))
+
+    def _all(self, state: State) -> tuple[Array, Array]:
+        """What is across the palm and how far the bar's middle is along the bar (2,), and their derivative (2, nv)."""
         center, axes = self.bar.at(state)
         frame, along = state.frame(self.place.frame), axes[2]
         palm, fingers = frame.translation, frame.rotation[:, 0]
         way = center - palm
         level = fingers - (fingers @ along) * along  # x . (1 - l l') (c - p) = level . way
         reach = float(along @ way)
-        excess = reach - float(np.clip(reach, -self.high, -self.low))
         # of the hand against the thing, seen from the thing: the hand's velocity v and rotation w
-        held = bool(excess) or self.low == self.high
-        wrench = through(palm, np.array([-level, -along if held else np.zeros(3)]))
+        wrench = through(palm, np.array([-level, -along]))
         wrench[0, 3:] += pin.skew(fingers) @ (way - reach * along)
         joints = np.full(2, self.place.joint, dtype=np.intp), np.full(2, self.bar.joint, dtype=np.intp)
-        return np.array([level @ way, excess]), state.rows(wrench, *joints)
+        return np.array([level @ way, reach]), state.rows(wrench, *joints)
 
 
 class Looking(NamedTuple):

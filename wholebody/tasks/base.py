@@ -12,11 +12,11 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from typing import TYPE_CHECKING, Any, Protocol, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.arrays import Array, Indices, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
 
@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 
 _T = TypeVar("_T")
+
+MOST_PLANES = 1 << 16  # more than one term ever has
 
 
 class Surroundings(Protocol):
@@ -53,6 +55,27 @@ def filled(term: _T, **values: object) -> _T:
     for name, value in values.items():
         object.__setattr__(result, name, value)
     return result
+
+
+class SupportingPlanes(NamedTuple):
+    """Inequalities ``value <= 0`` about a posture.
+
+    Attributes:
+        value: (k,) [m].
+        jacobian: (k, nv) their derivative.
+        key: (k,) numbers that name a plane from one posture to the next, each less than `MOST_PLANES`.
+        slack: (k,) what the tolerance to which terms are met leaves: a plane is at work where its value is above -slack
+            [m].
+        bend: (b, nv) rows b with the second derivatives of the term's rows as sums of b' b, where they are positive.
+        bend_row: (b,) the row of the term that a bend is of.
+    """
+
+    value: Array
+    jacobian: Array
+    key: Indices
+    slack: Array
+    bend: Array
+    bend_row: Indices
 
 
 class Term:
@@ -102,6 +125,14 @@ class Goal(Term, ABC):
         """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
         return np.zeros((), dtype=bool)
 
+    def supporting_planes(self, state: State) -> SupportingPlanes | None:
+        """Inequalities that hold wherever the goal is met, and that its own rows do not tell of to first order.
+
+        An error with kinks, such as the distance to a thing with edges, has one derivative on each side of a kink. The
+        planes on both sides of it say where the kink is. None, as here, for a smooth error.
+        """
+        return None
+
     @abstractmethod
     def error(self, state: State) -> Array:
         """(m,) remaining error, in metres and radians; zero when the goal is met."""
@@ -141,6 +172,10 @@ class Constraint(Term, ABC):
     def angular(self) -> Mask:
         """(m,) which rows are in radians, the others being in metres; a single value holds for all rows."""
         return np.zeros((), dtype=bool)
+
+    def supporting_planes(self, state: State) -> SupportingPlanes | None:
+        """Inequalities that hold wherever the constraint does; see `Goal.supporting_planes`."""
+        return None
 
     @abstractmethod
     def value(self, state: State) -> Array:

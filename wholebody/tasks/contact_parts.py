@@ -15,9 +15,14 @@ import pinocchio as pin
 from wholebody.arrays import Array, Mask
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
-from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import Face, Surface, nearest
+from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, faces_met, foot, nearest
+
+FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
+ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance
+MOST_OF_PART = 3 * MOST_FACES  # planes: more than one part ever has
+PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
 
 class Part(Protocol):
@@ -31,17 +36,55 @@ class Part(Protocol):
         """Values (m,) and their derivative (m, nv)."""
 
 
+class Bounded(Part, Protocol):
+    """A part whose rows have kinks."""
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """What says where the kinks are; keys are less than `MOST_PLANES` of a part."""
+
+
+class RoundEnd(NamedTuple):
+    """A point on the round surface of its own piece, which touches there only where the two normals are opposed.
+
+    With c the centre of curvature, p the point and P(c) the point of the other surface nearest to c, they are where
+    p = P(c). The distance of the piece says so to second order alone, by r (1 - cos t) for an angle t: its derivative
+    vanishes there. The two rows t_k . (p - P(c)) do not.
+
+    Attributes:
+        center: (3,) c in the axes of the joint [m].
+        across: (2, 3) t_k, two directions in the axes of the joint, along the surface at the point.
+        room: what the rows may be for the piece to be inside by `ROUND_DEPTH` [m].
+    """
+
+    center: Array
+    across: Array
+    room: float
+
+    def rows(self, point: Surface, other: Surface, near: Nearest, state: State) -> tuple[Array, Array]:
+        """Values (2,) and derivatives (2, nv)."""
+        place = state.data.oMi[near.against]
+        tip, center, across = point.placed(0, state).translation, place.act(self.center), self.across @ place.rotation.T
+        there = foot(other, near.pieces[1], center, state)
+        moves = np.array([foot(other, near.pieces[1], center + FOOT_STEP * way, state) - there for way in across])
+        arm = tip - there
+        wrench = through(tip, across) - through(center, moves / FOOT_STEP)
+        wrench[:, 3:] += np.cross(across, arm)
+        return across @ arm, _between(state, wrench, near.against, near.joint)
+
+
 class Gap(NamedTuple):
     """The signed distance of two surfaces: one row, zero where they touch [m].
 
     Attributes:
         first, second: the surfaces.
         face: the face of the second that the first is to lie on; None where any side will do.
+        end: of a first surface that is a point on its own round piece.
     """
 
     first: Surface
     second: Surface
     face: Face | None = None
+    end: RoundEnd | None = None
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -53,6 +96,35 @@ class Gap(NamedTuple):
         near = nearest(self.first, self.second, state)
         wrench = through(near.point, near.normal[None])
         return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """Of faces that a touching point is not beyond, and of the angle between the normals at a round end."""
+        near = nearest(self.first, self.second, state)
+        if near.distance > PLANES_WITHIN:
+            return no_planes(state.model.nv)
+        found = [*faces_met(self.first, self.second, near.pieces, state)]
+        back = faces_met(self.second, self.first, near.pieces[::-1], state)
+        joints = [(near.against, near.joint)] * len(found)
+        found += [plane._replace(key=plane.key + MOST_FACES) for plane in back]
+        joints += [(near.joint, near.against)] * (len(found) - len(joints))
+        wrench = np.vstack([np.zeros((0, 6)), *(through(plane.point, plane.normal[None]) for plane in found)])
+        of, against = np.array(joints, dtype=np.intp).reshape(-1, 2).T
+        value = np.array([plane.value for plane in found])
+        rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
+        key = np.array([plane.key for plane in found], dtype=np.intp)
+        turned = bends(self.first, self.second, near, state)
+        bend = _between(state, through(near.point, turned), near.joint, near.against)
+        if self.end is None:
+            return SupportingPlanes(value, rows, key, np.zeros(len(value)), bend, np.zeros(len(bend), dtype=np.intp))
+        upright, turns = self.end.rows(self.first, self.second, near, state)
+        return SupportingPlanes(
+            np.concatenate([value, upright - self.end.room, -upright - self.end.room]),
+            np.vstack([rows, turns, -turns]),
+            np.concatenate([key, 2 * MOST_FACES + np.arange(4)]),
+            np.concatenate([np.zeros(len(value)), np.full(4, 2.0 * self.end.room)]),
+            bend,
+            np.zeros(len(bend), dtype=np.intp),
+        )
 
 
 class Near(NamedTuple):
@@ -79,6 +151,11 @@ class Near(NamedTuple):
         value, row = Gap(self.first, self.second).rows(state)
         beyond = value - self.most
         return (beyond, row) if beyond[0] > 0.0 else (np.zeros(1), np.zeros_like(row))
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The distance that they may be apart."""
+        value, row = Gap(self.first, self.second).rows(state)
+        return one_sided(value - self.most, row)
 
 
 class Facing(NamedTuple):
@@ -158,14 +235,21 @@ class Over(NamedTuple):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """How far out it is along each axis."""
+        along, moves = self._along(state)
+        value = along - np.clip(along, self.low, self.high)
+        return value, np.where(((value != 0.0) | (self.low == self.high))[:, None], moves, 0.0)
+
+    def planes(self, state: State) -> SupportingPlanes:
+        """The sides of the box."""
+        along, moves = self._along(state)
+        return one_sided(np.concatenate([along - self.high, self.low - along]), np.vstack([moves, -moves]))
+
+    def _along(self, state: State) -> tuple[Array, Array]:
+        """Coordinates (k,) of the origin along the axes, and their derivative (k, nv)."""
         center, axes = self.face.at(state)
         axes = axes[: len(self.low)]
         point = state.frame(self.place.frame).translation
-        along = axes @ (point - center)
-        value = along - np.clip(along, self.low, self.high)
-        moves = np.where(((value != 0.0) | (self.low == self.high))[:, None], axes, 0.0)
-        wrench = through(point, moves)
-        return value, _between(state, wrench, self.place.joint, self.face.joint)
+        return axes @ (point - center), _between(state, through(point, axes), self.place.joint, self.face.joint)
 
 
 def through(point: Array, forces: Array) -> Array:
@@ -215,6 +299,36 @@ class ContactTerm(Goal, Constraint):
     def jacobian(self, state: State) -> Array:
         """(m, nv) the derivative."""
         return np.vstack([part.rows(state)[1] for part in self.parts])
+
+    def supporting_planes(self, state: State) -> SupportingPlanes:
+        """Planes of the faces about every gap: past an edge there is no surface left to slide on."""
+        return planes_of(self.parts, state)
+
+
+def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
+    """Planes of values (k,) that are to be at most zero, with their derivative (k, nv); without those far beyond."""
+    near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
+    none = no_planes(jacobian.shape[1])
+    return none._replace(value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))
+
+
+def no_planes(nv: int) -> SupportingPlanes:
+    """None at all."""
+    none, rows, index = np.zeros(0), np.zeros((0, nv)), np.zeros(0, dtype=np.intp)
+    return SupportingPlanes(none, rows, index, none, rows, index)
+
+
+def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
+    """The supporting planes of all parts that have some."""
+    found = [no_planes(state.model.nv)]
+    row = 0
+    for number, part in enumerate(parts):
+        if hasattr(part, "planes"):
+            bounded: Bounded = part
+            planes = bounded.planes(state)
+            found.append(planes._replace(key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
+        row += len(part.in_radians)
+    return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 
 
 def owner_pairs(first: Iterable[str], second: Iterable[str]) -> tuple[tuple[str, str], ...]:

@@ -14,8 +14,8 @@ from wholebody.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.base import Constraint, Surroundings, filled
-from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs
+from wholebody.tasks.base import Constraint, SupportingPlanes, Surroundings, filled
+from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs, planes_of
 from wholebody.tasks.sit import UP
 from wholebody.tasks.support import STANDING_HEIGHT, hull_corners, low_points
 from wholebody.tasks.surfaces import face, segments_beyond, surface
@@ -138,6 +138,10 @@ class Stand(Constraint):
         """(m, nv)."""
         rows = [part.rows(state)[1] for part in self.parts]
         return np.vstack(rows if self.polygon is None else [*rows, self.polygon.rows(state)[1]])
+
+    def supporting_planes(self, state: State) -> SupportingPlanes:
+        """Planes of the faces about the soles, and the ends of the face that they stand on."""
+        return planes_of(self.parts, state)
 
 
 class SolePolygon(NamedTuple):

@@ -24,6 +24,10 @@ from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
+FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
+MOST_FACES = 256  # more than a piece ever has
+SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
+GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
 TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
 
 
@@ -65,7 +69,7 @@ class Nearest(NamedTuple):
         point: (3,) a point on the line of both nearest points [m].
         joint: joint that carries the piece of the second surface.
         against: joint that carries the piece of the first.
-        pieces: numbers of the two pieces in their surfaces.
+        pieces: number of the piece of the first surface, and of the second.
     """
 
     distance: float
@@ -74,6 +78,22 @@ class Nearest(NamedTuple):
     joint: int
     against: int
     pieces: tuple[int, int]
+
+
+class FacePlane(NamedTuple):
+    """The plane of a face of one piece, and the point of another piece that is farthest behind it.
+
+    Attributes:
+        value: how far in front of the plane that point is [m]; not positive where the pieces touch.
+        normal: (3,) outward.
+        point: (3,) [m].
+        key: number of the face.
+    """
+
+    value: float
+    normal: Array
+    point: Array
+    key: int
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
@@ -193,6 +213,84 @@ def between_pieces(first: Any, placed: Any, second: Any, other: Any) -> Any:
 def _origins(placements: list[pin.SE3]) -> Array:
     """Translations (k, 3) of placements."""
     return np.array([place.translation for place in placements])
+
+
+def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
+    """The point (3,) of a piece that is nearest to a point (3,) outside of it."""
+    place = pin.SE3(np.eye(3), point)
+    found = between_pieces(coal.Sphere(POINT), place, surface.shapes[number], surface.placed(number, state))
+    return np.array(found.getNearestPoint2())
+
+
+def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: State) -> list[FacePlane]:
+    """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
+
+    Faces that another piece of the second surface goes on beyond are no end of it, and are left out.
+    """
+    i, j = pieces
+    swept = swept_points(second.shapes[j])
+    if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
+        return []
+    ours, theirs = first.placed(i, state), second.placed(j, state)
+    normals = swept.faces[:, :3] @ theirs.rotation.T
+    offsets = swept.faces[:, 3] + normals @ theirs.translation
+    points = np.array([_behind(first.shapes[i], ours, normal) for normal in normals])
+    values = np.einsum("ij,ij->i", normals, points) - offsets
+    found = []
+    for key in np.argsort(-values)[:FACES].tolist():
+        if not _goes_on(second, j, normals[key], offsets[key], points[key], state):
+            found.append(FacePlane(float(values[key]), normals[key], points[key], key))
+    return found
+
+
+def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
+
+    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none.
+    """
+    i, j = near.pieces
+    a, b = first.placed(i, state), second.placed(j, state)
+    round_by = _roundness(first, i) + _roundness(second, j)
+    if round_by == 0.0:
+        return np.zeros((0, 3))
+    along = across(near.normal)[:2]
+    turned, step = np.empty((2, 2)), SLIDE * round_by
+    for row, way in enumerate(along):
+        normals = []
+        for sign in (-step, step):
+            slid = pin.SE3(b.rotation, b.translation + sign * way)
+            normals.append(np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
+        turned[row] = along @ (normals[1] - normals[0]) / (2.0 * step)
+    values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
+    values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
+    return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
+
+
+def _roundness(surface: Surface, number: int) -> float:
+    """Radius by which a piece is round [m]; 0 for a point and what has flat faces, the least of an ellipsoid."""
+    if surface.fixed is not None:
+        return 0.0
+    swept = swept_points(surface.shapes[number])
+    return float(swept.radius) if len(swept.points) or not np.isfinite(swept.reach) else 0.5 * float(swept.width)
+
+
+def _behind(shape: Any, placement: pin.SE3, normal: Array) -> Array:
+    """The point (3,) of a piece that is farthest against a direction (3,)."""
+    points = outermost(shape, placement, -normal)
+    return np.asarray(points[int(np.argmin(points @ normal))])
+
+
+def _goes_on(thing: Surface, number: int, normal: Array, offset: float, point: Array, state: State) -> bool:
+    """Whether another piece than `number` reaches beyond a plane near a point (3,)."""
+    for other, shape in enumerate(thing.shapes):
+        if other != number:
+            place = thing.placed(other, state)
+            if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + GOES_ON:
+                if not np.isfinite(thing.reach[other]):
+                    return True
+                if float((outermost(shape, place, normal) @ normal).max()) > offset + ACCURACY:
+                    return True
+    return False
 
 
 def _between(first: Array, second: Array) -> Array:

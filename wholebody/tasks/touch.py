@@ -12,11 +12,14 @@ from wholebody.arrays import Array
 from wholebody.checks import shown
 from wholebody.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Part, owner_pairs
-from wholebody.tasks.surfaces import Surface, carried_by, face, surface
+from wholebody.tasks.contact_parts import ROUND_DEPTH, ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
+from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
+
+ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,6 +60,10 @@ class Touch(ContactTerm):
         """What touches."""
         return self.part
 
+    def nearest_points(self, state: State) -> Array:
+        """(3,) the middle of the two nearest points, once resolved [m]: where they touch."""
+        return nearest(self.parts[0].first, self.parts[0].second, state).point  # type: ignore[attr-defined]
+
     def resolve(self, scene: Surroundings, start: Array) -> Touch:
         """Find the two surfaces.
 
@@ -68,7 +75,9 @@ class Touch(ContactTerm):
         first, second = surface(scene, self.part, where), surface(scene, self.thing, where)
         check_apart(first, second, where)
         return filled(
-            self, parts=(Gap(first, second),), touches=owner_pairs(touched(scene, first), touched(scene, second))
+            self,
+            parts=(Gap(first, second, end=round_end(scene, first)),),
+            touches=owner_pairs(touched(scene, first), touched(scene, second)),
         )
 
 
@@ -126,6 +135,26 @@ class Lean(ContactTerm):
         facing = Facing(place, across(self.resolved_side), leaned_on, np.array((0.0, 0.0, -1.0)))
         parts = (Gap(first, second, leaned_on), facing)
         return filled(self, parts=parts, touches=owner_pairs(touched(scene, first), second.owners))
+
+
+def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
+    """The round piece on whose surface a point is; None for other surfaces and places."""
+    if point.fixed is None:
+        return None
+    own = carried_by(scene, point.name, point.joints[0])
+    for index, shape in zip(own.pieces, own.shapes, strict=True):
+        swept = swept_points(shape)
+        if not swept.radius:
+            continue
+        place = scene.geometry.geometryObjects[index].placement
+        there = place.actInv(point.fixed.translation)
+        low, high = swept.points.min(axis=0), swept.points.max(axis=0)
+        center = np.clip(there, low, high)  # a sphere's centre, or the segment of a capsule along its own axis
+        if abs(float(np.linalg.norm(there - center)) - swept.radius) <= ON_SURFACE:
+            basis = across(place.rotation @ (there - center) / float(np.linalg.norm(there - center)))
+            room = float(np.sqrt(ROUND_DEPTH * swept.radius))  # |rows| <= sqrt(2 r d), each the root of half of that
+            return RoundEnd(place.act(center), basis[:2], room)
+    return None
 
 
 def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:

@@ -23,6 +23,7 @@ PATTERN = (
     + ("file", "own term", "file", "solve")
     + ("file", "pairs", "file", "sleeper")
     + ("file", "weights", "file", "put")
+    + ("file", "contact")
 )
 """Kinds of cases in turn: two mutated files for each solve, as the targets of a long run have it."""
 KINDS = tuple(dict.fromkeys(PATTERN))

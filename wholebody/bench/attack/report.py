@@ -25,6 +25,7 @@ ATTACKED = {
     "sweep": "sweeps against a fine subdivision",
     "pairs": "things in each other, against every two pieces",
     "sleeper": "sleeping bodies whose support creeps, turns, jumps or leaves",
+    "contact": "contacts, against the effort of a point or frame at the place found",
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
     "own term": "solves and steps with terms of one's own that are not finite, or answer something odd",

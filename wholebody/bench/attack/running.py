@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from wholebody.bench.attack import arguments, files, frames, own_terms, solves, streams, sweeps, worlds
+from wholebody.bench.attack import arguments, contacts, files, frames, own_terms, solves, streams, sweeps, worlds
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
 from wholebody.errors import UnknownNameError, WholebodyError
 from wholebody.files import Scratch
@@ -102,6 +102,7 @@ WRITERS = {
     "sleeper": worlds.written_sleeper,
     "weights": frames.written_mixed,
     "put": frames.written_put,
+    "contact": contacts.written,
 }
 
 

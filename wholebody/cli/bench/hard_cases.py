@@ -155,15 +155,15 @@ def _print(result: Result) -> None:
     "random hard cases of every kind, judged",
     """\
 Attack the package with random hard cases: solves that begin inside things, with goals that contradict or are out of
-reach; streams; sweeps; mutated files; odd arguments. Answers are judged by coal over all pairs and by Pinocchio alone.
-Every failure is written as a script that repeats it. Case K of a seed is always the same. The exit code is 1 where
-something was wrong: a false claim, an error other than one sentence, a crash, or no end within a minute. What ended
-before Ctrl-C is written.""",
+reach; streams; sweeps; contacts beside points at the place found; mutated files; odd arguments. Answers are judged by
+coal over all pairs and by Pinocchio alone. Every failure is written as a script that repeats it. Case K of a seed is
+always the same. The exit code is 1 where something was wrong: a false claim, an error other than one sentence, a crash,
+or no end within a minute. What ended before Ctrl-C is written.""",
     option("--seconds", type=float, default=60.0, metavar="S", help="how long (default: 60)"),
     seed("of all cases"),
     option("--first", type=int, default=0, metavar="K", help="number of the first case (default: 0)"),
     count("--cases", None, "end after as many cases, if the time suffices"),
-    listed("--kinds", "of cases: solve, stream, sweep, file, argument", "KIND"),
+    listed("--kinds", "of cases: solve, stream, sweep, contact, file, argument", "KIND"),
     count("--jobs", 1, "processes at a time"),
     listed("--also", "attack.csv of other runs, counted too", "CSV", type=Path, default=[]),
     folders("out/attack"),

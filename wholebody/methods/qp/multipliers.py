@@ -24,6 +24,8 @@ from wholebody.arrays import Array
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.subproblem import Rows, compiled_kernel
 
+SAME = 0.99  # cosine of the angle between two rows from which on they count as one
+
 
 class Multipliers(NamedTuple):
     """Multipliers of a program's rows, in units of the measures for each metre or radian.
@@ -44,6 +46,13 @@ class Multipliers(NamedTuple):
             self.soft, self.elastic, self.key, rows.soft_error, rows.key, rows.elastic_violation
         )
         return measure + work
+
+    def net(self, rows: Rows) -> Array:
+        """(m,) y without what elastic rows of the same direction take back: a gap of zero that must not be negative."""
+        pushing = np.flatnonzero(self.elastic > 0.0)
+        long = np.linalg.norm(rows.soft, axis=1), np.linalg.norm(rows.elastic[pushing], axis=1)
+        along = (rows.soft @ rows.elastic[pushing].T) / np.maximum(np.outer(*long), 1e-12)
+        return np.asarray(self.soft - (along > SAME) @ self.elastic[pushing])
 
     def change(self, program: QuadraticProgram, x: Array) -> float:
         """What errors and violations add to L, to first order, with the displacement x (n,): y' A x - z' C x."""

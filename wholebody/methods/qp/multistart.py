@@ -47,6 +47,7 @@ STATIONARY = 0.01  # share of the error that they may still gain: they end where
 PUSHING_OUT = 6  # most programs of each
 INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
 STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
+SCREENED = 4  # feasible postures that are looked for, for each that is descended from; more = lower measures, slower
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
 
 
@@ -59,6 +60,7 @@ class Settings(NamedTuple):
     restarts: int
     seed: int
     measures: bool
+    restarts_for_measure: int = 0
 
 
 class Search:
@@ -95,6 +97,7 @@ class Search:
         """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found."""
         self._try_ways(begin)
         self._come_nearest()
+        self._restart_for_measure()
         if self.best.violation.worst <= self.settings.tolerance:
             self.contradictions = ()  # by less than what is asked
         if self._out_of_reach:  # which is known, although a nearer posture may be near
@@ -144,6 +147,29 @@ class Search:
             yield self._feasibility_first(local.q), "from before contact"
             if self.control.spent > FOR_WAYS:
                 return
+
+    def _restart_for_measure(self) -> None:
+        """Where all is met, look for a lower minimum of the measures, from other starts that are screened first.
+
+        A posture that fits costs a few programs and its measure tells which minimum it is near; a descent costs many.
+        So of `SCREENED` times as many postures that fit, those with the least measures are descended from.
+        """
+        count, tolerance = self.settings.restarts_for_measure, self.settings.tolerance
+        if not (count and self.settings.measures and self.best.violation.worst <= tolerance):
+            return
+        start = self.problem.scene.figure.clamp(self.problem.start)
+        rng = np.random.default_rng([self.settings.seed, count])
+        found: list[LocalSolution] = []
+        for q in chain([start], restarts(self.problem, self.lineariser.state, start, rng, SCREENED * count - 1)):
+            if self.control.over:
+                return
+            local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "for measure").once(q)
+            self.spent += local.iterations
+            if local.violation.worst <= tolerance:
+                found.append(local)
+        for local in sorted(found, key=lambda each: each.measure)[:count]:
+            if not self.control.over:
+                self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""

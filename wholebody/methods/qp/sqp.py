@@ -46,6 +46,7 @@ UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the mea
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
+BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
@@ -140,6 +141,8 @@ class SQP:
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0
+        self._multipliers: Multipliers | None = None
+        self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
@@ -156,7 +159,7 @@ class SQP:
                 break
             count += 1
             program = self.subproblem.program(
-                here.at,
+                self._bent(here),
                 here.rows,
                 self._radius,
                 None if self._full_step else self._pull,
@@ -204,15 +207,30 @@ class SQP:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
         if here.violation.worst > self.tolerance or not self._measures:
             return
-        worth = 10.0 * self.tolerance * (1.0 + abs(here.at.measure))
-        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
+        worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
+        clearly = self._kept is None or self._lagrangian(self._kept) - self._lagrangian(here) > worth
         self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
 
     def _better_than_kept(self, here: Iterate) -> bool:
         fits = here.violation.worst <= self.tolerance
-        return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
+        return fits and (self._kept is None or self._lagrangian(here) < self._lagrangian(self._kept))
+
+    def _lagrangian(self, here: Iterate) -> float:
+        y = self._multipliers
+        return here.at.measure if y is None else y.lagrangian(here.at.measure, here.rows)
+
+    def _bent(self, here: Iterate) -> Linearisation:
+        """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
+
+        The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
+        """
+        planes = here.at.planes
+        if planes is None or self._tension is None or not len(planes.bend) or not self._measures:
+            return here.at
+        pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
+        return here.at._replace(squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     @property
     def _pull(self) -> float:
@@ -227,11 +245,13 @@ class SQP:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
             multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
+            self._multipliers, self._tension = multipliers, multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
                 saved -= multipliers.change(program, parts.tangential)
-            flat = saved <= self.tolerance * (1.0 + abs(here.at.measure))
+            bent = here.at.planes is not None and len(here.at.planes.bend)
+            flat = saved <= (BENT if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
             x = parts.normal if flat else x  # what is asked is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
@@ -349,7 +369,7 @@ class SQP:
 
     def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
         within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
-        at = self.lineariser.at(q, within)
+        at = self.lineariser.at(q, within, planes=self.offset is None)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from wholebody.arrays import Array
 from wholebody.errors import InputError
 from wholebody.figures.state import State
-from wholebody.linearisation import Linearisation
+from wholebody.linearisation import Linearisation, TermPlanes
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.problem import Problem
 
@@ -34,6 +34,7 @@ FORCE = np.array([GOAL_FORCE, *GOAL_WEIGHTS, HOLD_WEIGHT])
 LEAST_SHARE = 1e-3  # of the largest goal weight: goals that weigh less count as this much, or they would not be met
 HEAVIEST_CURVATURE = 5e3  # 1/rad^2: heavier measures are scaled to this; above it they would hold goals back
 MOST_ROWS = 4096  # more than one contact ever has
+PLANE_KEYS = -(1 << 40)  # keys of supporting planes are below this, out of the way of all others
 LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
 LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
 
@@ -79,6 +80,7 @@ class Rows(NamedTuple):
         contact: (k,) rows of one contact share its number; the worst of them counts.
         contacts: how many numbers there are.
         key: (k,) names a row from one linearisation to the next.
+        elastic_weight: (k,) their weights; None where all have `ELASTIC_WEIGHT`.
     """
 
     soft: Array
@@ -90,6 +92,25 @@ class Rows(NamedTuple):
     contact: NDArray[np.intp]
     contacts: int
     key: NDArray[np.intp]
+    elastic_weight: Array | None = None
+
+
+def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
+    """Rows with the terms' supporting planes, which give way as the terms do and count for no violation of their own.
+
+    The gap itself counts, and is violated wherever a plane is.
+    """
+    count = len(planes.value)
+    weights = np.append(rows.soft_weight[: rows.goals], HOLD_WEIGHT)
+    return rows._replace(
+        elastic=np.vstack([rows.elastic, -planes.jacobian]),
+        elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
+        contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),
+        key=np.concatenate([rows.key, PLANE_KEYS - planes.key]),
+        elastic_weight=np.concatenate(
+            [np.full(len(rows.elastic), ELASTIC_WEIGHT), weights[np.minimum(planes.row, rows.goals)]]
+        ),
+    )
 
 
 class Subproblem:
@@ -159,9 +180,15 @@ class Subproblem:
             soft_values, elastic_rows, violated, labels,
         )  # fmt: skip
         contacts = self.one_sided + len(at.contacts.distance)
-        return Rows(
+        rows = Rows(
             soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
         )  # fmt: skip
+        return rows if at.planes is None else _with_planes(rows, at.planes)
+
+    def soft_row(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
+        """The soft rows of rows (k,) that are counted with the goals' before all values'; they are equalities."""
+        goals = len(self.goal_share)
+        return np.where(row < goals, row, goals + np.searchsorted(self._equal, row - goals))
 
     def check_rows(self, goals: int, values: int) -> None:
         """Raise InputError where goals and constraints have other numbers of rows than when this was set up."""
@@ -244,7 +271,7 @@ class Subproblem:
             weight=weight,
             elastic=rows.elastic,
             least=least,
-            elastic_weight=np.full(len(least), ELASTIC_WEIGHT),
+            elastic_weight=np.full(len(least), ELASTIC_WEIGHT) if rows.elastic_weight is None else rows.elastic_weight,
             lower=columns[2],
             upper=columns[3],
         )

@@ -88,7 +88,10 @@ def violation(
     worst: Array,
     displacement: Array,
 ) -> tuple[float, float, float, float]:
-    """The figures of `Violation` after a displacement: (nv,), or empty for none; `worst` (contacts,) is room."""
+    """The figures of `Violation` after a displacement: (nv,), or empty for none; `worst` (contacts,) is room.
+
+    Elastic rows of the contact -1 do not count.
+    """
     goals, moves = len(share), len(displacement) > 0
     goal, hold, left, total = 0.0, 0.0, 0.0, 0.0
     for r in range(len(soft_error)):
@@ -107,7 +110,8 @@ def violation(
         if moves:
             for i in range(len(displacement)):
                 violation -= elastic[r, i] * displacement[i]
-        worst[contact[r]] = max(worst[contact[r]], violation)
+        if contact[r] >= 0:
+            worst[contact[r]] = max(worst[contact[r]], violation)
     for c in range(len(worst)):
         total += worst[c]
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)

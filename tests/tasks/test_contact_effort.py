@@ -1,0 +1,133 @@
+"""What a contact term costs beside a point or frame at the place that it found, and what says where its kinks are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.arrays import Array
+from wholebody.figures.state import State
+
+AS_CHEAP = 1.02  # times the effort at the place
+STATIONARY = 1e-2  # rad, m
+CASES = {
+    "frame on a box": (wb.Touch("right_index_tip", "thing"), 8),
+    "frame on an edge": (wb.Touch("right_index_tip", "thing"), 3),
+    "frame on a rotated box": (wb.Touch("right_index_tip", "thing"), 25),
+    "segment on a box": (wb.Touch("right_hand", "thing"), 3),
+    "piece on a box": (wb.Touch("right_hand:2", "thing"), 6),
+    "palm on a box": (wb.Grasp("right", "thing"), 5),
+}
+
+
+def turned_box(seed: int) -> wb.Scene:
+    rng = np.random.default_rng(seed)
+    size, place = rng.uniform(0.05, 0.5, 3), rng.uniform((0.25, -0.6, 0.6), (0.8, 0.3, 1.5))
+    turn = rng.normal(size=4)
+    scene = wb.Scene(wb.load("human", sex="female"))
+    return scene.add(wb.Box(tuple(size)), name="thing", at=(*place, *(turn / np.linalg.norm(turn))))
+
+
+def effort_there(problem: wb.Problem, q: Array, goals: list[wb.Goal]) -> float:
+    """The effort of the best of two solves at the place, from the start and from the answer, which fits it."""
+    touching = [pair for term in problem.goals for pair in term.touching]
+    there = wb.solve(wb.Problem(problem.scene, problem.start, goals=goals, touching=touching))
+    assert there.status == "solved"
+    return there.assessment.measure
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
+    term, seed = CASES[name]
+    problem = wb.Problem(turned_box(seed), goals=[term])
+    solution = wb.solve(problem)
+    assert solution.status == "solved"
+    assert solution.assessment.optimality < STATIONARY
+    scene, touch = problem.scene, problem.goals[0]
+    frame = {"right_hand:2": "right_hand"}.get(term.frame, term.frame)
+    place = scene.state(solution.q).frame(scene.figure.frame_id(frame))
+    point = touch.nearest_points(scene.state(solution.q)) if isinstance(touch, wb.Touch) else place.translation
+    goal: wb.Goal = wb.Point(frame, point, offset=place.actInv(point))
+    if not isinstance(touch, wb.Touch):
+        goal = wb.Frame(frame, np.r_[place.translation, pin.Quaternion(place.rotation).coeffs()])
+    assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
+
+
+@pytest.mark.parametrize("back", [False, True])
+@pytest.mark.filterwarnings("ignore:nothing holds the figure")
+def test_a_seat_is_sat_on_where_it_is_cheapest(back: bool) -> None:
+    """The pelvis ends at the edge of its room over the seat, where the rows of that room have a kink."""
+    scene = wb.Scene(wb.load("human", sex="male"))
+    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.05, 0.40))
+    scene.add(wb.Box((0.03, 0.48, 0.36)), name="back", at=(-0.57, 0.05, 0.84))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Sit("seat", "back") if back else wb.Sit("seat")]))
+    assert solution.status == "solved"
+    assert solution.assessment.optimality < STATIONARY
+
+
+TERMS = {
+    "point": wb.Touch("right_index_tip", "box"),
+    "segment": wb.Touch("left_hand", "box"),
+    "sit": wb.Sit("box"),
+    "stand": wb.Stand("box"),
+    "power": wb.Grasp("right", "bar", "power"),
+}
+
+
+@pytest.mark.parametrize("name", TERMS)
+def test_derivatives_of_supporting_planes(name: str) -> None:
+    """By finite differences; a point is put at the box first, for planes are those near a contact."""
+    figure = wb.load("human")
+    model = figure.model
+    start = figure.posture("standing")
+    scene = wb.Scene(figure)
+    tip = figure.placement(start, "right_index_tip").translation
+    at = {"sit": (*start[:2], start[2] - 0.30), "stand": (0.0, 0.0, -0.12)}.get(name, (*(tip + (0.05, 0.0, -0.125)),))
+    if name == "segment":
+        at = (*(figure.placement(start, "left_index_tip").translation + (0.05, 0.0, -0.125)),)
+    scene.add(wb.Box((0.2, 0.3, 0.24)), name="box", at=at)
+    scene.add(wb.Capsule(0.015, 0.5), name="bar", at=(*(tip + (0.03, 0.0, 0.05)), 0.6, 0.0, 0.0, 0.8))
+    term = TERMS[name].resolve(scene, start)
+    state = State(model)
+    if name != "point":
+        start = pin.integrate(model, start, 0.03 * np.random.default_rng(3).normal(size=model.nv))  # nothing is flat
+    planes = term.supporting_planes(state.update(start))
+    assert planes is not None
+    assert len(planes.value) > 1
+    half, rng = 1e-6, np.random.default_rng(1)
+    for way in rng.normal(size=(6, model.nv)):
+        found = []
+        for sign in (1.0, -1.0):
+            there = term.supporting_planes(state.update(pin.integrate(model, start, sign * half * way)))
+            values = dict(zip(there.key.tolist(), there.value.tolist(), strict=True))
+            found.append(np.array([values[key] for key in planes.key.tolist()]))
+        np.testing.assert_allclose((found[0] - found[1]) / (2.0 * half), planes.jacobian @ way, atol=6e-3)
+
+
+def test_planes_hold_where_a_contact_is_made_and_bend_as_a_sphere_does() -> None:
+    figure = wb.load("human")
+    q = figure.posture("standing")
+    tip = figure.placement(q, "right_index_tip").translation
+    scene = wb.Scene(figure).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=tip + (0.05, 0.02, -0.1))
+    planes = wb.Touch("right_index_tip", "box").resolve(scene, q).supporting_planes(scene.state(q))
+    faces = np.sort(planes.value[planes.key < 6])  # of the box; the others are those of the round end of the finger
+    np.testing.assert_allclose(faces, [-0.2, -0.15, -0.12, -0.08, -0.05, 0.0], atol=1e-8)
+    round_scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=tip + (0.0, 0.0, -0.05))
+    touch = wb.Touch("right_index_tip", "ball").resolve(round_scene, q)
+    bend = touch.supporting_planes(round_scene.state(q)).bend
+    row = round_scene.state(q).dense_jacobian(
+        wb.Point("right_index_tip", tip).resolve(round_scene, q).jacobian(round_scene.state(q))
+    )
+    np.testing.assert_allclose(bend.T @ bend, row[:2].T @ row[:2] / 0.05, atol=0.3)
+
+
+def test_more_time_buys_a_lower_minimum() -> None:
+    from wholebody.bench.problem_sets.registry import problem_set
+
+    problem = problem_set("passage").make(5, 0).problem
+    first = wb.solve(problem)
+    bought = wb.solve(problem, wb.QP(restarts_for_measure=1, time_limit=60.0))
+    assert first.status == bought.status == "solved"
+    assert bought.assessment.measure < 0.7 * first.assessment.measure
