@@ -304,7 +304,7 @@ def _solve_from(make: bytes, method: Method, q: Array) -> dict[str, Any] | None:
 
 def _alone(method: Any) -> Any:
     """The method without starts of its own, where it has such: those of the first solve led to nothing."""
-    return replace(method, restarts=0) if is_dataclass(method) and hasattr(method, "restarts") else method
+    return replace(method, restarts=0) if hasattr(method, "restarts") and is_dataclass(type(method)) else method
 
 
 def fingerprint(*asked: Any) -> str:
