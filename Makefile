@@ -71,7 +71,7 @@ $(BIN)/python:
 $(VENV)/.run: requirements/run.txt $(RECIPE) | $(BIN)/python
 	$(PIP) install -r requirements/run.txt
 	$(PIP) install --no-deps --editable .
-	$(BIN)/python -m wholebody.compiled
+	$(BIN)/python -m wholebody.base.compiled
 	touch $@
 
 $(VENV)/.test: requirements/test.txt $(VENV)/.run

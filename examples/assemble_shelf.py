@@ -10,7 +10,7 @@ import pinocchio as pin
 from presenting import OAK, STEEL, command_line, play
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 DEPTH, WIDTH, HEIGHT, THICK = 0.30, 0.80, 1.00, 0.02  # m: of the shelf, outside, and of its boards
 BOARD = (DEPTH, WIDTH - 2.0 * THICK, THICK)

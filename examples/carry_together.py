@@ -10,7 +10,7 @@ import pinocchio as pin
 from presenting import CARDBOARD, DARK, command_line, play
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 APART = 1.20  # m: between the two people, who face each other
 BOX = (0.46, 0.30, 0.22)  # m

@@ -9,7 +9,7 @@ import pinocchio as pin
 from presenting import DARK, LIGHT, OAK, STEEL, command_line
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench import plot_style as style
 from wholebody.view.parts import Part, Parts
 

@@ -10,7 +10,7 @@ from four_bar import COUPLER, CRANK, GROUND, ROCKER, Y, angle_of, bar, closed_fo
 from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 RADIUS = 0.012  # m: of the bars
 SLIDER = (0.08, 0.03, 0.06)  # m

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.figure import Figure as Chart
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.avoidance import Avoided
 from wholebody.view.filmstrip import write_filmstrip
 

@@ -9,7 +9,7 @@ import pinocchio as pin
 from presenting import CARDBOARD, DARK, OAK, STEEL, command_line, play
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.newton import quaternions as quat
 
 BAR, STAGES = 0.80, 2  # m: length of a bar; crossed pairs one above the other

@@ -16,8 +16,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 from weakref import WeakKeyDictionary
 
-from wholebody import runner
-from wholebody.runner import ONE_THREAD
+from wholebody.base import runner
+from wholebody.base.runner import ONE_THREAD
 
 # Before numpy is loaded, and for workers and child processes too. Threads of linear algebra wait by computing, which
 # takes three times the processor's time of the computation itself where workers share two cores.
@@ -29,10 +29,10 @@ import pinocchio as pin
 import pytest
 from hypothesis import HealthCheck, settings
 
-from wholebody.errors import WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.figures.description import Description
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.view import browser, screenshot
 from wholebody.view.browser import Browser
 
@@ -56,12 +56,12 @@ settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 LONG = (
     *("view/test_page.py", "examples/test_examples.py", "docs/test_pages.py", "motion/test_avoidance.py"),
-    *("test_compiled.py", "test_odd_arguments.py", "cli/test_show.py", "motion/bisection/test_method.py"),
+    *("base/test_compiled.py", "test_odd_arguments.py", "cli/test_show.py", "motion/bisection/test_method.py"),
     *("view/test_live_page.py", "motion/test_batch.py", "cli/test_commands.py", "view/test_files.py"),
-    *("bench/compare/test_run.py", "methods/test_contradictions.py", "test_batches.py", "doctor/test_checks.py"),
+    *("bench/compare/test_run.py", "methods/test_contradictions.py", "base/test_batches.py", "doctor/test_checks.py"),
     *("view/test_server.py", "tracking/test_moving_things.py", "tasks/test_rhythm.py", "view/test_legend.py"),
     *("tracking/test_scenes.py", "bench/test_daily.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
-    *("tracking/test_dragging.py", "bench/test_challenge.py", "test_runner.py", "methods/newton/test_method.py"),
+    *("tracking/test_dragging.py", "bench/test_challenge.py", "base/test_runner.py", "methods/newton/test_method.py"),
     *("view/surface/test_surface.py", "bench/stability/test_command.py", "bench/test_motion.py", "test_threads.py"),
     *("test_copies.py", "bench/test_commands.py"),
 )

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import nearest_names
 from wholebody.cli.main import main
-from wholebody.errors import nearest_names
 
 NAMES = ("left_hand", "right_hand", "left_palm", "right_palm", "right_index_tip", "left_index_tip", "head", "pelvis")
 

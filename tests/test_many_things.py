@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody import all_pairs
-from wholebody.all_pairs import AllPairs
+from wholebody.assessment import all_pairs
+from wholebody.assessment.all_pairs import AllPairs
 from wholebody.geometry import proximity, single_pairs
 from wholebody.geometry.continuous import sweep, swept_depth
 from wholebody.geometry.large_models import TABLED, geometry_model

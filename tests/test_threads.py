@@ -13,8 +13,8 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
+from wholebody.base.pool import OneAtATime, Pool
 from wholebody.figures.state import State
-from wholebody.pool import OneAtATime, Pool
 
 THREADS = 3
 FEET = ("left_foot", "right_foot")

@@ -12,14 +12,14 @@ The public names are loaded when they are first used, so that ``import wholebody
 
 from __future__ import annotations
 
-from wholebody.interrupts import end_quietly
+from wholebody.base.interrupts import end_quietly
 
 end_quietly()  # before anything that takes time
 
 from importlib import import_module  # noqa: E402
 from typing import TYPE_CHECKING  # noqa: E402
 
-from wholebody.errors import (  # noqa: E402
+from wholebody.base.errors import (  # noqa: E402
     FileFormatError,
     InputError,
     MissingPackageError,
@@ -29,8 +29,7 @@ from wholebody.errors import (  # noqa: E402
 from wholebody.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:
-    from wholebody.assessment import Assessment, assess
-    from wholebody.derivatives import DerivativeCheck, check_derivatives
+    from wholebody.assessment.posture import Assessment, assess
     from wholebody.dynamics.coupling import Spring
     from wholebody.dynamics.world import World
     from wholebody.ergonomics.angles import BodyAngles, body_angles
@@ -56,9 +55,6 @@ if TYPE_CHECKING:
         Sphere,
         Torus,
     )
-    from wholebody.matter.body import Body
-    from wholebody.matter.joints import BallJoint, Hinge
-    from wholebody.matter.materials import Material
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly import Assembly
@@ -67,6 +63,7 @@ if TYPE_CHECKING:
     from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
+    from wholebody.methods.simplification.simplify import simplify
     from wholebody.methods.solve import solve
     from wholebody.motion.avoidance import AvoidanceReport, Avoided, avoid
     from wholebody.motion.batch import BatchProgress, avoid_many, read_many
@@ -87,8 +84,10 @@ if TYPE_CHECKING:
     from wholebody.motion.torques import Torques, torques
     from wholebody.motion.trajectory.method import Trajectory
     from wholebody.problem import Problem
-    from wholebody.scene import Scene
-    from wholebody.simplification.simplify import simplify
+    from wholebody.scene.matter.body import Body
+    from wholebody.scene.matter.joints import BallJoint, Hinge
+    from wholebody.scene.matter.materials import Material
+    from wholebody.scene.scene import Scene
     from wholebody.solution import Solution
     from wholebody.studies.accommodation import Accommodation, accommodation, people
     from wholebody.studies.many import SolveProgress, solve_many
@@ -128,6 +127,7 @@ if TYPE_CHECKING:
         StepLimit,
         Touch,
     )
+    from wholebody.terms.derivatives import DerivativeCheck, check_derivatives
     from wholebody.tracking.drag import Drag
     from wholebody.tracking.path_following import follow_path
     from wholebody.view import Viewer
@@ -271,8 +271,8 @@ __all__ = [
 ]
 
 _MODULES = {
-    "wholebody.assessment": "Assessment assess",
-    "wholebody.derivatives": "DerivativeCheck check_derivatives",
+    "wholebody.assessment.posture": "Assessment assess",
+    "wholebody.terms.derivatives": "DerivativeCheck check_derivatives",
     "wholebody.figures": "Figure load",
     "wholebody.figures.human.fingers": "finger_angles",
     "wholebody.geometry.shapes": "Box Capsule Cylinder Ellipsoid HalfSpace Hull Mesh Shape Sphere Torus",
@@ -287,9 +287,9 @@ _MODULES = {
     "wholebody.ergonomics.static_torques": "StaticTorques static_torques",
     "wholebody.ergonomics.vision": "FieldOfView Sight sight",
     "wholebody.ergonomics.work": "Work",
-    "wholebody.matter.body": "Body",
-    "wholebody.matter.joints": "BallJoint Hinge",
-    "wholebody.matter.materials": "Material",
+    "wholebody.scene.matter.body": "Body",
+    "wholebody.scene.matter.joints": "BallJoint Hinge",
+    "wholebody.scene.matter.materials": "Material",
     "wholebody.methods.ccd.method": "CCD",
     "wholebody.methods.damped_least_squares": "DampedLeastSquares",
     "wholebody.tracking.drag": "Drag",
@@ -320,8 +320,8 @@ _MODULES = {
     "wholebody.motion.stance": "StanceFeet",
     "wholebody.motion.trajectory.method": "Trajectory",
     "wholebody.problem": "Problem",
-    "wholebody.scene": "Scene",
-    "wholebody.simplification.simplify": "simplify",
+    "wholebody.scene.scene": "Scene",
+    "wholebody.methods.simplification.simplify": "simplify",
     "wholebody.solution": "Solution",
     "wholebody.studies.accommodation": "Accommodation accommodation people",
     "wholebody.studies.many": "SolveProgress solve_many",

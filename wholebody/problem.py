@@ -13,20 +13,19 @@ from typing import Any, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.all_pairs import all_pairs
-from wholebody.arrays import Array
-from wholebody.errors import InputError, TermError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, TermError
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
-from wholebody.linearisation import Lineariser
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import in_words
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.tasks.defaults import default_constraints, default_measures
-from wholebody.term_plan import TermPlan, make_plan
-from wholebody.workspace import Workspace
+from wholebody.terms.linearisation import Lineariser
+from wholebody.terms.plan import TermPlan, make_plan
 
 LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
 
@@ -129,7 +128,7 @@ class Problem(checks.FixedAttributes):
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         self.clearances = np.zeros(len(scene.built.table.pairs))
-        with self.borrow() as workspace, all_pairs(scene.built).borrow():
+        with self.borrow() as workspace:
             state = workspace.state.update(self.start)
             self._check_frozen(state)
             _check_goals(self.goals, state)

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from wholebody.arrays import Array
-from wholebody.assessment import Assessment
+from wholebody.assessment.posture import Assessment
+from wholebody.base.arrays import Array
 
 Status = Literal["solved", "unreachable", "infeasible", "stalled"]
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 from tests.bench.following import followed
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.registry import installed_tools, make_tool
 from wholebody.bench.figure_track import figure_tracks
 from wholebody.bench.step import StepRow, taking
 from wholebody.bench.tables import read_rows
 from wholebody.bench.track import CLEARANCE, Track, judge
 from wholebody.cli.bench import add_to
-from wholebody.errors import InputError
 
 TOOLS = [name for name in ("wholebody", "placo", "placo/pruned", "pink", "mink") if name in installed_tools()]
 LINK = '<link name="{}"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>'

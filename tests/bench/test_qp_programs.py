@@ -11,12 +11,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.qp_programs import files
 from wholebody.bench.qp_programs.measuring import measure, residuals, summaries
 from wholebody.bench.qp_programs.recording import Recorded, record
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 

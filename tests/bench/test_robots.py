@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.robots import descriptions, examine, measure, page, tip_targets
 from wholebody.cli import main
-from wholebody.errors import InputError
 
 ROBOT = """<robot name="r"><link name="a"/>
 <link name="b"><collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.02" length="0.3"/></geometry>

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench import scaling
 from wholebody.bench.chains import LENGTH, ROOM, TIP, chain, task
 from wholebody.bench.scaling import SIMPLIFIED, ScalingRow, assembly_rows, exponent, rows
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
-from wholebody.errors import InputError
 from wholebody.figures.state import State
 
 

@@ -7,8 +7,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.track import BLOCK, DT, VARIANTS, Track, smooth_way, track
-from wholebody.errors import InputError, UnknownNameError
 
 
 def test_there_are_twenty_objects_and_at_least_700_pairs(short_free: Track) -> None:

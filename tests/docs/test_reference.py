@@ -8,7 +8,7 @@ from pathlib import Path
 
 import wholebody
 
-WHOLE_MODULES = ("wholebody.geometry.shapes", "wholebody.errors")
+WHOLE_MODULES = ("wholebody.geometry.shapes", "wholebody.base.errors")
 
 
 def test_the_reference_has_every_public_name(root: Path) -> None:

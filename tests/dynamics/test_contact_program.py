@@ -6,7 +6,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.dynamics import contact_kernel, solve_kernel
 
 ADMM = pytest.mark.skipif(not hasattr(pin, "ADMMContactSolver"), reason="this Pinocchio names its solver otherwise")

@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.errors import InputError, UnknownNameError
 
 G = 9.81
 AWAY = np.array([5.0, 0.0, 0.0])

@@ -7,9 +7,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
-from wholebody.errors import InputError
 
 G = 9.81
 

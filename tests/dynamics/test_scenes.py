@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.dynamics.scenes import WORLD_SCENES, build_world_scene, standing_scene
 from wholebody.dynamics.world import World, WorldFrame
-from wholebody.errors import InputError, UnknownNameError
 
 
 @cache

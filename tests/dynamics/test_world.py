@@ -10,7 +10,7 @@ import wholebody as wb
 from wholebody.dynamics.driven_impulses import contact_impulse
 from wholebody.dynamics.overlaps import overlaps
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.matter.materials import Surface
+from wholebody.scene.matter.materials import Surface
 
 DT = 1.0 / 60.0
 

@@ -17,7 +17,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion_assessment import assess_motion
+from wholebody.assessment.motion import assess_motion
 
 Example = Callable[[str], ModuleType]
 

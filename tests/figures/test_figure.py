@@ -4,7 +4,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import Figure, load
 from wholebody.figures.denavit_hartenberg import denavit_hartenberg
 

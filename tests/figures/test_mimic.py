@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.errors import FileFormatError
+from wholebody.base.errors import FileFormatError
 from wholebody.figures.state import State, Wrench
 from wholebody.methods import installed_methods
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 
 ARM = """<mujoco model="arm"><compiler angle="radian"/>
 <asset><mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/></asset>

@@ -6,7 +6,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import load
 from wholebody.figures.anthropometry import make_person, table
 from wholebody.figures.measuring import measure

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.figures import ReachCone, load
 from wholebody.figures.human.figure import human_cones
 

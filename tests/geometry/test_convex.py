@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from wholebody import FileFormatError, InputError
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry import convex
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces

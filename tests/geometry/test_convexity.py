@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import trimesh
 
+from wholebody.base.runner import BY_THE_CLOCK
 from wholebody.geometry import convex
 from wholebody.geometry.convex import convex_pieces
 from wholebody.geometry.convexity import is_convex, passes_through_itself
-from wholebody.runner import BY_THE_CLOCK
 
 Arrays = tuple[np.ndarray, np.ndarray]
 
@@ -91,7 +91,7 @@ def test_little_that_passes_through_itself_gets_little_time(monkeypatch: pytest.
             pass
 
     box = trimesh.creation.box((1.0, 2.0, 3.1))
-    monkeypatch.setattr("wholebody.runner.Child", Waiting)
+    monkeypatch.setattr("wholebody.base.runner.Child", Waiting)
     monkeypatch.setenv("WHOLEBODY_CACHE", "/nowhere")
     convex_pieces(np.array(box.vertices)[[0, 1, 2, 3, 4, 5, 7, 6]], box.faces)
     assert asked == [pytest.approx(1.0)]

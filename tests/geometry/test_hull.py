@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.components import enclosed_volume
 from wholebody.geometry.convex import HULL_VERTICES, convex_pieces, mesh_hull
 from wholebody.geometry.hull import MOST_NEIGHBOURS, hull_piece

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from wholebody import InputError
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.minkowski import Placed
 from wholebody.geometry.penetration import global_depth, object_penetration, object_penetrations
 from wholebody.geometry.separation import least_separation

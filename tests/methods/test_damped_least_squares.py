@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 
 

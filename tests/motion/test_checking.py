@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.clip_contacts import contact, contact_as_dict
 from wholebody.motion.ready_equipment import equipment
 

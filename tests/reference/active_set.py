@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
 from wholebody.geometry.contact_rows import ContactRowBuilder, ContactRows
 from wholebody.geometry.proximity import Contacts

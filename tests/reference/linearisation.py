@@ -1,4 +1,4 @@
-"""Everything that counts at a posture, term by term: what the compiled pass of `wholebody.linearisation` must do."""
+"""Everything that counts at a posture, term by term: what the pass of `wholebody.terms.linearisation` must do."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from tests.reference.contact_rows import ReferenceRowBuilder
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State, Wrench
-from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.tasks import StepLimit
 from wholebody.tasks.base import Constraint, Goal
+from wholebody.terms.linearisation import Linearisation, Lineariser
 
 
 class ReferenceLineariser(Lineariser):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, QueryResult, distances
 from wholebody.geometry.proximity import PairTable
 

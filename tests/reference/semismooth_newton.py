@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tests.reference.active_set import minimise_on_face
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import STILL, WHOLE
 

@@ -1,6 +1,6 @@
 """Studies do their jobs beside each other in threads, each with a child process, as on a cluster.
 
-joblib's own processes, each of which imports the package for seconds, are looked at in tests/test_batches.py.
+joblib's own processes, each of which imports the package for seconds, are looked at in tests/base/test_batches.py.
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.task_text import box, figure, hold, point, table
-from wholebody.errors import WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.taskfile import read_task
 
 GOOD = (

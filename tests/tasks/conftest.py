@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.errors import UnknownNameError
+from wholebody.base.errors import UnknownNameError
 
 
 class StandInFigure:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.errors import UndefinedTermError
+from wholebody.base.errors import UndefinedTermError
 from wholebody.figures.state import Wrench
 
 FAR = 0.15  # m: farther to the front than this the terms below are not defined; the goal is at 0.3

@@ -12,7 +12,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench import human_tasks
 from wholebody.figures.state import State
 

@@ -12,7 +12,7 @@ import pytest
 from wholebody import tasks
 from wholebody.figures import load
 from wholebody.figures.state import State, Wrench
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 STEP = 1e-6
 TERMS = {

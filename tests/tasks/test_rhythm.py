@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks.base import filled
 

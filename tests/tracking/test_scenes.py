@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion_assessment import assess_motion
+from wholebody.assessment.motion import assess_motion
 from wholebody.tasks import ReachCones
 from wholebody.tracking import SCENES, Recording, Track, build_scene, follow, gallery, judge
 from wholebody.tracking.scenes import InteractionScene

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion_assessment import assess_motion
+from wholebody.assessment.motion import assess_motion
 from wholebody.tracking import Track, follow
 
 ALONG, ACROSS = 41, 9  # points on a capsule's axis, and along each edge of a box

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.dynamics.overlaps import overlaps
-from wholebody.errors import InputError
 from wholebody.view import Viewer
 from wholebody.view.contact_markers import mark_overlaps
 from wholebody.view.legend import legend

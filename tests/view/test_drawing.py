@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import quaternions
 

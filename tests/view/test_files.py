@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import wholebody as wb
-from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.view import Viewer, style
 from wholebody.view.browser import Browser, find_chromium
 from wholebody.view.movie import movie

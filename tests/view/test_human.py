@@ -11,7 +11,7 @@ from PIL import Image
 
 from wholebody.figures import load
 from wholebody.geometry.shapes import Box, HalfSpace, Sphere
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.view import Viewer
 from wholebody.view.browser import Browser
 from wholebody.view.surface import surface_of

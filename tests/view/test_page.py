@@ -12,9 +12,9 @@ import pinocchio as pin
 import pytest
 from PIL import Image
 
-from wholebody.errors import UnknownNameError
+from wholebody.base.errors import UnknownNameError
 from wholebody.figures import load
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Axis, CenterOfMass, Frame, Orientation, Point
 from wholebody.view import Viewer, style
 from wholebody.view.browser import Browser

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.report import render
 from wholebody.bench.stability.case import Posed

@@ -7,10 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch
 from wholebody.bench.problem_sets.things import Occupied
-from wholebody.errors import InputError
-from wholebody.files import Scratch
 
 LENGTH = 2.0  # m: of the whole chain, however many joints it has
 HALF = 0.025  # m: half the breadth of its segments

@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch
 from wholebody.bench.report import render
-from wholebody.errors import InputError
-from wholebody.files import Scratch
 from wholebody.tracking.live import LiveDrag
 from wholebody.view.live_page import LivePage
 

@@ -11,14 +11,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError
 from wholebody.bench import plot_style
 from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.problem_sets.registry import SETS
 from wholebody.bench.report import render
-from wholebody.errors import WholebodyError
+from wholebody.methods.simplification.simplify import GROWTH, Parts, leave_out
 from wholebody.problem import Problem
-from wholebody.simplification.simplify import GROWTH, Parts, leave_out
 
 DETAILS = ("spheres", "capsules", "hulls")
 FINEST = "hulls"

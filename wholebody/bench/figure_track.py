@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.bench.track import BLOCK, BOXES, CLEARANCE, ROOM_START, SEED, VARIANTS, Track, put_objects, smooth_way
-from wholebody.errors import InputError
 from wholebody.figures.self_pairs import random_postures
 
 FARTHEST = 1.0  # rad, m: that a joint moves to each of the two postures; a way of two seconds keeps the speed bound

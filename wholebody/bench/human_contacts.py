@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.human_tasks import add_seat, draw
 from wholebody.bench.problem_sets.things import coal_distance
 

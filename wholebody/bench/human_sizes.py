@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial import ConvexHull
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person, design_cases
 from wholebody.figures.human.spec import human_spec
 from wholebody.figures.measuring import ansur, measure

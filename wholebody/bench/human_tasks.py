@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
     from wholebody.problem import Problem
-    from wholebody.scene import Scene
+    from wholebody.scene.scene import Scene
 
 UP, DOWN, FRONT, LEFT, RIGHT = (0, 0, 1), (0, 0, -1), (1, 0, 0), (0, 1, 0), (0, -1, 0)
 WOOD = (0.60, 0.48, 0.36, 1.0)

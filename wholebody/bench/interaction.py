@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
 from wholebody.bench.tables import filled, of

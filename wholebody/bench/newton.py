@@ -15,10 +15,10 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError
 from wholebody.bench.newton_shapes import LINK, SHAPES, chain, four_bar, median_us, pulled_chain, ring, three_bar
 from wholebody.bench.report import render
-from wholebody.errors import WholebodyError
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem

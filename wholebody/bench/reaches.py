@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench import plot_style, statistics
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.problem_sets.bodies import CLEARANCE, TIPS

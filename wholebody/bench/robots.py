@@ -16,16 +16,16 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import Scratch
+from wholebody.base.runner import Child, EndedError
 from wholebody.bench.report import render
-from wholebody.errors import InputError, WholebodyError
-from wholebody.files import Scratch
 from wholebody.geometry.mesh_cache import VARIABLE
-from wholebody.runner import Child, EndedError
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure
-    from wholebody.scene import Scene
+    from wholebody.scene.scene import Scene
 
 LONGEST = 300.0  # s: after which a description is given up
 REACHES = 12  # of each robot

@@ -14,12 +14,12 @@ from typing import Any, TypeVar
 import numpy as np
 
 import wholebody as wb
+from wholebody.base.errors import WholebodyError
 from wholebody.bench import newton_shapes, plot_style
 from wholebody.bench.chains import TIP, chain, task
 from wholebody.bench.newton import assembly_row
 from wholebody.bench.report import render
-from wholebody.errors import WholebodyError
-from wholebody.simplification.simplify import simplify
+from wholebody.methods.simplification.simplify import simplify
 from wholebody.tracking.drag import Drag
 
 SERIES = ("joints", "pieces", "things")

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 
 import wholebody as wb
+from wholebody.base.errors import WholebodyError
+from wholebody.base.files import Scratch
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.report import render
 from wholebody.bench.tables import programs_text
-from wholebody.errors import WholebodyError
-from wholebody.files import Scratch
 
 TIMEOUT = 300.0  # s
 TOLERANCE = 1e-5  # m, rad: what methods are asked for

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench import track as setting
 from wholebody.bench.adapters.base import Tool
@@ -22,7 +23,6 @@ from wholebody.bench.report import render
 from wholebody.bench.statistics import BLOCK, NOTHING, Interval, quantile_ratio
 from wholebody.bench.tables import filled, programs_text
 from wholebody.bench.track import CLEARANCE, DT, Track, Verdict, judge
-from wholebody.errors import InputError
 
 REFERENCE = "placo"
 TURN = 50

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import Interval
-from wholebody.errors import FileFormatError
-from wholebody.files import make_folder, read_text, write
 
 _R = TypeVar("_R")
 

@@ -18,10 +18,10 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.assessment.motion import limit_violation, pairs_along, velocities
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.problem_sets.things import Occupied, add_things
-from wholebody.errors import InputError, UnknownNameError
-from wholebody.motion_assessment import limit_violation, pairs_along, velocities
 
 VARIANTS = ("free", "contact", "alone")
 DT = 0.01  # s

@@ -8,8 +8,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn, Protocol
 
-from wholebody.checks import is_number
-from wholebody.errors import InputError, UnknownNameError, nearest_names
+from wholebody.base.checks import is_number
+from wholebody.base.errors import InputError, UnknownNameError, nearest_names
 
 
 class Commands(Protocol):

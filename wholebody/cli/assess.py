@@ -52,7 +52,7 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
-    from wholebody.assessment import assess
+    from wholebody.assessment.posture import assess
     from wholebody.taskfile import result
 
     task, q = result.read(arguments.result)

@@ -31,8 +31,8 @@ def run(arguments: argparse.Namespace) -> int:
     Raises:
         MissingPackageError: shtab is not installed.
     """
+    from wholebody.base.errors import MissingPackageError
     from wholebody.cli.main import parser
-    from wholebody.errors import MissingPackageError
 
     try:
         import shtab

@@ -25,8 +25,8 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List the tasks, or pose one."""
+    from wholebody.base.errors import UnknownNameError
     from wholebody.cli.pose import pose
-    from wholebody.errors import UnknownNameError
 
     tasks = packaged_tasks()
     if arguments.list:

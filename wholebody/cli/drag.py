@@ -101,8 +101,8 @@ def live(arguments: argparse.Namespace) -> int:
     """Let the figure be dragged in a browser until Ctrl-C."""
     from functools import partial
 
+    from wholebody.base.errors import InputError
     from wholebody.cli.picture import make_folder
-    from wholebody.errors import InputError
     from wholebody.taskfile import read_task, write_task
     from wholebody.tracking.live import LiveDrag
     from wholebody.view.live_page import LivePage
@@ -160,7 +160,7 @@ def show(rows: list[DragRow]) -> None:
 
 
 def _goal(problem: Problem, number: int | None) -> int:
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
     from wholebody.tasks import Frame, Point
     from wholebody.tracking.moving_goals import moving_goal
 
@@ -176,8 +176,8 @@ def _corners(problem: Problem, goal: int, arguments: argparse.Namespace) -> Any:
     """Corners (k, 3) of the path, from the position of the dragged frame."""
     import numpy as np
 
-    from wholebody.errors import FileFormatError
-    from wholebody.files import is_file
+    from wholebody.base.errors import FileFormatError
+    from wholebody.base.files import is_file
     from wholebody.tasks.inputs import point
     from wholebody.tracking.dragging import present_position, target_position
     from wholebody.tracking.paths import circle, read_path

@@ -47,11 +47,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _write(name: str, options: dict[str, Any], out: Path) -> int:
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
+    from wholebody.base.files import checked_ending
     from wholebody.figures.anthropometry import make_person
     from wholebody.figures.packaged_urdf import write_human
     from wholebody.figures.proportions import proportioned
-    from wholebody.files import checked_ending
 
     if name != "human" or "detail" in options:
         raise InputError("--out writes the person in capsules; write: wholebody figure human --out FILE.urdf")

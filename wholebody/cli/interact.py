@@ -47,10 +47,10 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
+    from wholebody.base.files import check_writable, make_folder
     from wholebody.bench.interaction import report
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
-    from wholebody.files import check_writable, make_folder
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
 
@@ -83,7 +83,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _check_pages(docs: Path) -> None:
     """Check that the pages exist, before anything is computed."""
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
 
     for page in ("results.md", "where-methods-fail.md"):
         if not (docs / page).is_file():
@@ -122,7 +122,7 @@ def _run_one(
 
 def _picture(scene: InteractionScene, recording: Recording, frame: int, path: Path) -> None:
     """Draw the frame that misses a requirement, with the tracked posture as a ghost; none if all are met."""
-    from wholebody.errors import MissingPackageError
+    from wholebody.base.errors import MissingPackageError
     from wholebody.view import Viewer
 
     path.unlink(missing_ok=True)

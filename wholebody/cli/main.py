@@ -11,9 +11,9 @@ from contextlib import suppress
 from importlib import import_module
 from io import TextIOWrapper, UnsupportedOperation
 
+from wholebody.base.errors import WholebodyError
+from wholebody.base.interrupts import raise_again
 from wholebody.cli.arguments import Parser
-from wholebody.errors import WholebodyError
-from wholebody.interrupts import raise_again
 from wholebody.version import __version__
 
 COMMANDS = (

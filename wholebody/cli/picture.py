@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody import files
-from wholebody.errors import InputError, MissingPackageError
+from wholebody.base import files
+from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.problem import Problem
 from wholebody.taskfile.task import View
 

@@ -59,7 +59,7 @@ def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, dr
     Raises:
         WholebodyError: the task cannot be read, or the folder cannot be written to.
     """
-    from wholebody import files
+    from wholebody.base import files
     from wholebody.cli import picture
     from wholebody.methods.solve import method_named, solve
     from wholebody.taskfile import read_task, result

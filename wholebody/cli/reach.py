@@ -77,8 +77,8 @@ def _numbers(text: str, what: str, count: int = 3) -> list[float]:
     Raises:
         InputError: they are something else.
     """
-    from wholebody.checks import shown
-    from wholebody.errors import InputError
+    from wholebody.base.checks import shown
+    from wholebody.base.errors import InputError
 
     parts = text.split(",")
     try:

@@ -58,9 +58,9 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
+    from wholebody.base.errors import InputError
+    from wholebody.base.files import checked_target
     from wholebody.cli.picture import viewer_of
-    from wholebody.errors import InputError
-    from wholebody.files import checked_target
     from wholebody.view.viewer import SAVED
 
     save: Path | None = arguments.save
@@ -89,10 +89,10 @@ def _subject(what: str, options: Mapping[str, Any]) -> tuple[Problem, NDArray[np
     Raises:
         InputError: options of a person for a file that has its figure in it.
     """
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
     from wholebody.figures import load
     from wholebody.problem import Problem
-    from wholebody.scene import Scene
+    from wholebody.scene.scene import Scene
     from wholebody.taskfile import read_task, result
     from wholebody.taskfile.task import View
 

@@ -14,7 +14,7 @@ from wholebody.figures.state import State
 from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
-    from wholebody.assessment import Assessment
+    from wholebody.assessment.posture import Assessment
     from wholebody.figures import Figure
     from wholebody.problem import Problem
     from wholebody.solution import Solution

@@ -51,11 +51,11 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
+    from wholebody.base.files import check_writable, make_folder
     from wholebody.bench.machine import machine
     from wholebody.bench.tables import write_text
     from wholebody.bench.world_runs import report
     from wholebody.dynamics.scenes import WORLD_SCENES
-    from wholebody.files import check_writable, make_folder
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
     if not names:

@@ -10,7 +10,7 @@ import shutil
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
-from wholebody.runner import Child, EndedError
+from wholebody.base.runner import Child, EndedError
 
 TIMEOUT = 300.0
 """Time limit of a check, seconds; a check takes one or two, more on a busy machine; the first compiles the loops."""

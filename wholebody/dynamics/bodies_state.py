@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.pieces import Pieces
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 
 class BodiesState:

@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 
 
 @compiled()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.pieces import Pieces, PlacedPieces, PlacedProximity
 from wholebody.geometry.contact_rows import ContactRowBuilder

@@ -14,8 +14,8 @@ from math import cos, exp, sin, sqrt
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP, number, posture, settle, time_step
+from wholebody.base.arrays import Array
+from wholebody.base.checks import TIME_STEP, number, posture, settle, time_step
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m

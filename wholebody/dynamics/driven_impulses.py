@@ -12,11 +12,11 @@ from collections.abc import Mapping
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.matter.materials import Surface
+from wholebody.scene.matter.materials import Surface
 
 TOUCH = 1.5e-3  # m: nearer pieces touch; a figure stops short of things by less
 ROUNDS = 10  # of impulses over all contacts: with several contacts one undoes a part of another

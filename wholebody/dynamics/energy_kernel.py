@@ -23,8 +23,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.dynamics.contact_kernel import join
 from wholebody.dynamics.motion_kernel import angular_momentum, invert
 

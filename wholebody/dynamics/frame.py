@@ -9,9 +9,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.geometry.placement import placement
 
 

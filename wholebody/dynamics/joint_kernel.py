@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.dynamics.motion_kernel import invert
 
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 
 LARGEST_TURN = 0.1  # rad: of one midpoint step; smaller is more accurate and slower
 STILL = 1e-12  # rad/s: slower than this a body does not turn

@@ -6,9 +6,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.penetration import global_depth
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 
 class Overlap(NamedTuple):

@@ -7,14 +7,14 @@ from typing import Any, NamedTuple, cast
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.errors import InputError
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Kinematics, PairTable, Proximity
-from wholebody.matter.inertia import MassProperties, mass_properties
-from wholebody.matter.materials import MATERIALS, Material, surface
-from wholebody.scene import Scene
+from wholebody.scene.matter.inertia import MassProperties, mass_properties
+from wholebody.scene.matter.materials import MATERIALS, Material, surface
+from wholebody.scene.scene import Scene
 
 HUMAN = MATERIALS["human"]  # of every figure
 

@@ -16,9 +16,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody import checks
-from wholebody.arrays import Array, Mask
-from wholebody.checks import TIME_STEP
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import TIME_STEP
+from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
@@ -29,10 +30,9 @@ from wholebody.dynamics.passing import StepStart, check_passing
 from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
-from wholebody.errors import InputError
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Contacts
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
 SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower

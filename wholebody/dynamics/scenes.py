@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import known, posture, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import known, posture, whole
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, HalfSpace, Sphere
-from wholebody.matter.body import Body
-from wholebody.matter.joints import BallJoint, Hinge
-from wholebody.scene import Scene
+from wholebody.scene.matter.body import Body
+from wholebody.scene.matter.joints import BallJoint, Hinge
+from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
 from wholebody.tracking.tracks import MOST_FRAMES, Track

@@ -14,8 +14,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import compiled
 from wholebody.dynamics.contact_kernel import join
 
 JOINT_PRECISION = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open

@@ -6,12 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.records import with_values
 from wholebody.dynamics import contact_kernel, energy_kernel, impact_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.joints import JointRows, Joints
-from wholebody.records import with_values
 
 SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches

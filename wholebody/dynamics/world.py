@@ -15,24 +15,24 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import array, instance, time_step
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, instance, time_step
+from wholebody.base.errors import InputError
 from wholebody.dynamics.coupling import Coupling, Spring
 from wholebody.dynamics.driven_impulses import TOUCH, PushedContacts
 from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.errors import InputError
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
-from wholebody.matter.materials import Surface, surface
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
-from wholebody.moving_things import Collision
-from wholebody.scene import Scene
+from wholebody.scene.matter.materials import Surface, surface
+from wholebody.scene.moving_obstacles import Collision
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import NotCopyable
 from wholebody.tracking.frame import FRAME, Frame
 from wholebody.tracking.loop import FrameLoop, invalid_reason
-from wholebody.workspace import NotCopyable
 
 
 class WorldFrame(NamedTuple):

@@ -12,9 +12,9 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 
 SIDES = ("left", "right")

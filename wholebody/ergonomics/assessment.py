@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass
 from math import degrees
 from typing import Any
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
 from wholebody.ergonomics.owas import Owas, owas_code
 from wholebody.ergonomics.reba import Reba, reba_parts
@@ -16,7 +16,7 @@ from wholebody.ergonomics.static_torques import StaticTorques, static_torques
 from wholebody.ergonomics.work import Work
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 Color = tuple[float, float, float, float]
 

@@ -13,8 +13,8 @@ from math import degrees, inf, pi
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import check_person
 from wholebody.figures.figure import Figure
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import BodyAngles
 from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import KNEELING, Work, both_feet
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 BENT = radians(20.0)  # of the trunk forward or backward
 TURNED = radians(20.0)  # of the trunk sideways or about its axis

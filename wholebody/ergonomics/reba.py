@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
 from wholebody.ergonomics.rula import ABDUCTED, DEVIATED, END_OF_TWIST, NEUTRAL, RAISED, lower_arm, position, turned
 from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import COUPLINGS, Work, both_feet
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 TABLE_A = (
     ((1, 2, 3, 4), (2, 3, 4, 5), (2, 4, 5, 6), (3, 5, 6, 7), (4, 6, 7, 8)),

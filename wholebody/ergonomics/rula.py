@@ -10,13 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import pi, radians
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
 from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import Work, both_feet
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 TURNED = radians(10.0)
 """From which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly

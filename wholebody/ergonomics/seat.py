@@ -6,11 +6,11 @@ from dataclasses import replace
 from math import radians
 from typing import NamedTuple
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import BodyAngles, body_angles
 from wholebody.ergonomics.work import Work, check_work
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 SEATED = ("pelvis", "left_thigh", "right_thigh")
 TRUNK = ("thorax", "upper_lumbar", "lower_lumbar")

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, check_person
 from wholebody.ergonomics.work import HEAVIEST
 from wholebody.figures.figure import Figure

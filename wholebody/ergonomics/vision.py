@@ -10,10 +10,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError
-from wholebody.scene import Scene
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 
 EYES = "gaze"

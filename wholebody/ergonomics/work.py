@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from wholebody import checks
+from wholebody.base import checks
+from wholebody.base.errors import InputError
 from wholebody.ergonomics.angles import BodyAngles
-from wholebody.errors import InputError
 
 COUPLINGS = ("good", "fair", "poor", "unacceptable")
 HEAVIEST = 200.0  # kg

@@ -18,9 +18,9 @@ from statistics import NormalDist
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import number, shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import number, shown
+from wholebody.base.errors import InputError, UnknownNameError
 
 STATURE_RANGE = (1.3, 2.2)
 """Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""

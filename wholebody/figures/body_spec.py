@@ -14,10 +14,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.anthropometry import Person
-from wholebody.records import with_values
 
 
 class Solid(NamedTuple):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import warn
+from wholebody.base.arrays import Array
+from wholebody.base.checks import warn
 
 FAR_OUT = 1.0
 """Radians beyond a limit from which a value was probably meant in degrees."""

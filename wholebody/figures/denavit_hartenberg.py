@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 
 _PARALLEL = 1e-9

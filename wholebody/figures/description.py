@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.pool import Pool
+from wholebody.base.records import as_dict
 from wholebody.figures.degrees import Turning, warn_of_turns
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.reduction import reduced_parts
-from wholebody.pool import Pool
-from wholebody.records import as_dict
 
 LARGEST = 1e6
 """Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""

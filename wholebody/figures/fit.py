@@ -19,13 +19,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.files import write
 from wholebody.figures.anthropometry import FOLDER, Person, design_cases, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
 from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human import capsules
 from wholebody.figures.measuring import ansur, measure
-from wholebody.files import write
 
 TOLERANCE = 0.005
 """Metres: a dimension that is off by this counts as one unit of the fit."""

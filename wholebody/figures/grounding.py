@@ -8,8 +8,8 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
 DOWN = np.array((0.0, 0.0, -1.0))

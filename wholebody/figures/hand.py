@@ -14,8 +14,8 @@ from itertools import combinations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Person, describe, keyed, make_person
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place

@@ -12,15 +12,15 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import known, number, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import known, number, shown
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.meshes import EmptyMeshError, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST
-from wholebody.records import with_values
 
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""

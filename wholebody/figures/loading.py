@@ -8,10 +8,10 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-from wholebody.checks import listed, path, shown, text, whole
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.checks import listed, path, shown, text, whole
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.files import check_file, is_file
 from wholebody.figures.figure import Figure
-from wholebody.files import check_file, is_file
 
 MOST_SAMPLES = 100_000
 """Most random postures for finding pairs that always overlap: more take minutes."""

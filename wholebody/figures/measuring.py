@@ -15,7 +15,7 @@ from typing import Any, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import table
 from wholebody.figures.postures import support
 

@@ -13,16 +13,16 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError, InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import Scratch, write
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure
 from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
 from wholebody.figures.urdf.xml_reading import read_xml
-from wholebody.files import Scratch, write
 
 _PLACED = {"pos", "quat", "euler", "axisangle", "xyaxes", "zaxis"}
 """Attributes for the placement of a body; Pinocchio ignores them for a first body that is fixed."""

@@ -13,7 +13,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import table
 
 

@@ -6,8 +6,8 @@ import os
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.errors import UnknownNameError, WholebodyError
-from wholebody.files import checked_ending, make_folder, write
+from wholebody.base.errors import UnknownNameError, WholebodyError
+from wholebody.base.files import checked_ending, make_folder, write
 
 if TYPE_CHECKING:
     from wholebody.figures.anthropometry import Person

@@ -14,9 +14,9 @@ from functools import cache, lru_cache
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import known, number, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import known, number, shown
+from wholebody.base.errors import InputError
 from wholebody.figures.anthropometry import Person, table
 from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
 

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 
 PARALLEL = 1e-12  # shorter than this a projection onto the plane of an edge has no direction
 SHORTEST = 1e-9  # a vector shorter than this has no direction

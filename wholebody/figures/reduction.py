@@ -9,12 +9,12 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair
 from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import drop_pairs
-from wholebody.records import with_values
 
 _LOCKED = "locked together"
 

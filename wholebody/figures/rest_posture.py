@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
 from wholebody.figures.state import State

@@ -12,9 +12,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError, InputError, WholebodyError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces

@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import instance, posture, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, posture, whole
+from wholebody.base.errors import InputError
 from wholebody.geometry.memory_views import placement_view
 
 DOUBLE = np.dtype(np.float64)

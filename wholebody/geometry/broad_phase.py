@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.geometry.single_pairs import SinglePairs
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 
 class Component(NamedTuple):

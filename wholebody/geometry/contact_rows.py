@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
 
 BAND = 0.02  # m: swept points this much farther than the witness point still make a row; wider = more rows

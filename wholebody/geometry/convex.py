@@ -13,17 +13,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError, MissingPackageError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.records import with_values
 from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.convexity import is_convex, passes_through_itself
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
-from wholebody.records import with_values
 
 if TYPE_CHECKING:
-    from wholebody.runner import Child
+    from wholebody.base.runner import Child
 
 CONVEX_VOLUME = 1e-4
 """A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller."""
@@ -158,7 +158,7 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     pieces: list[Piece] = []
     notes: list[str] = []
     before = after = 0.0
-    from wholebody.runner import Child
+    from wholebody.base.runner import Child
 
     if is_convex(cloud, triangles):
         try:
@@ -230,7 +230,7 @@ CROSSING_TRIANGLES = 100
 def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
         raise MissingPackageError("a mesh that is not convex needs coacd: pip install coacd")
-    from wholebody.runner import BY_THE_CLOCK, EndedError
+    from wholebody.base.runner import BY_THE_CLOCK, EndedError
 
     _log.info("decomposing %s (%d triangles) into convex pieces", name, len(part.faces))
     faces = part.faces.astype(np.int32)
@@ -251,7 +251,7 @@ def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[A
 
 def limited(function: Callable[..., list[Array]], seconds: float, *arguments: Any) -> list[Array]:
     """Call a function with a limit of the processor's time; for a child process."""
-    from wholebody.runner import allow_processor
+    from wholebody.base.runner import allow_processor
 
     allow_processor(seconds)
     return function(*arguments)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.broad_phase import box_pairs
 
 FLAT = 1e-6  # share of a mesh's size: triangles nearer to the hull's surface are on it; float32 rounds by 1e-7

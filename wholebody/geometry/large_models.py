@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Indices
+from wholebody.base.arrays import Indices
 
 MANY = 300  # number of pieces from which entries are made at once; as many are added one by one in 20 ms
 TABLED = 2000  # number of pieces up to which a model has Pinocchio's table of pair numbers, of 16 MB then

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 SE3_STRIDE = 96  # bytes: rotation (9 doubles, column major), translation (3 doubles)
 RESULT_STRIDE = 160  # bytes of a coal.DistanceResult

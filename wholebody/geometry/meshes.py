@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
-from wholebody.files import check_file
+from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
+from wholebody.base.files import check_file
 from wholebody.geometry.convex import check_mesh
 
 SUFFIXES = (".obj", ".stl", ".gltf", ".glb", ".dae")

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.geometry.swept_points import SweptPoints, swept_points
 

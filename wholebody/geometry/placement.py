@@ -9,8 +9,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.checks import array
-from wholebody.errors import InputError
+from wholebody.base.checks import array
+from wholebody.base.errors import InputError
 
 PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
 """(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 homogeneous matrix, or a ``pinocchio.SE3``."""

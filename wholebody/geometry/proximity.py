@@ -13,8 +13,8 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
-from wholebody.checks import number
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import compiled
 from wholebody.geometry.memory_views import RESULT_FIRST
 
 

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.minkowski import OVERLAP, ObjectPair, Placed, Sides
 
 TOUCHING = 1e-7

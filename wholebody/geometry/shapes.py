@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import array, choice, number, path, settle, shown, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, choice, number, path, settle, shown, whole
+from wholebody.base.errors import InputError
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces

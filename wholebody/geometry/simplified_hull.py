@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.pieces import SMALLEST
 
 MANY_FACES = 1000

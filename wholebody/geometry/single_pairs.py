@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.memory_views import RESULT_FIELDS, distance_view, read_result
 
 KEPT = 30_000  # pairs up to which Pinocchio keeps data for each, 135 MB then; with them a distance takes a fifth

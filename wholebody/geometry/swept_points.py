@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import coal
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 
 
 class SweptPoints(NamedTuple):

@@ -13,7 +13,7 @@ from math import isfinite
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 DEPTH = 5  # steps remembered; more adds little where a handful of joints settles slowly
 STRETCH = 6.0  # an accelerated step is at most this many times the plain one

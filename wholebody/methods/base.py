@@ -11,17 +11,17 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import number, posture, time_step
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import number, posture, time_step
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.methods.control import Progress
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
-from wholebody.records import with_values
+from wholebody.scene.moving_obstacles import Collision, FrameMotion
+from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import at_speeds, shortened
-from wholebody.workspace import NotCopyable, Workspace
 
 
 class Step(Protocol):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.assessment import Assessment, assess
+from wholebody.assessment.posture import Assessment, assess
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import Contradiction, explanation, in_words, proven
 from wholebody.methods.control import Control

@@ -20,10 +20,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import Status
 from wholebody.tasks.base import Bound
 from wholebody.tasks.frame import Frame, Orientation
@@ -32,7 +33,6 @@ from wholebody.tasks.inputs import Place, find_place
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, TwistRow
 from wholebody.tasks.reach_cones import ReachCones
-from wholebody.workspace import Workspace
 
 CLEAR = 1e-4  # m, rad: smaller differences are left to the search
 NEAREST = 1.02  # factor on the least possible goal error, up to which a posture counts as the nearest

@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.assessment import Assessment
-from wholebody.checks import a, number
-from wholebody.compiled import compile_seconds
-from wholebody.errors import InputError, UndefinedTermError
+from wholebody.assessment.posture import Assessment
+from wholebody.base.checks import a, number
+from wholebody.base.compiled import compile_seconds
+from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.solution import TraceEntry
 
 LONGEST = 4.0

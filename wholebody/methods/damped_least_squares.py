@@ -22,9 +22,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.assessment import goal_errors
-from wholebody.checks import settle
+from wholebody.assessment.posture import goal_errors
+from wholebody.base.arrays import Array
+from wholebody.base.checks import settle
 from wholebody.figures.state import State
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded

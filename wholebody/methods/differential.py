@@ -13,13 +13,13 @@ from typing import NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.assessment import goal_errors, largest_violation
+from wholebody.assessment.posture import goal_errors, largest_violation
+from wholebody.base.arrays import Array
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.workspace import Workspace
 
 SHARE = 0.5  # of the tolerance, to which goals and constraints are met: the assessment rounds differently
 REST = 1e-2  # share of the tolerance: a smaller step counts as convergence

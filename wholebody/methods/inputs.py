@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.checks import instance, number, settle, whole
+from wholebody.base.checks import instance, number, settle, whole
 from wholebody.problem import Problem
 
 

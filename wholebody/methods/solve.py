@@ -6,8 +6,8 @@ import warnings
 
 import numpy as np
 
-from wholebody.checks import function, shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.checks import function, shown
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods import METHODS
 from wholebody.methods.base import Method
 from wholebody.methods.control import Progress

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.human.fingers import finger_angles
 from wholebody.figures.state import State
 from wholebody.problem import Problem

@@ -11,9 +11,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import a, flag, instance, listed, shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.assessment.motion import limit_violation
+from wholebody.base.arrays import Array
+from wholebody.base.checks import a, flag, instance, listed, shown
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
@@ -27,8 +28,7 @@ from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.torques import torques
-from wholebody.motion_assessment import limit_violation
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides

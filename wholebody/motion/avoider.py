@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple, Protocol
 
-from wholebody.arrays import Array
-from wholebody.checks import function, instance
+from wholebody.base.arrays import Array
+from wholebody.base.checks import function, instance
 from wholebody.motion.checking import same_joints
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given
 from wholebody.motion.strength import Strength
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 
 class AvoidProgress(NamedTuple):

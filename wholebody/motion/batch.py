@@ -9,12 +9,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.batches import run_batch
-from wholebody.errors import InputError, WholebodyError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.batches import run_batch
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import is_file, read_bytes
+from wholebody.base.runner import Job
 from wholebody.figures.figure import Figure
-from wholebody.files import is_file, read_bytes
 from wholebody.motion.avoidance import Avoided, as_avoider, avoid
 from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
@@ -23,7 +24,6 @@ from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
 from wholebody.motion.ready_equipment import NOTHING, Worn, dressed, label
-from wholebody.runner import Job
 from wholebody.tracking.tracks import check_figure
 from wholebody.version import __version__
 

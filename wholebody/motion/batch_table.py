@@ -10,8 +10,8 @@ from collections.abc import Iterable
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
-from wholebody.errors import FileFormatError
-from wholebody.files import make_folder, read_text, write
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import make_folder, read_text, write
 from wholebody.motion.clip import Clip
 
 TABLE = "cases.json"

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import function, instance, number
-from wholebody.errors import InputError
+from wholebody.assessment.motion import root_mean_square, third_differences, velocities
+from wholebody.base.arrays import Array
+from wholebody.base.checks import function, instance, number
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
 from wholebody.motion.feet import Sliding, sliding
-from wholebody.motion_assessment import root_mean_square, third_differences, velocities
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 DEPTH = 1e-4
 """Depth up to which an overlap is no contact, metres: that of sweeps, a tenth of a millimetre."""

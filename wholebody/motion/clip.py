@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import array, instance, number, shown, text, time_step
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, instance, number, shown, text, time_step
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.motion.mirroring import mirrored

@@ -7,10 +7,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.windows import runs
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 Kind = Literal["self", "equipment", "thing"]
 

@@ -8,9 +8,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.swept_depth import Depths
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
 SAMPLED = 4e-5  # m: the same where a gap is looked at in a few places only; the deepest one may be elsewhere

@@ -8,15 +8,15 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import choice, color, instance, known, listed, number, text
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, color, instance, known, listed, number, text
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
 from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 Side = Literal["front", "back", "left", "right"]
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
@@ -21,7 +21,7 @@ from wholebody.motion.faults import faults
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms, said
 from wholebody.motion.windows import Window, runs
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Goal
 
 ROUNDS = 12  # each frees the deepest frame of every collision that is left

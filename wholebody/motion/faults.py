@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.dips import dipping
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
 MISSED = 1e-4  # m, rad: by which a held constraint is missed

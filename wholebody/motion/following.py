@@ -8,16 +8,16 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.qp.method import QP
 from wholebody.motion.dips import dip_depth
 from wholebody.motion.faults import depth
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Posture
 from wholebody.tasks.base import Bound, Constraint, Goal, filled
-from wholebody.workspace import Workspace
 
 BACK = 1e-4  # rad, m: a posture this near to the original one is the original one
 MOST = 3  # steps of one frame; more = nearer to the original where much is in the way, dearer frames

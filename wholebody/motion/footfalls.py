@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.motion.stance import StanceFeet, speeds

@@ -14,15 +14,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import a, listed
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import a, listed
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.grips import grip_shifts
 from wholebody.motion.motion_bounds import MotionBounds
 from wholebody.motion.stance import StanceFeet, held_feet, standing
 from wholebody.motion.stance_places import shifts
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows

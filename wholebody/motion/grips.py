@@ -22,11 +22,11 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.trajectory.banded_qp import BandedQP, banded_solver
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.windows import Window, windows
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
 
 OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is

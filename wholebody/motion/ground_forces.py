@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 CONE_EDGES = 8
 """Edges of the pyramid that stands for the cone of friction: eight lie within 8 % of it, and inside."""

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.ground_forces import GroundForces, ground_forces
 from wholebody.motion.soles import Soles

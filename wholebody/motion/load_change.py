@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.clip import Clip
 from wholebody.motion.strength import Strength
 from wholebody.motion.torques import Torques, torques

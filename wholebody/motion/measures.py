@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import instance, number
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, number
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.checking import ClipCheck, joint_jerk
 from wholebody.motion.clip import Clip

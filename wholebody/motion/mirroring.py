@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 
 MIRROR = np.diag([1.0, -1.0, 1.0])

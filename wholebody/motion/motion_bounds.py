@@ -14,10 +14,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.lib.stride_tricks import sliding_window_view
 
-from wholebody import checks
-from wholebody.arrays import Array, Mask
+from wholebody.assessment.motion import root_mean_square, third_differences, velocities
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.clip import Clip
-from wholebody.motion_assessment import root_mean_square, third_differences, velocities
 from wholebody.tasks.base import filled
 
 SPAN = 0.5

@@ -13,13 +13,13 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.avoider import Watch
 from wholebody.motion.dips import depths_between, dip_depth
 from wholebody.motion.faults import depth
 from wholebody.motion.following import SHALLOW, Follower
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 PASSED = 1e-2
 """Metres: a motion that is deeper passes through something. Others are mostly arcs between two postures in contact,

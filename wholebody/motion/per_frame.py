@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
 from wholebody.motion.dips import dipping
@@ -23,8 +23,8 @@ from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.repair import Repairer
 from wholebody.motion.windows import Window, windows
-from wholebody.scene import Scene
-from wholebody.workspace import Workspace
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 MARGIN = 0.3  # s, before and after a collision: in which the pass begins and ends at the original posture
 ROOM = 5e-4  # m: more room that the frames beside a dip are first asked for; it doubles from round to round

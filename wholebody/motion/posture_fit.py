@@ -13,7 +13,7 @@ import daqp
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 

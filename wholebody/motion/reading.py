@@ -6,9 +6,9 @@ import logging
 import os
 from pathlib import Path
 
-from wholebody.checks import choice
-from wholebody.checks import path as checked_path
-from wholebody.errors import FileFormatError, InputError, one_line
+from wholebody.base.checks import choice
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.files import amass, archive, bvh, bvh_writing, read_frames

@@ -11,15 +11,15 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import instance, known
-from wholebody.checks import text as checked_text
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, known
+from wholebody.base.checks import text as checked_text
+from wholebody.base.errors import InputError
+from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
-from wholebody.files import is_file
 from wholebody.geometry.shapes import Box, Mesh, Sphere
 from wholebody.motion.equipment import Equipment
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 CARRIERS = ("lower_thorax", "thorax")
 CLOTH = (0.35, 0.38, 0.28, 1.0)

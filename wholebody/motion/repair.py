@@ -14,7 +14,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.records import with_values
 from wholebody.motion.avoider import Watch
 from wholebody.motion.dips import dip_depth, dips
 from wholebody.motion.faults import faults
@@ -28,8 +29,7 @@ from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import WindowProgram
 from wholebody.motion.windows import Window, windows
-from wholebody.records import with_values
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 MARGIN = 0.1  # s, before and after what is wrong: in which postures may change; what is left gets twice as much
 ROUNDS = 4  # of looking at the clip, and repairing what is wrong

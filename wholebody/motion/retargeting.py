@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import function
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import function
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.footfalls import Footfalls, footfalls

@@ -7,11 +7,11 @@ import re
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from wholebody.checks import path as checked_path
-from wholebody.checks import shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.checks import path as checked_path
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.files import parsed_toml, read_text
 from wholebody.figures.figure import Figure
-from wholebody.files import parsed_toml, read_text
 
 SIDED = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist", "hand")
 ROLES = ("pelvis", "chest", "neck", "head", *(f"{side}_{part}" for side in ("left", "right") for part in SIDED))

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.checks import array as checked_array
-from wholebody.checks import instance, listed, settle, text, time_step, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import array as checked_array
+from wholebody.base.checks import instance, listed, settle, text, time_step, whole
+from wholebody.base.errors import InputError
 from wholebody.tracking.tracks import LARGEST
 
 FOOT_TO_HEAD = 2.2

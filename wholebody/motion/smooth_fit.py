@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from scipy.linalg import LinAlgError, solveh_banded
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.posture_fit import Fitter, Goals
 
 ACCELERATION = 1e-4

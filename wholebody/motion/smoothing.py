@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.avoider import Watch
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import faults

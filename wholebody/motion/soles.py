@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import FEET, StanceFeet, foot_points, standing

@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 from scipy.cluster.vq import kmeans2
 from scipy.spatial import ConvexHull, cKDTree
 
-from wholebody.arrays import Array, Indices
-from wholebody.checks import array, flag, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import array, flag, whole
+from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Box, Hull, Mesh, Shape, Sphere
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array, Mask
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.motion.windows import long_runs

@@ -15,7 +15,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.windows import Window, runs

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array
+from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 
 PERCENTILES = (5.0, 50.0, 95.0)

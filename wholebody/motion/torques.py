@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array, Mask
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches

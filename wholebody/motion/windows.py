@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Mask
+from wholebody.base.arrays import Mask
 
 
 class Window(NamedTuple):

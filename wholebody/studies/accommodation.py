@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from scipy.special import ndtri
 
-from wholebody import checks
+from wholebody.base import checks
+from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
-from wholebody.errors import InputError
 from wholebody.figures.anthropometry import STATURE_RANGE, table
 from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress

@@ -8,15 +8,15 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any, NamedTuple
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.batches import run_batch
-from wholebody.errors import InputError, WholebodyError, one_line
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.batches import run_batch
+from wholebody.base.errors import InputError, WholebodyError, one_line
+from wholebody.base.runner import Job, packed
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.runner import Job, packed
 from wholebody.studies.records import ENDED, REFUSED, Records, SolveRecord
 from wholebody.studies.store import RecordStore
 from wholebody.version import __version__

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.errors import InputError
-from wholebody.files import write
+from wholebody.base.errors import InputError
+from wholebody.base.files import write
 from wholebody.studies.reach_pictures import new_chart, png
 
 MOST = 100  # rows or columns; letters of more are too small to read

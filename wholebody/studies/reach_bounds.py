@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
+from wholebody.methods.simplification.pairs import held_balls
+from wholebody.methods.simplification.reach import Balls, Reach
 from wholebody.problem import Problem
-from wholebody.simplification.pairs import held_balls
-from wholebody.simplification.reach import Balls, Reach
 
 SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
 

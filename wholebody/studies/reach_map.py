@@ -8,16 +8,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.batches import spread
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.batches import spread
+from wholebody.base.errors import InputError
+from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.runner import packed
 from wholebody.studies.many import MOST_JOBS
 from wholebody.studies.reach_bounds import SLACK, distance_beyond, reach_balls
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap

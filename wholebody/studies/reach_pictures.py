@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.files import write
+from wholebody.base.arrays import Array
+from wholebody.base.files import write
 
 MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
 COLUMNS = 6

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
-from wholebody.files import checked_target, write
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.files import checked_target, write
 from wholebody.problem import Problem
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)

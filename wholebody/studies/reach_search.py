@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
 from wholebody.problem import Problem

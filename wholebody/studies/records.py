@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import MissingPackageError
-from wholebody.files import checked_target, write
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import MissingPackageError
+from wholebody.base.files import checked_target, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"

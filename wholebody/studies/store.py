@@ -6,8 +6,8 @@ import sqlite3
 from contextlib import closing
 from pathlib import Path
 
-from wholebody.errors import FileFormatError, InputError
-from wholebody.files import make_folder
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import make_folder
 from wholebody.studies.records import CANCELLED, ENDED, SolveRecord
 
 NAME = "records.sqlite"

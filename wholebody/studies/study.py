@@ -10,14 +10,14 @@ from functools import cache
 from itertools import product
 from typing import Any
 
-from wholebody import checks
-from wholebody.errors import InputError, WholebodyError
+from wholebody.base import checks
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import read_bytes
+from wholebody.base.runner import packed
 from wholebody.figures import Figure, load
 from wholebody.figures.anthropometry import design_cases
-from wholebody.files import read_bytes
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
-from wholebody.runner import packed
 from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
 from wholebody.studies.records import Records, SolveRecord
 from wholebody.studies.store import RecordStore

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from wholebody.checks import shown
-from wholebody.errors import UnknownNameError
-from wholebody.files import is_file
+from wholebody.base.checks import shown
+from wholebody.base.errors import UnknownNameError
+from wholebody.base.files import is_file
 from wholebody.methods import METHODS
 from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Kind, Text
 from wholebody.taskfile.reading import read_toml

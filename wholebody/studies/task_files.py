@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from wholebody import checks
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base import checks
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.geometry.placement import placement
 from wholebody.problem import Problem
-from wholebody.records import with_values
 from wholebody.taskfile.reading import Entry, read_contents
 from wholebody.taskfile.task import task_from
 

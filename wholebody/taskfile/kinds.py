@@ -8,10 +8,10 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from wholebody.checks import FAR, color, shown, unit_hint
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.checks import FAR, color, shown, unit_hint
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
-from wholebody.matter.joints import BallJoint, Hinge
+from wholebody.scene.matter.joints import BallJoint, Hinge
 from wholebody.taskfile.where import Where
 from wholebody.tasks.inputs import FARTHEST
 

@@ -7,10 +7,10 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.base.files import is_file, parsed_toml, read_text
 from wholebody.figures.figure import Figure
-from wholebody.files import is_file, parsed_toml, read_text
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where

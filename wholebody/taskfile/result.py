@@ -10,15 +10,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import instance, posture
-from wholebody.checks import path as checked_path
-from wholebody.errors import FileFormatError, one_line
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, posture
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.files import checked_target, read_text, write
+from wholebody.base.records import as_dict
 from wholebody.figures.state import State
-from wholebody.files import checked_target, read_text, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
-from wholebody.records import as_dict
 from wholebody.solution import Solution
 from wholebody.taskfile.task import Task, read_task
 from wholebody.version import __version__

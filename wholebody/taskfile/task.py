@@ -12,18 +12,18 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.checks import path as checked_path
-from wholebody.errors import InputError, UnknownNameError, WholebodyError
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import InputError, UnknownNameError, WholebodyError
+from wholebody.base.files import is_file, is_folder
+from wholebody.base.records import with_values
 from wholebody.figures import Figure, load
-from wholebody.files import is_file, is_folder
 from wholebody.geometry.placement import placement
 from wholebody.geometry.shapes import Mesh, Shape
-from wholebody.matter.body import Body
 from wholebody.methods.base import Method
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
-from wholebody.records import with_values
-from wholebody.scene import Scene
+from wholebody.scene.matter.body import Body
+from wholebody.scene.scene import Scene
 from wholebody.taskfile.reading import Contents, Entry, read_contents
 from wholebody.taskfile.where import Where
 

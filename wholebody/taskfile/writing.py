@@ -11,15 +11,16 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody import files, tasks
-from wholebody.checks import instance, shown
-from wholebody.errors import InputError
+from wholebody import tasks
+from wholebody.base import files
+from wholebody.base.checks import instance, shown
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
-from wholebody.matter.joints import BallJoint
 from wholebody.problem import Problem
-from wholebody.scene import Scene
-from wholebody.scene_geometry import SceneObject
+from wholebody.scene.geometry_model import SceneObject
+from wholebody.scene.matter.joints import BallJoint
+from wholebody.scene.scene import Scene
 from wholebody.taskfile.kinds import JOINTS
 from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
 from wholebody.taskfile.things import SHAPES

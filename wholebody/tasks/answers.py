@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError, TermError, UndefinedTermError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, TermError, UndefinedTermError
 from wholebody.figures.state import State, Wrench
 
 Check = Callable[[object, str, Any, tuple[Any, ...]], Any]

@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import coal
 import numpy as np
 
-from wholebody.records import with_values
+from wholebody.base.records import with_values
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Gap, Near
 from wholebody.tasks.surfaces import Face, Surface

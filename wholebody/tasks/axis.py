@@ -17,9 +17,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings, filled

@@ -7,9 +7,9 @@ from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import listed, number
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import listed, number
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled

@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks.base import SupportingPlanes
 from wholebody.tasks.contact_parts import one_sided, through

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
 

@@ -8,9 +8,9 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import instance, number, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance, number, shown
+from wholebody.base.errors import InputError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.tasks import inputs

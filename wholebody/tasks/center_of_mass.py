@@ -8,8 +8,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import choice
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import choice
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import TermError, UndefinedTermError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import TermError, UndefinedTermError
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
 from wholebody.tasks.base import Constraint, Goal, Measure, Term

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.balance import Balance

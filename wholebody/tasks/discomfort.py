@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled

@@ -8,8 +8,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import shown
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs

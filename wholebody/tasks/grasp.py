@@ -10,11 +10,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import choice, number, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, number, shown
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.bars import Crossing, Looking, bar_of, rim_of

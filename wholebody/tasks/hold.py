@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import flag, settle, shown
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import flag, settle, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs

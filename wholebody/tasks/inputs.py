@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.checks import array, number, numbers, shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.checks import array, number, numbers, shown
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.tasks.base import Surroundings

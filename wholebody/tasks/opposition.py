@@ -14,9 +14,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.records import with_values
 from wholebody.tasks.axis import across
 from wholebody.tasks.contact_parts import Gap
 from wholebody.tasks.surfaces import Surface, between_pieces, nearest

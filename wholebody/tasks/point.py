@@ -7,8 +7,8 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import shown
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings, filled

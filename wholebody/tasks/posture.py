@@ -9,9 +9,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import array, listed, numbers
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import array, listed, numbers
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import ROUNDING
 from wholebody.tasks import inputs

@@ -9,9 +9,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Mask
-from wholebody.checks import known, listed
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import known, listed
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled

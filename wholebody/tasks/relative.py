@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
-from wholebody.arrays import Array
-from wholebody.checks import flag, settle, shown
+from wholebody.base.arrays import Array
+from wholebody.base.checks import flag, settle, shown
 from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings, filled

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks.base import Surroundings
 from wholebody.tasks.inputs import WORLD, Place

@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE

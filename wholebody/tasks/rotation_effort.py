@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.records import with_values
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance

@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.checks import flag, listed, number, settle, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.checks import flag, listed, number, settle, shown
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings

@@ -13,9 +13,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points

@@ -8,9 +8,9 @@ from dataclasses import KW_ONLY, dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs

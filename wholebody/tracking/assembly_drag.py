@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
-from wholebody.moving_things import Collision
+from wholebody.scene.moving_obstacles import Collision
 
 GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
 

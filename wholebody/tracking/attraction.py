@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Bound
 from wholebody.tasks.bounds import clipped

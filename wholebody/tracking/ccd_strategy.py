@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
 
 NOTED = 1e-3

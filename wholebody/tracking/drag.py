@@ -11,24 +11,24 @@ from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import posture, shown, time_step
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture, shown, time_step
+from wholebody.base.errors import InputError
+from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
 from wholebody.methods.base import Method, Tracker, goal_error, judged
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
-from wholebody.moving_things import Collision, FrameMotion
-from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
+from wholebody.scene.moving_obstacles import Collision, FrameMotion
+from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
 from wholebody.tasks import Frame, Point
 from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
-from wholebody.workspace import NotCopyable, Workspace
 
 Answer = TypeVar("Answer", Solution, AssemblySolution)
 

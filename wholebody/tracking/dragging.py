@@ -15,12 +15,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from wholebody.arrays import Array
-from wholebody.assessment import assess
-from wholebody.checks import array, function, instance, numbers
-from wholebody.errors import InputError
+from wholebody.assessment.motion import deepened, jerk
+from wholebody.assessment.posture import assess
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, function, instance, numbers
+from wholebody.base.errors import InputError
 from wholebody.methods.base import Method
-from wholebody.motion_assessment import deepened, jerk
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 from wholebody.tasks import Point

@@ -11,11 +11,11 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.proximity import PENETRATION, Contacts
 from wholebody.methods.ccd.overlap_resolution.resolver import chains_of
-from wholebody.scene import Scene
-from wholebody.workspace import Workspace
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 FAR = 0.05
 """Distance of a degree of freedom from its tracked value, radians and metres, below which nothing holds it back: the

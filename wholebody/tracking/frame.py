@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from wholebody.arrays import Array
-from wholebody.moving_things import Collision
+from wholebody.base.arrays import Array
+from wholebody.scene.moving_obstacles import Collision
 
 FRAME = 1.0 / 60.0  # s: of a display, from frame to frame
 

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import instance
-from wholebody.motion_assessment import OVERLAPS, assess_motion, cone_violation, frames_passed_through, root_mean_square
-from wholebody.scene import Scene
+from wholebody.assessment.motion import OVERLAPS, assess_motion, cone_violation, frames_passed_through, root_mean_square
+from wholebody.base.arrays import Array
+from wholebody.base.checks import instance
+from wholebody.scene.scene import Scene
 from wholebody.tracking.recording import Recording
 
 Counts = NDArray[np.intp]

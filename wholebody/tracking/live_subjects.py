@@ -9,13 +9,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.geometry.shapes import HalfSpace
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.drag import Drag
 

@@ -16,26 +16,26 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import array, flag, function, instance, known, listed, time_step
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, flag, function, instance, known, listed, time_step
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.methods.base import judged
 from wholebody.methods.inputs import SEED
 from wholebody.methods.qp.method import QP
-from wholebody.moving_things import Collision, FrameMotion
 from wholebody.problem import Problem
-from wholebody.records import with_values
-from wholebody.scene import Scene
+from wholebody.scene.moving_obstacles import Collision, FrameMotion
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import NotCopyable
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction
 from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
 from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
 from wholebody.tracking.recording import Recording
 from wholebody.tracking.tracks import Track
-from wholebody.workspace import NotCopyable
 
 OVERLAPS = ("qp", "ccd")
 

@@ -8,9 +8,9 @@ from typing import Any
 
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import whole
+from wholebody.base.errors import InputError
 from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
 from wholebody.tasks import Frame, Point

@@ -12,9 +12,9 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.assembly import Assembly

@@ -9,11 +9,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import array, is_number, number, shown, time_step, whole
-from wholebody.checks import path as checked_path
-from wholebody.errors import FileFormatError, InputError
-from wholebody.files import read_text
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, is_number, number, shown, time_step, whole
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import read_text
 from wholebody.tasks.inputs import direction, point
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.tracks import MOST_FRAMES

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import ReachCones
 from wholebody.tracking.attraction import Attraction, FrameMotionLimit
 from wholebody.tracking.entanglement import Entanglement

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.tracking.frame import Frame
 
 Counts = NDArray[np.intp]

@@ -14,11 +14,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.geometry.penetration import global_depth
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
 
 STEP = 0.01

@@ -9,7 +9,7 @@ import numpy as np
 
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, Ellipsoid, HalfSpace, Hull, Mesh, Sphere
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tracking.tracks import check_figure
 
 Color = tuple[float, float, float, float]

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import known
+from wholebody.base.arrays import Array
+from wholebody.base.checks import known
 from wholebody.figures.figure import Figure
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tracking import rooms
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at

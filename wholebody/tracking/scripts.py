@@ -10,8 +10,8 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import number, whole
+from wholebody.base.arrays import Array
+from wholebody.base.checks import number, whole
 from wholebody.figures import load
 from wholebody.figures.figure import Figure
 from wholebody.methods.inputs import SEED

@@ -10,11 +10,11 @@ from pathlib import Path
 
 import numpy as np
 
-from wholebody.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown
-from wholebody.checks import path as checked_path
-from wholebody.errors import FileFormatError, InputError
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import checked_target, read_text, write
 from wholebody.figures.figure import Figure
-from wholebody.files import checked_target, read_text, write
 from wholebody.tracking.tracks import LARGEST as LARGEST_VALUE
 from wholebody.tracking.tracks import Track, check_figure
 

@@ -10,10 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import array, instance, known, listed, settle, shown, text, time_step, whole
-from wholebody.checks import posture as checked_posture
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import array, instance, known, listed, settle, shown, text, time_step, whole
+from wholebody.base.checks import posture as checked_posture
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import placement

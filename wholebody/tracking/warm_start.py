@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from wholebody.arrays import Array
-from wholebody.assessment import assess
+from wholebody.assessment.posture import assess
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.base import Tracker

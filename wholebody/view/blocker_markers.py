@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, Marker

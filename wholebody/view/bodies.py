@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style

@@ -14,8 +14,8 @@ import time
 from contextlib import suppress
 from typing import Any
 
-from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.files import Scratch
+from wholebody.base.errors import MissingPackageError, WholebodyError
+from wholebody.base.files import Scratch
 
 _NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell")
 _FLAGS = (

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view import commands, style
 from wholebody.view.server import CAMERA, Command
 

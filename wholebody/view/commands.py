@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view.server import ANIMATION, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
 from wholebody.view.surface import Patch
 

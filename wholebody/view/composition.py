@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.dynamics.overlaps import Overlap
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION

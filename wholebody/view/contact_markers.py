@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wholebody import checks
+from wholebody.base import checks
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import drawing, style

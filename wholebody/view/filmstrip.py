@@ -9,9 +9,9 @@ from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from wholebody.checks import a, listed
-from wholebody.errors import InputError
-from wholebody.files import Scratch, checked_target, write
+from wholebody.base.checks import a, listed
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch, checked_target, write
 from wholebody.view.screenshot import check_size
 from wholebody.view.viewer import Viewer
 

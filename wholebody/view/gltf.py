@@ -7,7 +7,7 @@ from typing import Any
 import coal
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.motion.files.gltf import add_piece, joint_tree, triangles
 from wholebody.view.bodies import Bodies

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import a
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import a
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
 from wholebody.view import drawing, style

@@ -8,9 +8,9 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
-from wholebody.records import with_values
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 
 APART = 1e-3  # share of a frame: postures that follow each other at once are shown this far apart
 

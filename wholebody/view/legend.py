@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from math import degrees
 from typing import Any
 
-from wholebody.assessment import Assessment
+from wholebody.assessment.posture import Assessment
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import style
 from wholebody.view.commands import pack

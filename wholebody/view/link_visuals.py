@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import WholebodyError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError
 from wholebody.geometry.mesh_cache import cached_entry
 from wholebody.geometry.meshes import read_parts
 from wholebody.view import drawing

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import WholebodyError
+from wholebody.base.errors import WholebodyError
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.gltf import drawn_triangles

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.checks import number
-from wholebody.errors import MissingPackageError, WholebodyError
-from wholebody.files import Scratch, checked_target
+from wholebody.base.checks import number
+from wholebody.base.errors import MissingPackageError, WholebodyError
+from wholebody.base.files import Scratch, checked_target
 
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""

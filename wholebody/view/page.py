@@ -8,7 +8,7 @@ import importlib.util
 from functools import lru_cache
 from pathlib import Path
 
-from wholebody.errors import MissingPackageError
+from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Command, bundle
 
 _TEMPLATE = """<!DOCTYPE html>

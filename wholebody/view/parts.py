@@ -10,12 +10,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.geometry.placement import FARTHEST, PlacementLike, placement
 from wholebody.geometry.shapes import Shape
-from wholebody.records import with_values
 from wholebody.view.style import Color
 from wholebody.view.viewed_scene import Colored
 

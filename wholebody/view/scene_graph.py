@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view import commands, drawing, style
 from wholebody.view.commands import Track
 from wholebody.view.sender import Sender

@@ -6,8 +6,8 @@ import base64
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 
-from wholebody.checks import listed, shown, whole
-from wholebody.errors import InputError
+from wholebody.base.checks import listed, shown, whole
+from wholebody.base.errors import InputError
 from wholebody.view import commands, style
 from wholebody.view.browser import Browser
 from wholebody.view.page import picture_page

@@ -15,8 +15,8 @@ import time
 from collections.abc import Iterable
 from typing import Any
 
-from wholebody import checks
-from wholebody.errors import InputError, MissingPackageError, WholebodyError
+from wholebody.base import checks
+from wholebody.base.errors import InputError, MissingPackageError, WholebodyError
 from wholebody.view import server
 from wholebody.view.server import PAGE, PUSH, SYNC, Command
 

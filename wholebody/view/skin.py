@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view import commands
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.style import Color

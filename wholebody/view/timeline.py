@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.checks import instance
-from wholebody.errors import InputError
-from wholebody.files import Scratch
+from wholebody.base.checks import instance
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch
 from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip_contacts import Contact
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.view.viewer import Viewer
 
 if TYPE_CHECKING:

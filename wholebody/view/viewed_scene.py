@@ -11,17 +11,17 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.checks import a
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import a
+from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.moving_scene import MovingScene
-from wholebody.scene import Scene
-from wholebody.scene_geometry import SceneGeometry
+from wholebody.scene.geometry_model import SceneGeometry
+from wholebody.scene.moving_scene import MovingScene
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 from wholebody.view import style
 from wholebody.view.style import Color
-from wholebody.workspace import Workspace
 
 
 @dataclass(frozen=True)

@@ -14,12 +14,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.assessment import assess
+from wholebody.assessment.posture import assess
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.files import checked_target, write
 from wholebody.dynamics.overlaps import Overlap
-from wholebody.errors import InputError
-from wholebody.files import checked_target, write
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem

@@ -7,7 +7,7 @@ from http import HTTPStatus
 from types import SimpleNamespace
 from typing import Any
 
-from wholebody.errors import MissingPackageError
+from wholebody.base.errors import MissingPackageError
 from wholebody.view.server import Guard
 
 _STARTING = threading.Lock()

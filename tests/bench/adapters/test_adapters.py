@@ -10,11 +10,11 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter
 from wholebody.bench.adapters.registry import ALL, adapters, missing, names
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.problem_sets.registry import SETS
-from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 INSTALLED = adapters([ALL])
 CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.registry import adapters
-from wholebody.errors import InputError
 
 pytest.importorskip("pydrake")
 

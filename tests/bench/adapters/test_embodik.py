@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.problem_sets import robot_arm
-from wholebody.errors import InputError
 
 pytest.importorskip("embodik")
 

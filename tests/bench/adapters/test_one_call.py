@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.one_call import OneCall
-from wholebody.errors import InputError
 
 
 class Still(OneCall[Any]):

@@ -12,12 +12,12 @@ import pytest
 
 import wholebody as wb
 from tests.bench.following import followed
+from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.adapters.mjcf import mjcf
 from wholebody.bench.adapters.own import MovingPoint
 from wholebody.bench.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
 from wholebody.bench.adapters.urdf import Frames, own_frame
 from wholebody.bench.track import CLEARANCE, Track, judge, track
-from wholebody.errors import InputError, MissingPackageError, UnknownNameError
 
 LIMIT = {"pink": 1e-4}
 """Radians by which a tool may exceed a limit here: pink leaves DAQP at its own tolerance."""

@@ -9,12 +9,12 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
 from wholebody.bench.attack.report import Row
 from wholebody.bench.attack.running import Ended
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
 
 def bench(*words: str) -> int:

@@ -10,13 +10,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from wholebody.base.errors import UnknownNameError
+from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, SCRIPT, Case, Verdict, Written, kind_of
 from wholebody.bench.attack.mutations import mutated
 from wholebody.bench.attack.report import Row, keep, percentiles, report
 from wholebody.bench.attack.running import Ended, attack, write
-from wholebody.errors import UnknownNameError
-from wholebody.runner import Child
 
 RIGHT = 'from wholebody.bench.attack.case import Verdict\nverdict = Verdict("right", "as it should be")\n'
 SCRIPTS = {

@@ -13,9 +13,9 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.errors import InputError
 from wholebody.methods.base import SolvingTracker
 from wholebody.methods.control import Progress
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.compare.record import Record
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
-from wholebody.errors import InputError, UnknownNameError
 
 
 def bench(*words: str) -> int:

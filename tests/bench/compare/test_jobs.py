@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from wholebody.batches import close_own_child
+from wholebody.base.batches import close_own_child
 from wholebody.bench.compare.jobs import Task, work
 from wholebody.bench.compare.store import Chunk
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.compare import lock, report
 from wholebody.bench.compare import run as running
 from wholebody.bench.compare.lock import Locked, differences, in_words, locked, read_lock, shares, write_lock
@@ -21,7 +22,6 @@ from wholebody.bench.compare.store import Chunk
 from wholebody.bench.compare.summary import summaries
 from wholebody.bench.statistics import Interval
 from wholebody.cli import main
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
 
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}
 FIGURES = {

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.own_task import TaskRow, chart, compared, report
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
-from wholebody.errors import UnknownNameError
 
 TASK = """
 title = "A hand in front"

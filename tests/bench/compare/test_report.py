@@ -10,6 +10,7 @@ from types import ModuleType
 
 import pytest
 
+from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench.compare import report as publishing
 from wholebody.bench.compare.charts import BAND, Point, lowest
@@ -21,7 +22,6 @@ from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk, Store
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.tables import read_rows
-from wholebody.errors import InputError
 
 FACTS = {"wholebody": "0", "processor": "a fast one", "date": "2030-01-02"}
 REFUSAL = "it cannot take <goals[0]>, Point"

@@ -12,11 +12,11 @@ from types import ModuleType
 
 import pytest
 
+from wholebody.base.errors import InputError, WholebodyError
 from wholebody.bench.compare.record import FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.compare.run import run
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import NAME, Store
-from wholebody.errors import InputError, WholebodyError
 
 TIMES = ("seconds", "cpu_seconds", "setup_seconds", "frame_p95")
 CAP = 1.0  # s of the processor: much more than a solve takes
@@ -144,7 +144,7 @@ def test_a_set_that_cannot_be_built_is_an_error_with_its_reason(fakes: ModuleTyp
 
 def test_a_local_dask_cluster_gives_the_same(fakes: ModuleType, tmp_path: Path) -> None:
     distributed = pytest.importorskip("distributed")
-    from wholebody.batches import threads
+    from wholebody.base.batches import threads
 
     asked = settings(fakes, "solves", "refuses", cases=2)
     with distributed.LocalCluster(
@@ -158,7 +158,7 @@ def test_a_local_dask_cluster_gives_the_same(fakes: ModuleType, tmp_path: Path) 
 
 def test_a_cluster_that_is_not_there_is_one_sentence() -> None:
     pytest.importorskip("distributed")
-    from wholebody.batches import threads
+    from wholebody.base.batches import threads
 
     with pytest.raises(WholebodyError, match="no dask scheduler answers"):
         threads("not an address")

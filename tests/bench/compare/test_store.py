@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.bench.compare.record import ANSWERED, FAILED, Record
 from wholebody.bench.compare.store import NAME, Chunk, Store
-from wholebody.errors import FileFormatError, InputError
 
 SETTINGS = {"seed": 0, "sets": ["a"], "levels": {"x": [[0.1, None], [0.01, 3]]}}
 

@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.problem_sets.registry import SETS, problem_set
-from wholebody.errors import UnknownNameError
 
 NUMBERS = (0, 1, 5, 199)  # of every kind, side and tip: sets take them in turn, of two and three, by number
 SPARE = 5e-4  # m

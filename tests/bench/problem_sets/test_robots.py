@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets import robots
 from wholebody.bench.problem_sets.registry import SETS, problem_set
-from wholebody.errors import InputError
 
 
 @pytest.mark.parametrize("number", [0, 1, 15])

@@ -12,12 +12,12 @@ import pytest
 from published_helpers import SEED, witness
 
 import wholebody as wb
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.registry import SETS, problem_set
 from wholebody.bench.published.bodies import body_files
 from wholebody.bench.published.export import export
 from wholebody.bench.published.rebuilt import Rebuilt
 from wholebody.cli import main
-from wholebody.errors import InputError
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_gives_others(tmp_path: Path) -> None:

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 from published_helpers import answers
 
+from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.bench.published.answers import read_answers
 from wholebody.bench.published.judging import TIMEOUT, as_json, judge
 from wholebody.bench.published.words import left_out
 from wholebody.cli import main
-from wholebody.errors import FileFormatError, InputError, WholebodyError
 
 
 def written(tmp_path: Path, content: Any) -> Path:

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from published_helpers import answers
 
+from wholebody.base.errors import InputError
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.published.judging import NONE, Judged, set_score
 from wholebody.bench.published.leaderboard import Board, boards, judge_folder, publish, sentences, styles, summary
 from wholebody.bench.statistics import NOTHING, share
 from wholebody.cli import main
-from wholebody.errors import InputError
 
 
 def judged(number: int, solved: bool, seconds: float) -> Judged:

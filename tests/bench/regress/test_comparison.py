@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 import wholebody.bench.regress.selection as selected
+from wholebody.base.errors import FileFormatError
 from wholebody.bench.regress.comparison import LOCKED, MARGINS, compared, read, write
 from wholebody.bench.regress.selection import Run, selection
 from wholebody.cli.main import main
-from wholebody.errors import FileFormatError
 
 BEFORE = {"solve a": {"status": "solved", "iterations": 100, "pairs": 10}}
 

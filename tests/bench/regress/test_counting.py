@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.all_pairs import AllPairs
+from wholebody.assessment.all_pairs import AllPairs
 from wholebody.bench.regress.counting import counting, peak_bytes
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from wholebody.arrays import Array
-from wholebody.assessment import assess
+from wholebody.assessment.posture import assess
+from wholebody.base.arrays import Array
 from wholebody.bench.adapters.base import Adapter
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status

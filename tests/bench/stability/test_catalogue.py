@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.assessment import assess
+from wholebody.assessment.posture import assess
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability.asking import ask
 from wholebody.bench.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.stability.catalogue import QUICK, cases, names
 from wholebody.bench.stability.judging import judge
 from wholebody.bench.stability.verdict import decide
-from wholebody.errors import InputError, UnknownNameError
 
 FAST = (
     "straight-arm", "collinear-start", "gimbal", "out-by-1-mm", "conflict", "start-30-cm-inside", "cancelling-normals",

@@ -12,6 +12,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.adapters import registry
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.stability import page
@@ -21,7 +22,6 @@ from wholebody.bench.stability.judging import judge
 from wholebody.bench.stability.verdict import Result, StabilityRow, result
 from wholebody.bench.tables import read_rows, write_rows
 from wholebody.cli.bench import stability
-from wholebody.errors import FileFormatError, InputError, MissingPackageError, UnknownNameError
 
 CASES = ("out-by-1-mm", "edge-on-edge", "not-a-number")
 METHODS = ("qp", "ccd")

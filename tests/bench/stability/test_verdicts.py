@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability import asking
 from wholebody.bench.stability.asking import ask, run
@@ -18,7 +19,6 @@ from wholebody.bench.stability.case import NOTHING, Answer, Stream
 from wholebody.bench.stability.catalogue import cases
 from wholebody.bench.stability.judging import Judged, judge
 from wholebody.bench.stability.verdict import ALONE, Verdict, audited, decide, length, result
-from wholebody.errors import InputError
 from wholebody.problem import Problem
 
 Fakes = Callable[..., Adapter]

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures import load, urdf_path
 from wholebody.figures.anthropometry import design_cases, make_person, table
 from wholebody.figures.packaged_urdf import packaged_files

@@ -7,7 +7,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.figures import load
 from wholebody.figures.anthropometry import design_cases, make_person, table
 from wholebody.figures.measuring import ansur, measure

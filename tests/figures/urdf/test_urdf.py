@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import wholebody as wb
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.figures import load
 
 ARM = Path(__file__).resolve().parents[2] / "data" / "arm" / "arm.urdf"

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.errors import FileFormatError
 from wholebody.cli import main
-from wholebody.errors import FileFormatError
 from wholebody.figures import urdf_path
 from wholebody.figures.state import State
 

@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 from wholebody import InputError
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous import sweep as module
 from wholebody.geometry.continuous.sweep import Sweep, first_contact
 

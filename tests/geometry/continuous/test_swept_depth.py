@@ -10,7 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous import swept_depth as module
 from wholebody.geometry.continuous.swept_depth import COARSE, SHARP, Depths, SweptDepth
 

@@ -8,8 +8,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.batches import Key
 from wholebody.methods.newton.linear_algebra.normal_equations import Gram

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.linear_algebra.normal_equations import Gram
 from wholebody.methods.newton.surfaces import OnSurface

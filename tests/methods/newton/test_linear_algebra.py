@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.errors import UnknownNameError
+from wholebody.base.errors import UnknownNameError
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import dense_columns, linear_algebra
 from wholebody.methods.newton.linear_algebra.normal_equations import Gram

@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.methods.placo.robot import Robot
 
 pytest.importorskip("placo", reason="placo is not installed (the extra placo)")

@@ -14,7 +14,6 @@ import wholebody as wb
 from wholebody.bench.adapters.registry import make_tool
 from wholebody.bench.track import judge, track
 from wholebody.figures.state import State
-from wholebody.linearisation import Linearisation, PackedLinearisation
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import (
     AGAIN,
@@ -31,6 +30,7 @@ from wholebody.methods.qp.step_program import (
 )
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.terms.linearisation import Linearisation, PackedLinearisation
 
 DT = 0.01
 

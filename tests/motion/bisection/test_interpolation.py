@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.motion.bisection.interpolation import fill, key_frames, linear, quadratic
 

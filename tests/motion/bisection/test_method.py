@@ -15,7 +15,7 @@ import pytest
 from scipy.optimize import minimize
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State

@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.motion.bisection.prediction import path_planes

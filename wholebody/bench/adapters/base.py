@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
 

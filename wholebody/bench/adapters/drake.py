@@ -12,12 +12,12 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.base import Adapter, few
 from wholebody.bench.adapters.loop import kept_apart, placements, posture_costs
 from wholebody.bench.adapters.one_call import OneCall
 from wholebody.bench.adapters.urdf import axis_of
-from wholebody.errors import InputError
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place

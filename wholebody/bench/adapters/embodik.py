@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch
 from wholebody.bench.adapters.base import LADDER, Adapter, few
 from wholebody.bench.adapters.loop import Loop, Stepper, kept_apart, placements, posture_costs, size
 from wholebody.bench.adapters.urdf import Frames, joint_name, piece_name, write_urdf
-from wholebody.files import Scratch
 from wholebody.methods.base import named_terms
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem

@@ -9,7 +9,8 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.bench.adapters.one_call import Outside
 from wholebody.figures.figure import Figure
 from wholebody.methods import differential
@@ -18,7 +19,6 @@ from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
-from wholebody.records import with_values
 from wholebody.solution import Solution
 
 NEAR = 0.1  # of the size of a figure: pairs nearer than this have a row, where a tool has such a setting

@@ -10,7 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import (
     NEAR,

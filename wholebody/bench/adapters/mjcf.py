@@ -11,9 +11,9 @@ import coal
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.urdf import axis_of
-from wholebody.errors import InputError
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 ROOT = "root_joint"
 

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.adapters.one_call import OneCall
 from wholebody.bench.adapters.urdf import add_model_joint
-from wholebody.files import Scratch
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Budget, Tool, few, made
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
 from wholebody.figures.state import State, Wrench

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.adapters.base import FEASIBILITY_ONLY, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
 from wholebody.bench.adapters.loop import OUT, Loop, Stepper, kept_apart, longest_moves, posture_costs, size
 from wholebody.bench.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track

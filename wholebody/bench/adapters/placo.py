@@ -15,13 +15,13 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.bench.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
 from wholebody.bench.adapters.urdf import own_frame
 from wholebody.bench.track import DT, JOINT_SPEED, WITHIN, Track
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
-from wholebody.scene_geometry import SceneGeometry
+from wholebody.scene.geometry_model import SceneGeometry
 
 SAMPLES = 2000
 OWN_SAMPLES = 10_000  # of a figure alone, as many as MoveIt's setup assistant takes by default

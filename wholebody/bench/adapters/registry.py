@@ -9,12 +9,12 @@ from importlib.util import find_spec
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
+from wholebody.base.errors import MissingPackageError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.bench.adapters.base import Adapter, Tool
 from wholebody.bench.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
 from wholebody.bench.adapters.starts import ONE, STARTS, restarted
 from wholebody.bench.track import Track
-from wholebody.errors import MissingPackageError, UnknownNameError
-from wholebody.records import with_values
 
 SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
 """Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""

@@ -18,16 +18,16 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.runner import processor_time
 from wholebody.bench.adapters.base import Adapter
 from wholebody.methods.base import Tracker
 from wholebody.methods.control import Progress
 from wholebody.methods.differential import NEGLIGIBLE
 from wholebody.methods.starts import SPREADS, restarts
 from wholebody.problem import Problem
-from wholebody.runner import processor_time
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
-from wholebody.workspace import Workspace
 
 SECONDS = 1.5
 """Processor time of all starts of a solve; the last one that began within it is finished."""

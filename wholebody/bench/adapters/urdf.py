@@ -11,12 +11,12 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.loop import size
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place
 
 ROOT = "root"

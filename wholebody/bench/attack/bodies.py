@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.attack.judging import Pairs
 
 SCALES = (0.005, 0.02, 0.1, 1.0, 1.0, 1.0, 10.0, 60.0)
@@ -107,8 +107,8 @@ def robot(rng: np.random.Generator, scale: float | None = None) -> Body:
 
 
 def _called(call: str, size: float, people: bool = False, files: Mapping[str, bytes] | None = None) -> Body:
+    from wholebody.base.files import Scratch
     from wholebody.figures.packaged_urdf import task_paths, urdf_path
-    from wholebody.files import Scratch
 
     with Scratch() as folder:
         for name, text in (files or {}).items():

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.solves import HEAD, number_text
 from wholebody.problem import Problem

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
@@ -15,7 +15,7 @@ from wholebody.bench.attack.things import clear, xyzquat
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tracking.loop import FrameLoop
 
 MET = 1e-4  # m, rad: goals are met

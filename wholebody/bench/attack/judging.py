@@ -17,10 +17,10 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 OWN = (wb.Balance, wb.ReachCones, wb.RangeOfMotion)
 """Constraints whose values are those of the package's own terms."""

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.problem import Problem
 from wholebody.solution import Solution

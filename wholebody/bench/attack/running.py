@@ -15,11 +15,11 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from wholebody.base.errors import UnknownNameError, WholebodyError
+from wholebody.base.files import Scratch
+from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow, allow_processor, run_jobs, tell
 from wholebody.bench.attack import arguments, contacts, files, frames, own_terms, solves, streams, sweeps, worlds
 from wholebody.bench.attack.case import KINDS, SCRIPT, Case, Verdict, Written
-from wholebody.errors import UnknownNameError, WholebodyError
-from wholebody.files import Scratch
-from wholebody.runner import ONE_THREAD, Child, EndedError, Job, allow, allow_processor, run_jobs, tell
 
 DEADLINE = 60.0  # s of the processor: a case that takes longer, twice, hangs
 WRITING = 300.0  # s: to write a case

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
@@ -13,7 +13,7 @@ from wholebody.bench.attack.solves import Terms, script_head
 from wholebody.bench.attack.things import clear, inside
 from wholebody.bench.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 PARTS = 150  # of a way
 FINER = 40  # parts of the part where something is deepest

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.things import Occupied
 
 KINDS = ("box", "sphere", "capsule", "ellipsoid", "hull", "plate", "halfspace", "mesh")

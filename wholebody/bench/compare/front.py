@@ -21,7 +21,7 @@ from typing import Literal
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.compare.results import Quantity, Results
 from wholebody.bench.statistics import Interval, budget_ratio
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.run import Progress, run
@@ -15,7 +16,6 @@ from wholebody.bench.problem_sets import robots
 from wholebody.bench.problem_sets.registry import TUNED_ON, problem_set
 from wholebody.bench.report import render
 from wholebody.bench.statistics import against
-from wholebody.errors import InputError
 
 METHODS = ("qp", "placo", "placo/starts", "dls/starts")
 CASES = 40

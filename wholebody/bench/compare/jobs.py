@@ -7,14 +7,14 @@ import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
-from wholebody.batches import own_child
+from wholebody.base.batches import own_child
+from wholebody.base.runner import Child, EndedError
 from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
 from wholebody.bench.compare.reference_kernel import kernel_seconds
 from wholebody.bench.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
 from wholebody.bench.compare.store import Chunk
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.runner import Child, EndedError
 
 _local = threading.local()
 

@@ -13,6 +13,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import read_text
 from wholebody.bench.adapters.registry import adapters
 from wholebody.bench.compare.pages import Material
 from wholebody.bench.compare.settings import Settings
@@ -21,8 +23,6 @@ from wholebody.bench.problem_sets.registry import problem_set
 from wholebody.bench.report import spanned, words
 from wholebody.bench.statistics import LEAST, Interval, median
 from wholebody.bench.tables import write_text
-from wholebody.errors import FileFormatError, InputError
-from wholebody.files import read_text
 
 NAME = "lock.json"
 FORMAT = "wholebody comparison"

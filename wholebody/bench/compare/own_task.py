@@ -14,7 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.assessment import assess
+from wholebody.assessment.posture import assess
+from wholebody.base.compiled import compile_all
+from wholebody.base.runner import ONE_THREAD, Child, EndedError, allow, allow_processor
 from wholebody.bench import plot_style
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, FLOOR, OVERTIME, Record
@@ -22,9 +24,7 @@ from wholebody.bench.compare.solving import BUILDING, Ready, solve
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.report import render
-from wholebody.compiled import compile_all
 from wholebody.problem import Problem
-from wholebody.runner import ONE_THREAD, Child, EndedError, allow, allow_processor
 from wholebody.taskfile import read_task
 
 REPEATS = 5  # warm solves, of which the median counts

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.compare.settings import Settings
 from wholebody.bench.compare.store import Chunk
 

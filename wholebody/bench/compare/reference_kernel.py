@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.runner import processor_time
+from wholebody.base.runner import processor_time
 
 SIZE = 64  # of the matrices: about the degrees of freedom of a person
 PRODUCTS = 60

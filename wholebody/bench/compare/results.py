@@ -9,7 +9,7 @@ from math import inf
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.adapters.base import Budget
 from wholebody.bench.compare.record import COARSE, DEFAULT, FLOOR, REFUSED, Record
 

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from wholebody.batches import spread
+from wholebody.base.batches import spread
+from wholebody.base.errors import WholebodyError
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.jobs import Task, work
 from wholebody.bench.compare.plan import Plan
 from wholebody.bench.compare.settings import Settings, seed_of
 from wholebody.bench.compare.store import Chunk, Store
-from wholebody.errors import WholebodyError
 
 SPARE = 3.0  # times its equal share that a method's sweep of one case may take: others leave something over
 TURN = 5  # methods by which the order is turned from case to case: far apart, so that a family does not stay together

@@ -8,6 +8,8 @@ from collections.abc import Mapping, Sequence
 from operator import attrgetter
 from typing import NamedTuple
 
+from wholebody.base.files import Scratch
+from wholebody.base.runner import ONE_THREAD, Child, EndedError, allow_processor
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.compare.charts import groups
 from wholebody.bench.compare.examples import Example, Pair
@@ -16,8 +18,6 @@ from wholebody.bench.compare.results import Results
 from wholebody.bench.compare.settings import seed_of
 from wholebody.bench.compare.solving import BUILDING, Ready, Which, case_of, solve
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.files import Scratch
-from wholebody.runner import ONE_THREAD, Child, EndedError, allow_processor
 
 OPENING = '<script id="picture" type="application/octet-stream">'
 CLOSING = "</script>"

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from math import inf
 from typing import Any
 
+from wholebody.base.errors import InputError
 from wholebody.bench.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
 from wholebody.bench.compare.record import DEFAULT
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.errors import InputError
 from wholebody.version import __version__
 
 MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves

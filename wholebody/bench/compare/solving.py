@@ -1,6 +1,6 @@
 """One solve of one case, or goals that move followed frame by frame, timed, and judged by `assess` alone.
 
-`built`, `warmed` and `solved` are jobs of a process of `wholebody.runner`, which keeps the last case and knows
+`built`, `warmed` and `solved` are jobs of a process of `wholebody.base.runner`, which keeps the last case and knows
 which methods have run in it.
 """
 
@@ -14,20 +14,20 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.assessment import Assessment, assess
+from wholebody.assessment.motion import third_differences
+from wholebody.assessment.posture import Assessment, assess
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compile_all
+from wholebody.base.errors import WholebodyError
+from wholebody.base.runner import allow, allow_processor, processor_time
 from wholebody.bench.adapters.base import Adapter, Budget
 from wholebody.bench.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, REFUSED, Difficulty, Record, frame_cap
 from wholebody.bench.problem_sets.case import Case, ProblemSet
 from wholebody.bench.problem_sets.difficulty import away, descended
 from wholebody.bench.tables import programs_text
-from wholebody.compiled import compile_all
-from wholebody.errors import WholebodyError
 from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.methods.differential import TOOL
-from wholebody.motion_assessment import third_differences
 from wholebody.problem import Problem
-from wholebody.runner import allow, allow_processor, processor_time
 
 BUILDING = 300.0  # s: to build a case and what belongs to its scene; compiling once included
 LEAST = 1e-6  # s: no call of a solver is faster; differences of two clock readings may be

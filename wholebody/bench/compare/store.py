@@ -13,8 +13,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.bench.compare.record import Difficulty, Record
-from wholebody.errors import FileFormatError, InputError
 
 NAME = "chunks.jsonl"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.ablation import Constant, constants_in, places, replaced
 from wholebody.bench.motion.cases import synthetic
 from wholebody.bench.report import render

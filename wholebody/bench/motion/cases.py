@@ -10,9 +10,9 @@ from types import MappingProxyType
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.reading import read_clip

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch, make_folder, write
 from wholebody.bench import plot_style
 from wholebody.bench.motion.cases import RATE
 from wholebody.bench.motion.report import STYLES
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.files import Scratch, make_folder, write
 from wholebody.geometry.shapes import Capsule, HalfSpace
 from wholebody.methods.solve import solve
 from wholebody.motion.avoider import Avoider
@@ -31,7 +31,7 @@ from wholebody.motion.frame_terms import Given
 from wholebody.motion.reading import read_clip
 from wholebody.motion.ready_equipment import Worn, dressed, equipment
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze, Hold, Point
 
 WALK, JUMP, RISE = "cmu_35_01", "cmu_02_04", "deepmimic_getup_facedown"

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.batches import run_batch
+from wholebody.base.batches import run_batch
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import make_folder
+from wholebody.base.runner import BY_THE_CLOCK, Job, allow_processor
 from wholebody.bench.motion.cases import SYNTHETIC, WEAPON, recorded, synthetic
 from wholebody.bench.tables import read_rows, write_rows
-from wholebody.errors import InputError, WholebodyError
-from wholebody.files import make_folder
-from wholebody.runner import BY_THE_CLOCK, Job, allow_processor
 
 if TYPE_CHECKING:
     from wholebody.motion.checking import ClipCheck

@@ -11,7 +11,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation
@@ -21,7 +21,7 @@ from wholebody.motion.trajectory.nodes import NodeEvaluator
 from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import MET, WindowProgram
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 ROOT = 0.01  # weight of a free root: the deviation that is compared is of the other joints
 STEPS = 60  # of one answer

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import wholebody as wb
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 
 ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at the start
 CLEARANCE = 0.002  # m: what is asked of an answer

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.bodies import (
     ROOM,
     TIPS,
@@ -19,7 +20,6 @@ from wholebody.bench.problem_sets.bodies import (
 )
 from wholebody.bench.problem_sets.case import Posed, ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
-from wholebody.errors import InputError
 
 THINGS = 12
 SPAN = 24  # frames from one knot of the spline to the next: 0.4 s

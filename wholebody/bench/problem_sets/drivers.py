@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.bodies import alone, is_free, movable, until_found
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.fitting import fitted

@@ -14,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.state import State, Wrench
 
 EXACT = 1e-10  # m, rad

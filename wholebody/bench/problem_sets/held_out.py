@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     FEET,
     ROOM,

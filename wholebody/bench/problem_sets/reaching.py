@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.bodies import (
     ROOM,
     TIPS,

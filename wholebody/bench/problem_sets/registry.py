@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from types import MappingProxyType
 
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.problem_sets import (
     balance,
     closed_loop,
@@ -18,7 +19,6 @@ from wholebody.bench.problem_sets import (
     self_contact,
 )
 from wholebody.bench.problem_sets.case import ProblemSet
-from wholebody.errors import UnknownNameError
 
 _ALL = (
     reaching.FREE, reaching.SEVERAL, reaching.CLUTTER, self_contact.SET, balance.SET, closed_loop.SET, passage.SET,

@@ -7,11 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch
 from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, until_found
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
-from wholebody.files import Scratch
 
 THINGS = 8
 SPACE = ((-0.8, -0.8, 0.05), (0.8, 0.8, 1.3))  # m: where they are put

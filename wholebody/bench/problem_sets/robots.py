@@ -14,11 +14,11 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.bodies import CLEARANCE, ROOM, until_found
 from wholebody.bench.problem_sets.case import ProblemSet
 from wholebody.bench.problem_sets.things import Occupied, add_things
-from wholebody.errors import InputError
 from wholebody.figures.self_pairs import random_postures
 
 VARIABLE = "WHOLEBODY_ROBOTS"

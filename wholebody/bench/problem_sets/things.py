@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.geometry.placement import placement
 from wholebody.geometry.swept_points import swept_points
 

@@ -10,11 +10,11 @@ from typing import Any, Literal, cast
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, UnknownNameError
 from wholebody.bench.published.reading import VERSION, loaded, read_index
 from wholebody.bench.published.rebuilt import UNIT, Rebuilt
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError, UnknownNameError
 
 Seed = Literal["near", "far"]
 SEEDS: tuple[Seed, ...] = ("near", "far")

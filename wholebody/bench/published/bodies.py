@@ -15,10 +15,10 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.bench.published.reading import VERSION
 from wholebody.bench.published.shapes import Meshes, described, pose_of
-from wholebody.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
 

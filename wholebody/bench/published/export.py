@@ -13,7 +13,9 @@ from typing import Any
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.problem_sets.bodies import human
 from wholebody.bench.problem_sets.case import Case, ProblemSet, generator
 from wholebody.bench.problem_sets.difficulty import away, descended
@@ -23,8 +25,6 @@ from wholebody.bench.published.reading import INDEX, VERSION, dumped
 from wholebody.bench.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
 from wholebody.bench.published.seeds import far_seed
 from wholebody.bench.statistics import wilson
-from wholebody.errors import InputError, WholebodyError
-from wholebody.files import make_folder, read_text, write
 
 STATIC = Path(__file__).parent / "static"
 NAMES = ("problem", "body", "answers", "verdict")

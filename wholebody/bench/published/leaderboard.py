@@ -9,6 +9,9 @@ from pathlib import Path
 
 from numpy import nan_to_num
 
+from wholebody.base.errors import InputError
+from wholebody.base.files import is_folder
+from wholebody.base.records import with_values
 from wholebody.bench import plot_style
 from wholebody.bench.compare.pages import write_page
 from wholebody.bench.compare.rankings import in_words
@@ -21,9 +24,6 @@ from wholebody.bench.published.words import cells, left_out
 from wholebody.bench.report import render, spanned, words
 from wholebody.bench.statistics import Ranking, ranking, ratio
 from wholebody.bench.tables import write_text
-from wholebody.errors import InputError
-from wholebody.files import is_folder
-from wholebody.records import with_values
 
 PAGE = "leaderboard.html"
 MOST = 6  # methods in a chart

@@ -9,12 +9,12 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.published.bodies import BodyFiles
 from wholebody.bench.published.reading import VERSION
 from wholebody.bench.published.shapes import Meshes, described, pose_of
-from wholebody.errors import InputError
 from wholebody.tasks.base import Goal
 
 SAME = 1e-12  # m: clearances that differ by less are the same

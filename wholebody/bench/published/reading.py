@@ -8,8 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from wholebody.errors import FileFormatError, InputError
-from wholebody.files import LARGEST, is_folder, read_text
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import LARGEST, is_folder, read_text
 
 VERSION = "1.0"
 INDEX = "index.json"

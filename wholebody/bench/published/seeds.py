@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.bench.problem_sets.case import Case
 from wholebody.bench.problem_sets.fitting import Held, fitted, held
 

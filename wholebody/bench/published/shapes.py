@@ -8,7 +8,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 
 Meshes = dict[str, str]
 """Text of OBJ files by their path below the folder of an export."""

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import numpy as np
 
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.qp_programs.recording import Recorded
-from wholebody.errors import FileFormatError
-from wholebody.files import make_folder, read_text, write
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.split_form import split
 

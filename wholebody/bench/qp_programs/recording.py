@@ -7,9 +7,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from wholebody.base.errors import InputError
 from wholebody.bench.problem_sets.case import Case, generator
 from wholebody.bench.problem_sets.registry import problem_set
-from wholebody.errors import InputError
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver

@@ -7,10 +7,10 @@ from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.files import read_text
+from wholebody.base.files import write as write_whole
 from wholebody.bench.regress.selection import Run
-from wholebody.errors import FileFormatError, one_line
-from wholebody.files import read_text
-from wholebody.files import write as write_whole
 
 LOCKED = Path(__file__).with_name("locked.json")
 STATUSES = ("solved", "unreachable", "infeasible", "stalled")

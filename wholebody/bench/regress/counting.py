@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.all_pairs import AllPairs
+from wholebody.assessment.all_pairs import AllPairs
 
 
 @dataclass

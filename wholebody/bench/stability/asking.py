@@ -8,12 +8,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wholebody.base.compiled import compile_all
+from wholebody.base.errors import WholebodyError
+from wholebody.base.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.bench.adapters.base import Adapter
 from wholebody.bench.stability.case import NOTHING, Answer, HardCase, Nonsense, Posed, Stream
 from wholebody.bench.stability.judging import Judged, judge
-from wholebody.compiled import compile_all
-from wholebody.errors import WholebodyError
-from wholebody.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.tracking.drag import Drag
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.stability import equations, posed, streams
 from wholebody.bench.stability.case import HardCase
-from wholebody.errors import UnknownNameError
 
 GROUPS = (
     posed.SINGULAR, posed.OUT_OF_REACH, posed.STARTS, posed.CONTACT, equations.LOOPS, equations.NUMBERS,

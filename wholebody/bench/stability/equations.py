@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.drag import Drag
 

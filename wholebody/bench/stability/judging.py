@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from wholebody.assessment import Assessment, assess
+from wholebody.assessment.motion import depth_between, velocities
+from wholebody.assessment.posture import Assessment, assess
 from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Posed, Stream
-from wholebody.motion_assessment import depth_between, velocities
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 

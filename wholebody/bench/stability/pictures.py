@@ -9,11 +9,11 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch
 from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Nonsense, Stream
 from wholebody.bench.stability.verdict import Result
-from wholebody.files import Scratch
 from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
 from wholebody.tasks import Point

@@ -11,7 +11,7 @@ from wholebody.bench.stability.bodies import human_arm, planar_arm, sliding_tool
 from wholebody.bench.stability.case import Group, Posed
 from wholebody.geometry.shapes import Box, Sphere
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Orientation, Point
 
 SINGULAR = Group("Singular postures")

@@ -10,7 +10,7 @@ from wholebody.bench.stability.bodies import planar_arm, spatial_arm
 from wholebody.bench.stability.case import FRAME, Frame, Group, Stream, still
 from wholebody.geometry.shapes import Box, Sphere
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Point, StepLimit
 
 STREAMS = Group("Goals and things that move", tolerance=1e-3)  # a moderate accuracy, as frames have it

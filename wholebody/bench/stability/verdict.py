@@ -13,14 +13,14 @@ from functools import cached_property
 from pathlib import Path
 from typing import NamedTuple, cast
 
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.bench.adapters import registry
 from wholebody.bench.stability import catalogue
 from wholebody.bench.stability.asking import Cell
 from wholebody.bench.stability.case import Answer, HardCase, Kind
 from wholebody.bench.stability.judging import INSIDE, Judged
 from wholebody.bench.tables import filled, read_rows
-from wholebody.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.records import with_values
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 DENSITY = 700.0  # kg/m3
 GRAVITY = 9.81  # m/s2

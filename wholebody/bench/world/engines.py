@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.world.drops import DENSITY, FRICTION, GRAVITY, RESTITUTION, Drop
 
 MUJOCO_STEP = 1.0 / 480.0  # s: its own default is 2 ms

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.proximity import Contacts
 
 FREE = 1e-4  # m: depth up to which a posture is free

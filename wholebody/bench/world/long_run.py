@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.dynamics.rigid_bodies import RigidBodies
 
 DT = 1.0 / 60.0

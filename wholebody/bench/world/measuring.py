@@ -11,7 +11,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.problem_sets.things import coal_distance
 from wholebody.bench.world.drops import GRAVITY, Drop
 from wholebody.bench.world.engines import ENGINES

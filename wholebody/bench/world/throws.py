@@ -17,7 +17,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.bench.world.free_postures import free_posture
 from wholebody.tracking.moving_goals import retarget
 

@@ -6,10 +6,10 @@ import argparse
 import shutil
 from pathlib import Path
 
+from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_text
 from wholebody.cli.bench.command import listed, measuring, option, publish, publish_page
-from wholebody.files import make_folder
 
 PARTS = "maps", "drag", "pictures"
 """What is measured of every day's work, each into a table of its own."""

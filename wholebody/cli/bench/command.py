@@ -10,9 +10,9 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wholebody.base.errors import InputError
 from wholebody.bench.tables import replace_section, write_rows, write_text
 from wholebody.cli.arguments import Commands, add_folders
-from wholebody.errors import InputError
 
 Option = Callable[[argparse.ArgumentParser], object]
 """Adds itself to a parser."""

@@ -7,10 +7,10 @@ from datetime import date
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from wholebody.base.errors import InputError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows, write_text
 from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, publish, quick, seed
-from wholebody.errors import InputError
 
 if TYPE_CHECKING:
     from wholebody.bench.compare.settings import Settings
@@ -48,7 +48,7 @@ def compare(arguments: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
-    from wholebody.batches import threads
+    from wholebody.base.batches import threads
     from wholebody.bench.adapters.registry import missing
     from wholebody.bench.compare import run as comparison
     from wholebody.bench.compare.advice import advice

@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.base.errors import InputError
 from wholebody.bench.machine import machine
 from wholebody.cli.bench.command import command, count, measuring, option, publish
-from wholebody.errors import InputError
 
 PROBLEMS = 6  # of every set, where --count is left out
 

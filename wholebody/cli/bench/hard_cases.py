@@ -8,10 +8,10 @@ from itertools import count as numbers
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
 from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, seed
-from wholebody.errors import InputError, UnknownNameError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence

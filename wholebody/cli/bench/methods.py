@@ -9,9 +9,9 @@ from itertools import chain
 from pathlib import Path
 from typing import Any
 
+from wholebody.base.errors import UnknownNameError
 from wholebody.bench.machine import machine
 from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish, seed
-from wholebody.errors import UnknownNameError
 
 PAIRS_OF_RUNS = 15  # with a person's defaults and without: their ratio then has an interval of some 3 %
 QUICK = 45  # quadratic programs

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from wholebody.base.checks import number
+from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows
-from wholebody.checks import number
 from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish
-from wholebody.files import make_folder
 
 CLIPS = (
     option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),

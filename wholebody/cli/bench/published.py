@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from wholebody.base.errors import InputError
 from wholebody.bench.tables import write_text
 from wholebody.cli.bench.command import command, count, listed, option, seed
-from wholebody.errors import InputError
 
 WIDTH = 230  # columns of the judge's table, also where the terminal has fewer
 PROBLEMS = option("--problems", type=Path, required=True, metavar="DIR", help="folder of the exported problems")
@@ -63,11 +63,11 @@ def judge(arguments: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.table import Table
 
+    from wholebody.base.files import checked_target
     from wholebody.bench.published.answers import read_answers
     from wholebody.bench.published.judging import as_json, judge
     from wholebody.bench.published.reading import dumped
     from wholebody.bench.published.words import COLUMNS, cells, left_out
-    from wholebody.files import checked_target
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
     checked_target(out, "--out", "a verdict", (".json",))

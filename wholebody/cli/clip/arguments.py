@@ -60,8 +60,8 @@ def jobs_of(arguments: argparse.Namespace) -> int:
     Raises:
         WholebodyError: less than one, or a cluster that does not answer.
     """
-    from wholebody.batches import threads
-    from wholebody.checks import whole
+    from wholebody.base.batches import threads
+    from wholebody.base.checks import whole
 
     if arguments.jobs is None:
         return threads(arguments.cluster) if arguments.cluster else 1

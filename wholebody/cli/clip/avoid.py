@@ -71,7 +71,7 @@ def run(arguments: argparse.Namespace) -> int:
         return _batch(arguments, methods, worn)
     from rich.console import Console
 
-    from wholebody.files import check_writable
+    from wholebody.base.files import check_writable
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
@@ -105,7 +105,7 @@ def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     Raises:
         WholebodyError: there is no such method, or it does not slow motions or take dynamics.
     """
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
     from wholebody.motion.avoidance import as_avoider
     from wholebody.motion.avoider import has_setting
     from wholebody.motion.strength import Strength

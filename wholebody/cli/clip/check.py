@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip import Clip
-    from wholebody.scene import Scene
+    from wholebody.scene.scene import Scene
 
 DESCRIPTION = """\
 Check a motion: every pair of pieces that can touch, in every frame and in the motion from each frame to the next one;
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from rich.console import Console
 
-    from wholebody.files import checked_target, write
+    from wholebody.base.files import checked_target, write
     from wholebody.motion.checking import DEPTH
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import NOTHING, put_on
@@ -84,7 +84,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _scene(arguments: argparse.Namespace) -> Scene:
-    from wholebody.scene import Scene
+    from wholebody.scene.scene import Scene
 
     if arguments.scene is None:
         return Scene(figure_of(arguments))
@@ -108,13 +108,13 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.batches import run_batch
-    from wholebody.checks import number
+    from wholebody.base.batches import run_batch
+    from wholebody.base.checks import number
+    from wholebody.base.errors import InputError
+    from wholebody.base.runner import Job
     from wholebody.cli.tables import table
-    from wholebody.errors import InputError
     from wholebody.motion.checking import LARGEST, SMALLEST
     from wholebody.motion.ready_equipment import NOTHING, put_on
-    from wholebody.runner import Job
 
     if arguments.html is not None:
         raise InputError("--html is for one motion with one equipment; give one file")
@@ -151,7 +151,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
 
 def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: float) -> dict[str, Any]:
     """Check a motion in a process of its own; what `ClipCheck.as_dict` gives, or why it was refused."""
-    from wholebody.errors import WholebodyError
+    from wholebody.base.errors import WholebodyError
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import put_on

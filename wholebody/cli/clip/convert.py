@@ -28,7 +28,7 @@ def add_to(commands: Commands) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Read, change and write."""
-    from wholebody.files import check_writable
+    from wholebody.base.files import check_writable
     from wholebody.motion.files import check_ending
 
     check_writable(check_ending(arguments.out))

@@ -46,9 +46,9 @@ def run(arguments: argparse.Namespace) -> int:
 
     import numpy as np
 
-    from wholebody.checks import whole
-    from wholebody.errors import InputError
-    from wholebody.files import checked_target
+    from wholebody.base.checks import whole
+    from wholebody.base.errors import InputError
+    from wholebody.base.files import checked_target
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
     from wholebody.motion.ready_equipment import dressed

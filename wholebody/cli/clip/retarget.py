@@ -37,7 +37,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Read, retarget and write."""
     if len(arguments.files) > 1:
         return _many(arguments)
-    from wholebody.files import check_writable
+    from wholebody.base.files import check_writable
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.retargeting import retarget
@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _many(arguments: argparse.Namespace) -> int:
-    from wholebody.errors import InputError
+    from wholebody.base.errors import InputError
     from wholebody.motion.batch import read_many
 
     for option in ("names", "unit", "up"):

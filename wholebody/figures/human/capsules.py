@@ -9,7 +9,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import RELAXED, Dimensions
 

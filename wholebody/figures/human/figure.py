@@ -8,6 +8,7 @@ from functools import partial
 
 import numpy as np
 
+from wholebody.base.records import with_values
 from wholebody.figures import postures
 from wholebody.figures.anthropometry import Person, make_person, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
@@ -21,7 +22,6 @@ from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
-from wholebody.records import with_values
 
 ROOT_EFFORT = (5.0, 2.0)
 """Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.

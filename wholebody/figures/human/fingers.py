@@ -14,7 +14,7 @@ from typing import NamedTuple
 import coal
 import pinocchio as pin
 
-from wholebody.checks import choice, known
+from wholebody.base.checks import choice, known
 from wholebody.figures.body_spec import BodySpec, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.hand import (

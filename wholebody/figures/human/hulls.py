@@ -7,11 +7,11 @@ from typing import Any
 
 import pinocchio as pin
 
+from wholebody.base.records import with_values
 from wholebody.figures import hulls
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human import capsules
-from wholebody.records import with_values
 
 _TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
 

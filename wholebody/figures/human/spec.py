@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from wholebody.checks import known
-from wholebody.errors import InputError, UnknownNameError
+from wholebody.base.checks import known
+from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.anthropometry import Person, describe, make_person, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions

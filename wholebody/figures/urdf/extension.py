@@ -41,9 +41,9 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError, UnknownNameError, WholebodyError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, UnknownNameError, WholebodyError
 from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, ExcludedPair, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import (

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-from wholebody.errors import InputError
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure, visual_of_links

@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
-from wholebody.checks import color, shown
-from wholebody.errors import FileFormatError, InputError
+from wholebody.base.checks import color, shown
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, read_xml, unique_names
 from wholebody.geometry.pieces import LARGEST
-from wholebody.records import with_values
 
 EXTENSION = "wholebody"
 """Name of the element of our extension; see `wholebody.figures.urdf.extension`."""

@@ -11,11 +11,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.checks import shown, warn
-from wholebody.errors import FileFormatError
+from wholebody.base.checks import shown, warn
+from wholebody.base.errors import FileFormatError
+from wholebody.base.records import with_values
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
 from wholebody.geometry.pieces import LARGEST
-from wholebody.records import with_values
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 FOLLOWING = ("revolute", "continuous", "prismatic")

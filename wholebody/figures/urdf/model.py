@@ -14,12 +14,12 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import pinocchio as pin
 
-from wholebody.checks import shown
-from wholebody.errors import FileFormatError
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError
+from wholebody.base.records import with_values
 from wholebody.figures.urdf.file import UrdfFile
 from wholebody.figures.urdf.joints import Mimic, UrdfJoint
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
-from wholebody.records import with_values
 
 _INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

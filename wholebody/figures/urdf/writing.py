@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, SubElement
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 FOLLOWS = "JointModelMimic"
 """Pinocchio's name of a joint that follows another."""

@@ -12,9 +12,9 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from wholebody.checks import shown, warn
-from wholebody.errors import FileFormatError, one_line
-from wholebody.files import read_bytes
+from wholebody.base.checks import shown, warn
+from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.files import read_bytes
 
 MOST_BYTES = 64 * 2**20
 """Largest file that is accepted as a description of a robot."""

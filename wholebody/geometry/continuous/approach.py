@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.motion_bounds import TURNING_AXES
 from wholebody.geometry.proximity import PairTable
 

@@ -16,8 +16,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 
 TURNING_AXES = ("Composite", "SphericalZYX", "Universal", "Ellipsoid")
 """Joints whose twist is not constant along a geodesic, by a part of Pinocchio's name for them."""

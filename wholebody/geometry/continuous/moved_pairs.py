@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 
 ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step

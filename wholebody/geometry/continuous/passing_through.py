@@ -16,7 +16,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved, separated
 from wholebody.geometry.proximity import Contacts, PairTable
 
@@ -34,7 +34,7 @@ HALVINGS = 3  # of a motion before doubtful pairs are swept
 
 
 class Queries(Protocol):
-    """Queries at postures between the two; `wholebody.workspace.Workspace` implements them."""
+    """Queries at postures between the two; `wholebody.scene.workspace.Workspace` implements them."""
 
     @property
     def model(self) -> pin.Model:

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, read_result

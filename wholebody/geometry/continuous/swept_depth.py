@@ -14,7 +14,7 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import distance_view, placement_view, read_result

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import compiled
 from wholebody.geometry.proximity_kernel import bound_by_boxes, outer_gap
 
 

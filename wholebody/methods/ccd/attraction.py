@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
 BLOCKED = 0.4  # a part that gains less than this share of the gain without contact is blocked (2 is all of it)

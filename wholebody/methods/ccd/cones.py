@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.methods.ccd.limbs import Limbs, Placement, floats, rotated, seen_from

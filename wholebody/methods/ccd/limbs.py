@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.ccd import limbs_kernel
 from wholebody.methods.ccd.limbs_kernel import OBLIQUE, SLIDE, X, Y, Z
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import acos, atan2, ceil, cos, floor, inf, pi, sin
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 
 X, Y, Z, OBLIQUE, SLIDE = range(5)
 """What a joint does: turn about an axis of its own frame (either way round), about any other, or slide."""

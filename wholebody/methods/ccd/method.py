@@ -10,8 +10,8 @@ from math import inf
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import posture, settle
+from wholebody.base.arrays import Array
+from wholebody.base.checks import posture, settle
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
@@ -23,8 +23,8 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution, TraceEntry
-from wholebody.workspace import Workspace
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the present posture; later ones begin anywhere
 ROUNDS = 6  # alternations of reaching and overlap resolution, from one start

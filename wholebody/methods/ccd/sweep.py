@@ -20,7 +20,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.methods.ccd.limbs import Limbs, compiled_kernel
 
 Vector = Sequence[float]

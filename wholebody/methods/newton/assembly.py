@@ -10,9 +10,10 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import choice, flag, known, number, shown, whole
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, flag, known, number, shown, whole
+from wholebody.base.errors import InputError
+from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
@@ -29,8 +30,7 @@ from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import Patterns, System
-from wholebody.moving_things import Collision, FrameMotion
-from wholebody.pool import OneAtATime
+from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.tasks.inputs import point
 
 if TYPE_CHECKING:

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import color as checked_color
-from wholebody.checks import instance, known, number, numbers, shown, text
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import color as checked_color
+from wholebody.base.checks import instance, known, number, numbers, shown, text
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.pieces import check_length
@@ -32,8 +32,8 @@ from wholebody.methods.newton.assembly_geometry import (
 )  # fmt: skip
 from wholebody.methods.newton.system import unit
 from wholebody.problem import LARGEST_CLEARANCE, Problem
-from wholebody.scene import Scene
-from wholebody.scene_geometry import SceneObject
+from wholebody.scene.geometry_model import SceneObject
+from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint
 from wholebody.tasks.inputs import target_placement
 

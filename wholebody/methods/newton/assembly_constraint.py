@@ -6,9 +6,9 @@ from abc import ABC, abstractmethod
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.checks import listed, shown, text
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import listed, shown, text
+from wholebody.base.errors import InputError
 from wholebody.methods.newton.batches import Batch
 
 STEP = 1e-6  # m and parts of a quaternion: of the central differences that a derivative is compared with

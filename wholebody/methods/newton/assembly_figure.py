@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.figure_bodies import FigureBodies

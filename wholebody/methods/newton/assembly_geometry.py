@@ -7,15 +7,15 @@ from typing import Any, NamedTuple
 
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.errors import InputError
+from wholebody.base import checks
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
 from wholebody.geometry.swept_points import swept_points
-from wholebody.scene import Scene
-from wholebody.scene_geometry import SceneObject, assemble
+from wholebody.scene.geometry_model import SceneObject, assemble
+from wholebody.scene.scene import Scene
 
 Solid = tuple[Shape, Any]
 """A shape, and its placement (pin.SE3) in its body."""

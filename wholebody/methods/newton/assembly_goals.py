@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.tasks.inputs import point, target_placement
 

@@ -10,9 +10,9 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
-from wholebody.checks import choice, flag, instance, known, numbers, shown
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, flag, instance, known, numbers, shown
+from wholebody.base.errors import InputError
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.newton.assembly_bodies import WORLD, AssemblyBodies
 from wholebody.methods.newton.assembly_constraint import AssemblyConstraint, OwnRows, checked, names_of

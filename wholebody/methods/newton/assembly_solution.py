@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.all_pairs import all_pairs
-from wholebody.arrays import Array
+from wholebody.assessment.all_pairs import all_pairs
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.kkt import project
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import unit
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.solution import Status
 
 FINEST = 1e-9  # least tolerance of the KKT system: redundant equations leave an error of about a tenth of it

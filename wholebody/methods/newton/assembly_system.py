@@ -7,14 +7,14 @@ from collections.abc import Callable, Hashable, Sequence
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, Key
 from wholebody.methods.newton.contacts import LONGEST, ContactSet
 from wholebody.methods.newton.system import WORLD, ActiveSystem, Patterns, unit
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 Batches = Sequence[tuple[Batch, Key]]
 ONE_SIDED = Key("", False, True, 1.0)

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.errors import InputError
 from wholebody.methods.newton import quaternions as quat
 
 PLACE, TURN = slice(0, 3), slice(3, 7)

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer repeated steps
 LEAVE = 0.06  # m beyond the clearance: farther pairs cease to be; the difference avoids changes of the structure

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import OTHER_TURN, PLACE, TURN, Batch
 

@@ -9,11 +9,11 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.newton.angles import Angle
 from wholebody.methods.newton.batches import Batch, Coincide, Key, Slide, Turn, Unit
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
-from wholebody.records import with_values
 
 
 class Row(NamedTuple):

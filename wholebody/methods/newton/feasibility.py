@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.iteration import LEAST_PROGRESS, Iteration
 from wholebody.methods.newton.system import ActiveSystem

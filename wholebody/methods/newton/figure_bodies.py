@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key, Unit
 from wholebody.methods.newton.contacts import LONGEST, ContactSet
 from wholebody.methods.newton.figure_bodies import FigureBodies
@@ -12,9 +12,9 @@ from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import ActiveSystem, Patterns
 from wholebody.methods.newton.terms import bound_equations, constraint_equations, goal_equations
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.checks import undefined
-from wholebody.workspace import Workspace
 
 HARD = Key("", False, False, 1.0)
 ONE_SIDED = Key("", False, True, 1.0)

@@ -14,7 +14,7 @@ from typing import Literal, Protocol
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 FREE = 1e12  # diagonal of an inactive inequality: it is in the pattern, but has no effect
 RELEASE = 1e-12  # an active inequality with a multiplier below minus this is released; larger = held longer

@@ -13,8 +13,8 @@ from typing import Literal
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import UndefinedTermError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.methods.newton.system import ActiveSystem

@@ -15,11 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
 from wholebody.methods.newton.system import System
-from wholebody.records import with_values
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
 HALVINGS = 12  # of a step that is not accepted

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from wholebody.checks import choice, known, settle
+from wholebody.base.checks import choice, known, settle
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings

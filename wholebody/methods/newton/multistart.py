@@ -10,8 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.assessment import Assessment, assess
+from wholebody.assessment.posture import Assessment, assess
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -19,7 +20,6 @@ from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.refinement import refine
 from wholebody.methods.starts import Minima, off_limits, restarts
-from wholebody.records import with_values
 from wholebody.solution import Solution, TraceEntry
 
 SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment uses norms over the rows of a goal

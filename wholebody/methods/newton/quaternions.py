@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 
 def product(a: Array, b: Array) -> Array:

@@ -12,8 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import UndefinedTermError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.acceleration import Anderson
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
 from wholebody.geometry.shapes import Box, Capsule, Shape, Sphere
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import OTHER_PLACE, OTHER_TURN, PLACE, TURN, Batch

@@ -7,7 +7,7 @@ from collections.abc import Hashable, Sequence
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import Control
 from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern

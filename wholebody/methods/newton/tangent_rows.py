@@ -14,15 +14,15 @@ from collections.abc import Callable
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.errors import TermError
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.errors import TermError
 from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.checks import defined
-from wholebody.term_plan import checked_count
+from wholebody.terms.plan import checked_count
 
 SAMPLES = 3  # postures that tell which degrees of freedom a residual depends on
 

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import number, posture, time_step
+from wholebody.base.arrays import Array
+from wholebody.base.checks import number, posture, time_step
+from wholebody.base.pool import OneAtATime
+from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
@@ -17,13 +19,11 @@ from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.multistart import SHARPER, Search, Settings
-from wholebody.moving_things import Collision
-from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
-from wholebody.records import with_values
+from wholebody.scene.moving_obstacles import Collision
+from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-from wholebody.workspace import NotCopyable
 
 FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.checks import choice, settle
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import choice, settle
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress, check_time_limit
@@ -18,8 +18,8 @@ from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
-from wholebody.workspace import Workspace
 
 STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger

@@ -14,8 +14,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import MissingPackageError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import MissingPackageError
 from wholebody.figures.description import Follower
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint, urdf_axis

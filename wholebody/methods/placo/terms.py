@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.base import named_terms
 from wholebody.methods.placo.robot import Robot, unsupported_joints
 from wholebody.problem import Problem

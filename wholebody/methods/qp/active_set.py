@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 
 BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside

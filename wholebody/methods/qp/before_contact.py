@@ -12,7 +12,6 @@ from itertools import chain
 
 import numpy as np
 
-from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import ENDLESS
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -22,6 +21,7 @@ from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.tasks.approach import approached, has_face
+from wholebody.terms.linearisation import Lineariser
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
 NEAR = 1e-3  # m, rad: to which that is met; what is exact there is not where surfaces meet

@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.penetration import global_depth
 from wholebody.geometry.proximity import Contacts
 from wholebody.geometry.separation import least_separation
 from wholebody.problem import Problem
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 CANCELLED = 0.1  # share of the deepest overlap below which what all normals together push with counts as none
 MOST_PAIRS = 16  # of pieces that overlap; more take longer to separate than other starts

@@ -19,19 +19,19 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import UndefinedTermError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import UndefinedTermError
+from wholebody.base.records import with_values
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import Iterate, LocalSolution
 from wholebody.methods.qp.subproblem import Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
-from wholebody.records import with_values
+from wholebody.terms.linearisation import Lineariser
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
 WITHIN = 0.12  # m: pairs nearer than this get rows

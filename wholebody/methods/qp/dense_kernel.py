@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compiled
 
 SWEEPS = 30  # over all rows in one projection, at most
 LEAST = 1e-9  # of the square of a row that moves anything, and m or rad by which a row is violated

@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.linearisation import PackedLinearisation
+from wholebody.base.arrays import Array
+from wholebody.terms.linearisation import PackedLinearisation
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
 WAYS = (

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
 
 

@@ -19,10 +19,10 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
-from wholebody.errors import UndefinedTermError
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import UndefinedTermError
+from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.linearisation import Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -30,8 +30,8 @@ from wholebody.methods.qp.sqp import Iterate, LocalSolution, stalls
 from wholebody.methods.qp.subproblem import BOX, Subproblem, Violation
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
-from wholebody.records import with_values
 from wholebody.solution import TraceEntry
+from wholebody.terms.linearisation import Lineariser
 
 STEP = 0.2  # rad, m: most that a degree of freedom moves in a program; larger = fewer programs, limbs jump over others
 LEAST_STEP = 1e-3  # rad, m: of the box; smaller = slower to end where steps go to and fro

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from wholebody.arrays import Array
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compiled
 
 
 @compiled()

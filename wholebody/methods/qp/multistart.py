@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.linearisation import Lineariser
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import before_contact
@@ -22,9 +22,9 @@ from wholebody.methods.qp.sqp import SQP, LocalSolution
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import Minima, hooked_hands, named_postures, restarts, throughout
 from wholebody.problem import Problem
-from wholebody.records import with_values
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.workspace import Workspace
+from wholebody.terms.linearisation import Lineariser
 
 PROBE_PROGRAMS = 40  # most programs of a probe; more = surer on curved ways, fewer starts within the budget
 RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; two limbs that cross need as much

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 
 MOST = 1e30
 """Sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite."""

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.active_set import ROW_TOLERANCE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 

@@ -15,11 +15,11 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import UndefinedTermError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import UndefinedTermError
+from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.linearisation import Linearisation, Lineariser
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
@@ -28,8 +28,8 @@ from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
 from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.records import with_values
 from wholebody.solution import TraceEntry
+from wholebody.terms.linearisation import Linearisation, Lineariser
 
 FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
 LARGEST_RADIUS = 0.8

@@ -14,9 +14,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.state import State
-from wholebody.linearisation import ConstraintValues, PackedLinearisation
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
 from wholebody.methods.qp.subproblem import (
@@ -34,8 +33,9 @@ from wholebody.methods.qp.subproblem import (
 from wholebody.methods.qp.subproblem import compiled_kernel as compiled_subproblem
 from wholebody.methods.qp.working_set import LIMITS, WorkingSet
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
-from wholebody.workspace import Workspace
+from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
 DAMPING = 2.0

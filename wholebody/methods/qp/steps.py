@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
-from wholebody.arrays import Array
-from wholebody.moving_things import Collision
+from wholebody.base.arrays import Array
+from wholebody.scene.moving_obstacles import Collision
 
 
 class QPStep(NamedTuple):

@@ -18,11 +18,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.acceleration import STRETCH, Anderson
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.records import with_values
 
 ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
 ROOM = 1e-3  # rad, m: a bound that is nearer holds the normal part too

@@ -9,11 +9,12 @@ from dataclasses import replace
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.checks import flag, number, posture, time_step
-from wholebody.errors import TermError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import flag, number, posture, time_step
+from wholebody.base.errors import TermError
+from wholebody.base.pool import OneAtATime
+from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.base import Method, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.escaping import WITHIN, ProjectionRows, free_end, projection_rows
@@ -23,13 +24,12 @@ from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.steps import FrameStep, QPStep
 from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
-from wholebody.moving_things import MOST_SHARES, FrameMotion
-from wholebody.pool import OneAtATime
 from wholebody.problem import Problem
-from wholebody.records import with_values
+from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
+from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import StepLimit, allowed, at_speeds, clipped
-from wholebody.workspace import NotCopyable
+from wholebody.terms.linearisation import PackedLinearisation
 
 LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
 LARGEST_WITHIN = 0.5

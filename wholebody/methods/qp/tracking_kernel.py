@@ -6,8 +6,8 @@ from typing import TypeAlias
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import solve_growing, work_size
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.subproblem_kernel import motion, program, sort_rows

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.linearisation import PackedLinearisation
 from wholebody.methods.qp.subproblem import Rows
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
+from wholebody.terms.linearisation import PackedLinearisation
 
 ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
 OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance

@@ -15,15 +15,15 @@ from typing import Any, NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.description import Limits
 from wholebody.figures.state import extended_columns
 from wholebody.methods.control import Control
 from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
-from wholebody.term_entries import BOX, RESIDUAL
-from wholebody.term_plan import TermPlan
-from wholebody.workspace import Workspace
+from wholebody.terms.entries import BOX, RESIDUAL
+from wholebody.terms.plan import TermPlan
 
 STEPS = 60  # most; descents that reach their goals take 5 to 15
 DAMPING = 1e-3  # m, rad: of the steps at the goals; less = errors vanish faster, steps near singular postures are wild

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices, Mask
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import solve
-from wholebody.residual_kernel import residuals
-from wholebody.term_entries import Integers
+from wholebody.terms.entries import Integers
+from wholebody.terms.residual_kernel import residuals
 
 
 @compiled(error_model="numpy")

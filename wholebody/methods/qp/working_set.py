@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import (
     BOUND_TOLERANCE,
     FULL_CORRECTIONS,
@@ -16,7 +17,6 @@ from wholebody.methods.qp.active_set import (
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import compiled_kernel as semismooth_kernel
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
-from wholebody.records import with_values
 
 NEAR = 0.03  # m: rows with less room than this at x = 0 are in from the beginning
 ROUNDS = 8  # most times that rows are added before all of them are

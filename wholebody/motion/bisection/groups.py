@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from wholebody.arrays import Mask
+from wholebody.base.arrays import Mask
 from wholebody.motion.windows import runs
 
 

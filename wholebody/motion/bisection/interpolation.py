@@ -7,7 +7,7 @@ from typing import Literal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 
 Kind = Literal["linear", "quadratic"]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import choice, listed, number, settle, text, whole
+from wholebody.base.arrays import Array
+from wholebody.base.checks import choice, listed, number, settle, text, whole
 from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
@@ -21,7 +21,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms, said
 from wholebody.motion.repair import Repairer
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
 
 OVERLAP = 5e-5

@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.problem import Problem
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks import Effort, Freeze, Hold, Plane
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
-from wholebody.workspace import Workspace
 
 ELBOWS = ("left_elbow", "right_elbow")
 ANKLES = ("left_ankle", "right_ankle")

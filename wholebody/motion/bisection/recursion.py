@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State
 from wholebody.motion.avoider import Watch
 from wholebody.motion.bisection.groups import Group, collision_groups
@@ -16,7 +16,7 @@ from wholebody.motion.bisection.interpolation import Kind, fill
 from wholebody.motion.bisection.prediction import Prediction, Predictor, path_planes
 from wholebody.motion.following import Follower
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 from wholebody.tasks import Plane
 
 SAME = 1e-4

@@ -6,8 +6,8 @@ import os
 from collections.abc import Callable, Collection
 from pathlib import Path
 
-from wholebody.checks import path as checked_path
-from wholebody.errors import FileFormatError, one_line
+from wholebody.base.checks import path as checked_path
+from wholebody.base.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.files import archive, bvh_writing, columns, gltf, joint_profile
 from wholebody.motion.files.base import Frames, Motion

@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP
-from wholebody.errors import FileFormatError, InputError, one_line
+from wholebody.base.arrays import Array
+from wholebody.base.checks import TIME_STEP
+from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES

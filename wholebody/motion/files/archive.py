@@ -13,10 +13,10 @@ from typing import IO
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
+from wholebody.base.files import LARGEST, read_bytes
+from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.files import LARGEST, read_bytes
-from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.tracking.tracks import MOST_FRAMES
 

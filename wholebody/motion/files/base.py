@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple, Protocol
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.files import read_text
+from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.base.files import read_text
 from wholebody.motion.files.bvh_text import BvhText, parsed
 from wholebody.motion.files.text import LARGEST_FILE
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit

@@ -8,9 +8,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass, field
 
-from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP, TIME_STEP_ASKED
-from wholebody.errors import FileFormatError, one_line
+from wholebody.base.arrays import Array
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
+from wholebody.base.errors import FileFormatError, one_line
 from wholebody.motion.files.text import number as read_number
 from wholebody.motion.files.text import table
 from wholebody.tracking.tracks import MOST_FRAMES

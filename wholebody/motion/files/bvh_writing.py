@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.base.files import Scratch
+from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.files import Scratch
-from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.files.bvh import pybvh
 from wholebody.motion.files.euler import angles_about

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from wholebody.errors import FileFormatError, InputError
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.tracking.track_files import read_track, write_track

@@ -7,7 +7,7 @@ import warnings
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 LOCKED = 1e-6
 """Radians from gimbal lock: six digits of a degree, as BVH has, say nothing there of the first and the third angle."""

@@ -13,10 +13,10 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError, MissingPackageError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, MissingPackageError
+from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.files import write as write_file
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 

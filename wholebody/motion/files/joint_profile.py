@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from wholebody.arrays import Array
-from wholebody.checks import TIME_STEP, TIME_STEP_ASKED
-from wholebody.errors import FileFormatError, InputError, one_line
+from wholebody.base.arrays import Array
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
+from wholebody.base.errors import FileFormatError, InputError, one_line
+from wholebody.base.files import read_text
+from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.files import read_text
-from wholebody.files import write as write_file
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.motion.files.euler import angles_about
 from wholebody.motion.files.text import LARGEST_FILE, number, table
@@ -94,7 +94,7 @@ def sampled(times: Array, curves: Array, figure: Figure, dt: float, name: str = 
     """
     from scipy.interpolate import CubicSpline
 
-    from wholebody.checks import array, time_step
+    from wholebody.base.checks import array, time_step
 
     _check_figure(figure)
     times, curves = (

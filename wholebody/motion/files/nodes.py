@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 from scipy.spatial.transform import Rotation
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.euler import angles_about
 

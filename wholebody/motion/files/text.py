@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.errors import FileFormatError, one_line
+from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, one_line
 from wholebody.tracking.tracks import LARGEST
 
 LARGEST_FILE = 500_000_000

@@ -17,9 +17,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.checks import shown
-from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 
 ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.description import Limits as JointLimits
 
 

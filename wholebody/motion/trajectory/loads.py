@@ -17,7 +17,8 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import FrameTerms, between
@@ -27,7 +28,6 @@ from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.torques import CUTOFF, smoothed
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
-from wholebody.records import with_values
 
 FRICTION = 0.8
 """Coefficient of friction of the ground, as that of `wb.torques`."""

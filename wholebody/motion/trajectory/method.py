@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody import checks
-from wholebody.arrays import Array, Mask
-from wholebody.checks import listed
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.checks import listed
 from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
@@ -23,8 +23,8 @@ from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun, WindowResult, WindowSettings
 from wholebody.motion.windows import Window, windows
-from wholebody.scene import Scene
-from wholebody.workspace import Workspace
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
 CORRECTIONS = 6  # of the loads of rows; more = fewer loads beyond their bounds, longer where they cannot keep to them

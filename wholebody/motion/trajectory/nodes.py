@@ -12,12 +12,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.figures.state import State
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.loads import WindowLoads
+from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint, Goal
-from wholebody.workspace import Workspace
 
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
 ROOM = 1e-4  # m: asked of pairs between frames; what is beside a place then dips by less than is told, once for all

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 
 def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_qp import BandedQP
 from wholebody.motion.trajectory.nodes import Rows
 from wholebody.motion.trajectory.objective import Objective

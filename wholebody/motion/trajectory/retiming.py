@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.objective import Objective
 

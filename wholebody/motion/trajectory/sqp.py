@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
 from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
 from wholebody.motion.trajectory.objective import Objective

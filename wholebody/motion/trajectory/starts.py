@@ -14,13 +14,13 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.motion.dips import dip_depth
 from wholebody.motion.fade import freed_posture
 from wholebody.motion.following import BACK, SHALLOW, Follower, keep_back
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.windows import Window, outwards
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 PATIENCE = 0.25  # s: a run of frames at the original posture this long ends the following
 

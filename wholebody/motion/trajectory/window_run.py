@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array, Mask
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.clip import Clip
 from wholebody.motion.dips import FEW, depths_between, dipping, dips, sampled_dips
 from wholebody.motion.frame_terms import FrameTerms
@@ -25,7 +25,7 @@ from wholebody.motion.trajectory.program import ONE_STEP, Limits
 from wholebody.motion.trajectory.sqp import LARGEST, MET, RADIUS, SQPResult, WindowProgram
 from wholebody.motion.trajectory.starts import Carried
 from wholebody.motion.windows import Window
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 ROUNDS = 12  # of sweeping and adding places between frames
 SIDES = (0.0, -0.005, 0.005)  # shares of a gap beside its deepest place that become nodes with it

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 BONES_EACH = 4
 """Bones that move a vertex: as many as a page's shader takes."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 
 Field = Callable[[Array], Array]
 """From points (n, 3) to signed distances (n,), exact or nearly so close to the surface."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view.surface.borders import BONES_EACH, strongest
 from wholebody.view.surface.fields import Field
 from wholebody.view.surface.nets import Triangles, triangles

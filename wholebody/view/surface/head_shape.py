@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.dimensions import Dimensions
 from wholebody.view.surface.fields import (
     Field,

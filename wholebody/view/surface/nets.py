@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.view.surface.fields import Field, intersection
 
 NEWTON_STEPS = 2

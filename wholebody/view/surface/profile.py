@@ -9,7 +9,7 @@ import coal
 import numpy as np
 from scipy.ndimage import gaussian_filter1d, maximum_filter1d
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid
 from wholebody.view.surface.fields import Field, ball, box, ellipsoid, placed, round_cone
 

@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import Person
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, PARTS

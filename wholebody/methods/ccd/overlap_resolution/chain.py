@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.ccd.cones import guards
 from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
 from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
 from wholebody.methods.ccd.sweep import carried, distance, moving_all
-from wholebody.scene import Scene
-from wholebody.workspace import Workspace
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next query finds no overlap
 CLOSE = 1e-4  # m: a goal nearer than this is reached

@@ -14,14 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
-from wholebody.errors import InputError
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
 from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
 from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver
-from wholebody.scene import Scene
+from wholebody.scene.scene import Scene
 
 STEP = 0.03  # m: largest motion of a chain's tip in one step; half of a forearm's width
 SMALL_STEP = 0.006  # m: length of steps that lead around a bulge which the direct motion penetrates

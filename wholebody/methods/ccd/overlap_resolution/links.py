@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from wholebody.geometry.separation import least_separation
 from wholebody.methods.ccd.limbs import Limbs
-from wholebody.workspace import Workspace
+from wholebody.scene.workspace import Workspace
 
 Vector = tuple[float, float, float]
 

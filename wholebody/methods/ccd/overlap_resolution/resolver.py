@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.proximity import Joints
@@ -19,8 +19,8 @@ from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
 from wholebody.methods.ccd.overlap_resolution.links import Link, Overlap
 from wholebody.methods.control import Control
-from wholebody.scene import Scene
-from wholebody.workspace import Workspace
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 Find = Callable[[ChainResolver, Sequence[Overlap]], "Link | None"]
 """What chooses the link to be moved."""

@@ -6,8 +6,8 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
-from wholebody.errors import WholebodyError
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import WholebodyError
 
 
 class SingularSystemError(WholebodyError, ArithmeticError):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Indices
-from wholebody.checks import known
+from wholebody.base.arrays import Indices
+from wholebody.base.checks import known
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
 from wholebody.methods.newton.linear_algebra.dense_columns import DenseColumns
 from wholebody.methods.newton.linear_algebra.normal_equations import NormalEquations

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array, Indices
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import compiled
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError, by_normal_equations
 
 Places = NDArray[np.int32]

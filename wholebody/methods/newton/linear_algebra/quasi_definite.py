@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from wholebody.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern, SingularSystemError
 
 LEAST_DAMPING = 1e-10  # times the largest weight's inverse: makes the matrix quasi-definite; smaller = less stable

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
-from wholebody.records import with_values
 
 ACTIVE_SET = "active set"
 """What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""

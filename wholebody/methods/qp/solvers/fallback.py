@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import guess_active_set, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.semismooth_newton import minimise
-from wholebody.records import with_values
 
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""

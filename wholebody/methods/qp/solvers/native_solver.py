@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -21,7 +22,6 @@ from wholebody.methods.qp.solvers.split_form import (
     scaled_split,
     slots_for,
 )
-from wholebody.records import with_values
 
 
 class NativeAnswer(NamedTuple):

@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
 from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE, read_active, slots_for
-from wholebody.records import with_values
 
 RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import piqp
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE

@@ -15,7 +15,7 @@ import numpy as np
 import quadprog
 from scipy.linalg.lapack import dgeqrf, dtrtri
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
 from wholebody.methods.qp.solvers.split_form import HEAVIEST, SCALE

@@ -7,8 +7,8 @@ from importlib import import_module
 from importlib.util import find_spec
 from types import MappingProxyType
 
-from wholebody.checks import shown
-from wholebody.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.base.checks import shown
+from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.methods.qp.active_set import compiled_kernel
 from wholebody.methods.qp.solvers.base import QPSolver
 

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from wholebody.arrays import Array
+from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 SCALE = 100.0  # x is in hundredths of a radian inside solvers, so that its entries are as large as the residuals

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.arrays import Array
-from wholebody.compiled import compiled
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compiled
 
 
 @compiled(error_model="numpy")

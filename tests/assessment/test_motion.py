@@ -1,0 +1,77 @@
+"""The judge of motions against coal asked pair by pair, and against motions whose figures are known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import coal
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from wholebody.assessment import motion as motion_assessment
+from wholebody.assessment.motion import (
+    assess_motion,
+    deepened,
+    depth_between,
+    frames_passed_through,
+    pairs_along,
+    velocities,
+)
+
+Arms = Callable[..., wb.Figure]
+
+
+def test_distances_are_those_of_coal_asked_pair_by_pair() -> None:
+    scene = wb.Scene(wb.load("avatar")).add(wb.Box((0.4, 0.4, 0.4)), name="box", at=(0.4, 0.0, 1.0))
+    rng = np.random.default_rng(3)
+    start, model, geometry = scene.figure.neutral, scene.model, scene.geometry
+    postures = np.array([pin.integrate(model, start, 0.3 * rng.normal(size=model.nv)) for _ in range(3)])
+    data, placed = model.createData(), pin.GeometryData(geometry)
+    for q, pairs in zip(postures, pairs_along(scene, postures), strict=True):
+        pin.updateGeometryPlacements(model, data, geometry, placed, q)
+        places = [coal.Transform3s(place.rotation, place.translation) for place in placed.oMg]
+        shapes = [piece.geometry for piece in geometry.geometryObjects]
+        expected = [
+            coal.distance(
+                shapes[pair.first], places[pair.first], shapes[pair.second], places[pair.second],
+                coal.DistanceRequest(), coal.DistanceResult(),
+            )
+            for pair in geometry.collisionPairs
+        ]  # fmt: skip
+        np.testing.assert_allclose(pairs.distance, expected, atol=1e-6)
+
+
+@pytest.fixture
+def beside_a_plate(planar_arm: Arms) -> wb.Scene:
+    """Return an arm that swings in the plane z = 0, and a thin plate across its way."""
+    return wb.Scene(planar_arm((0.4, 0.3))).add(wb.Box((0.6, 0.01, 0.2)), name="plate", at=(0.5, 0.0, 0.0))
+
+
+def test_a_way_through_a_plate_is_seen_though_both_ends_are_free(beside_a_plate: wb.Scene) -> None:
+    before, after = np.array([0.6, 0.0]), np.array([-0.6, 0.0])
+    motion = np.array([before, after, after])
+    judged = assess_motion(beside_a_plate, motion, 0.1)
+    assert judged.depth.max() == 0.0
+    assert judged.overlapping.max() == 0
+    assert frames_passed_through(beside_a_plate, motion, 1e-3) == (1,)
+    assert deepened(beside_a_plate, motion).tolist() == [np.inf, motion_assessment.DEPTHS[0]]
+    depth, what = depth_between(beside_a_plate, before, after, 1e-3)
+    assert depth > 0.01
+    assert "plate" in what
+    assert depth_between(beside_a_plate, after, after, 1e-3) == (0.0, "")
+
+
+def test_limits_speeds_and_jerk_of_a_known_motion(planar_arm: Arms) -> None:
+    """A joint that moves as a t^3 has the third derivative 6 a; a motion without acceleration has none."""
+    scene, dt = wb.Scene(planar_arm((0.4, 0.3))), 0.01
+    time = dt * np.arange(8)
+    motion = np.column_stack([2.0 * time**3, 0.5 * time])
+    judged = assess_motion(scene, motion, dt)
+    np.testing.assert_allclose(judged.jerk, 12.0 / np.sqrt(2.0), rtol=1e-6)
+    np.testing.assert_allclose(judged.velocity[:, 1], 0.5)
+    assert judged.limit_violation == 0.0
+    limit = float(scene.model.upperPositionLimit[0])
+    assert assess_motion(scene, np.array([[limit + 0.1, 0.0]]), dt).limit_violation == pytest.approx(0.1)
+    assert velocities(scene.model, motion[:1], dt).shape == (0, 2)

@@ -1,0 +1,282 @@
+"""Loops that numba compiles: kept where a folder can be written to, told the first time, and not charged to solves."""
+
+from __future__ import annotations
+
+import gc
+import importlib
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from wholebody.base import compiled
+
+LOOP = """
+from wholebody.base.compiled import compiled
+
+@compiled()
+def twice(x):
+    return 2.0 * x
+
+@compiled()
+def of_another(x):
+    return twice(x) + 1.0
+
+@compiled()
+def of_constants(x):
+    return twice(2) + twice(3) + x
+
+def compiled_kernel():
+    of_constants(1.0)
+"""
+USE = """
+import logging, sys
+logging.basicConfig(level=logging.INFO, format="%(message)s")
+from wholebody import loop_of_a_test
+from wholebody.base.compiled import compile_seconds
+print(loop_of_a_test.twice(1.5), loop_of_a_test.twice(2), compile_seconds() > 0.0, "numba.np.linalg" in sys.modules)
+"""
+
+
+@pytest.fixture
+def run(tmp_path: Path, root: Path):
+    """Return a function that runs a process that uses a loop.
+
+    It takes more code to run and the folder that numba may keep things in; it returns output and messages.
+    """
+    place = tmp_path / "wholebody"
+    place.mkdir()
+    for path in (root / "wholebody").glob("*.py"):
+        (place / path.name).symlink_to(path)
+    (place / "base").symlink_to(root / "wholebody" / "base")
+    (place / "loop_of_a_test.py").write_text(LOOP)
+
+    def use(more: str = "", **variables: str) -> tuple[list[str], list[str]]:
+        environment = {**os.environ, "PYTHONPATH": str(tmp_path), **variables}
+        command = [sys.executable, "-c", USE + more]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.split(), done.stderr.splitlines()
+
+    return use
+
+
+def test_the_first_compilation_is_told_once_and_kept_until_the_loop_changes(run, tmp_path: Path) -> None:
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    assert run(**kept) == (
+        ["3.0", "4.0", "True", "True"],
+        ["compiling the inner loops: up to a minute, once on a machine"],
+    )
+    # Read back without what numba needs to compile; where this fails, look how numba keeps things now (`_loop_type`).
+    others = "print(loop_of_a_test.twice(1j), loop_of_a_test.of_another(2.0))"
+    answers, told = run(others, **kept)
+    assert answers == ["3.0", "4.0", "False", "False", "2j", "5.0"]
+    assert len(told) == 1  # of the others
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(path.read_text().replace("2.0 * x", "30.0 * x"))
+    assert run(**kept)[0][:3] == ["45.0", "60.0", "True"]
+
+
+def test_loops_work_where_nothing_can_be_kept(run, tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    nowhere = str(tmp_path / "file" / "folder")
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
+    answers, told = run(NUMBA_CACHE_DIR=nowhere, HOME=nowhere, XDG_CACHE_HOME=nowhere)
+    assert answers == ["3.0", "4.0", "True", "True"]
+    assert len(told) == 1
+
+
+INNER = """
+from wholebody.base.compiled import compiled
+
+@compiled(inner=True)
+def half(x):
+    return 0.5 * x
+
+@compiled()
+def quarter(x):
+    return 0.5 * half(x)
+"""
+
+
+def test_what_was_kept_and_cannot_be_read_back_is_compiled_anew(run, tmp_path: Path) -> None:
+    kept = {"NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    run(**kept)
+    for ending in ("*.nb[ic]", "*.nbc"):  # with the index, and with it whole
+        files = [*(tmp_path / "kept").rglob(ending)]
+        assert files
+        for file in files:
+            file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+        assert run(**kept)[0][:3] == ["3.0", "4.0", "True"]
+    assert run(**kept)[0][:3] == ["3.0", "4.0", "False"]  # and kept
+
+
+def test_what_compiled_loops_alone_call_is_kept_and_refuses_python(run, tmp_path: Path) -> None:
+    """In the user's cache, which is taken where the package cannot be written to."""
+    (tmp_path / "wholebody" / "__pycache__").write_text("in the way")
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(INNER)
+    (tmp_path / "wholebody" / "loop_of_a_test.py").write_text(
+        LOOP.replace("return 2.0 * x", "return 4.0 * half(x)") + "from wholebody.loop_of_another_test import half\n"
+    )
+    asks = """
+from wholebody.loop_of_another_test import half, quarter
+print(quarter(6.0))
+try:
+    half(6.0)
+except TypeError as error:
+    print(str(error).replace(" ", "_"))
+"""
+    kept = {"NUMBA_CACHE_DIR": "", "HOME": str(tmp_path / "home"), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    refused = "half_is_compiled_for_calls_from_compiled_functions_only"
+    first, _ = run(asks, **kept)
+    assert [first[0], *first[4:]] == ["3.0", "1.5", refused]
+    assert list((tmp_path / "cache").rglob("*.nbi"))
+    again, told = run(asks, **kept)
+    assert again[2] == "False"  # read back, not compiled
+    assert told == []
+    path = tmp_path / "wholebody" / "loop_of_a_test.py"
+    path.write_text(path.read_text() + "\n")  # compiled anew with what was kept of the other
+    assert run(asks, **kept)[0] == first
+
+
+IN_PROCESSES = """
+from wholebody.base import compiled
+
+if __name__ == "__main__":
+    names = ("wholebody.loop_of_a_test", "wholebody.loop_of_another_test")
+    compiled.compile_in_processes(2, [(name,) for name in names])
+    print(compiled.compile_seconds() > 0.0)
+    compiled.compile_in_processes(1, [(name,) for name in names])
+    print(compiled.compile_seconds() > 0.0)
+"""
+
+
+def test_processes_compile_beside_each_other_and_constants_are_numbers(run: object, tmp_path: Path) -> None:
+    """What two processes compiled one reads back, and `twice` of 2 and of 3 is one loop."""
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(LOOP)
+    path = tmp_path / "asks.py"
+    path.write_text(IN_PROCESSES)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["False", "False"]
+    assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2
+
+
+def test_all_loops_are_compiled_by_one_call() -> None:
+    compiled.compile_all()
+    for name in compiled.LOOPS:
+        loops = vars(sys.modules[name].compiled_kernel()).values()
+        assert any(loop.signatures for loop in loops if hasattr(loop, "signatures")), name
+
+
+WORK = """
+import json, sys
+import wholebody as wb
+from wholebody.base import compiled
+
+def signatures():
+    modules = {name: module for name, module in sys.modules.items() if name.startswith("wholebody.")}
+    found = {f"{name}.{key}": value for name, module in modules.items() for key, value in vars(module).items()}
+    return {(name, str(kind)) for name, loop in found.items() for kind in getattr(loop, "signatures", ())}
+
+def steps(problem, count):
+    tracker, q, near = wb.QP().tracker(problem, 0.02), problem.start, set()
+    for _ in range(count):
+        q = tracker.step(q).q
+        near.add(len(problem.scene.contacts(q, 0.02).distance))
+    return near
+
+compiled.compile_all()
+print(compiled.compile_seconds(), "scipy.linalg" in sys.modules)
+before = signatures()
+shelf = wb.read_task("examples/tasks/shelf.toml").problem
+for method in (wb.QP(), wb.Newton(iterations=5, restarts=0)):
+    wb.solve(shelf, method)
+steps(shelf, 20)
+wb.solve(wb.read_task("examples/tasks/robot_arm_among_obstacles.toml").problem)
+figure = wb.load("hand")
+tip = wb.Point("right_index_tip", (0.1, 0.0, 0.1))
+free = wb.Scene(figure)
+steps(wb.Problem(free, goals=[tip]), 2)
+wb.solve(wb.Problem(free, goals=[tip]), wb.CCD(iterations=3, restarts=0))
+figure = wb.load(sys.argv[1])
+near = set()
+for boxes in range(3):
+    scene = wb.Scene(figure)
+    for number in range(boxes):
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name=f"box {number}", at=(0.3, 0.3, 0.06 * number))
+    near |= steps(wb.Problem(scene, goals=[wb.Point("moved", (0.0, 0.4, 0.0), offset=(0.4, 0, 0))]), 60)
+print(json.dumps(sorted(near)))
+for name, kind in sorted(signatures() - before):
+    print(name, kind)
+"""
+
+
+ONE_JOINT = """<robot name="one">
+<link name="base"/>
+<link name="moved"><collision><origin xyz="0.2 0 0"/><geometry><box size="0.3 0.05 0.05"/></geometry></collision></link>
+<joint name="turn" type="revolute"><parent link="base"/><child link="moved"/><axis xyz="0 0 1"/>
+<limit lower="-2" upper="2" velocity="1" effort="1"/></joint>
+</robot>"""
+
+
+def test_solves_and_steps_compile_nothing_beyond_what_one_call_compiles(root: Path, tmp_path: Path) -> None:
+    """Whatever the number of joints, pairs and contacts is: numba takes some arrays of one row for another type.
+
+    And what is kept is read back without scipy: numba's array functions (numba.np.arraymath) load scipy.linalg, a tenth
+    of the time that `wholebody pose` needs.
+    """
+    compiled.compile_all()
+    path = tmp_path / "one.urdf"
+    path.write_text(ONE_JOINT)
+    command = [sys.executable, "-c", WORK, str(path)]
+    done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True)
+    read, first, *rest = done.stdout.splitlines()
+    assert {0, 1, 2} <= set(json.loads(first))  # contacts of a step
+    assert rest == []
+    seconds, loaded = read.split()
+    if float(seconds) == 0.0:  # where no folder can be written to, nothing is kept
+        assert loaded == "False"
+
+
+def test_garbage_is_not_collected_while_numba_compiles_but_afterwards_if_it_was(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from numba.core import event
+
+    class Look(event.Listener):
+        def on_start(self, event: object) -> None:
+            seen.append(gc.isenabled())
+
+        on_end = on_start
+
+    (tmp_path / "loop_of_its_own.py").write_text("def made(x):\n    return x + 1.0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    made = importlib.import_module("loop_of_its_own").made
+    for collects in (True, False):
+        loop, seen = compiled.compiled()(made), list[bool]()
+        (gc.enable if collects else gc.disable)()
+        event.register("numba:run_pass", look := Look())
+        try:
+            loop(1.0)
+            afterwards = gc.isenabled()
+        finally:
+            event.unregister("numba:run_pass", look)
+            gc.enable()
+        assert afterwards == collects
+        assert set(seen) == ({False} if collects else set())  # the second time it is read back
+    sys.modules.pop("loop_of_its_own")
+
+
+def test_what_a_process_leaves_is_compiled_by_this_one(run: object, tmp_path: Path) -> None:
+    """A process ends in the middle, as the system ends one for want of memory; all loops are compiled."""
+    ends = "import os\nif __import__('multiprocessing').parent_process() is not None:\n    os._exit(1)\n"
+    (tmp_path / "wholebody" / "loop_of_another_test.py").write_text(ends + LOOP)
+    path = tmp_path / "asks.py"
+    path.write_text(IN_PROCESSES)
+    environment = {**os.environ, "PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "kept")}
+    done = subprocess.run([sys.executable, str(path)], env=environment, capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
+    assert len(list((tmp_path / "kept").rglob("*.twice-*.nbc"))) == 2

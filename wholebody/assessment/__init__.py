@@ -1,0 +1,1 @@
+"""The judgement of postures and motions; it shares nothing with the methods."""

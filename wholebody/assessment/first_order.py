@@ -1,0 +1,326 @@
+"""First-order optimality of a posture, and its blockers: the limits, constraints and contacts with large multipliers.
+
+At an optimum the objective's gradient is a combination of the gradients of all active constraints, with nonnegative
+multipliers for inequalities (Karush, Kuhn and Tucker). Nonnegative least squares finds the combination. Its residual
+measures the distance from an optimum, and its largest parts are the blockers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.assessment.all_pairs import AllPairs, Label, NearPairs, all_pairs
+from wholebody.base.arrays import Array, Mask
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+from wholebody.problem import Problem
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.checks import values_and_rows
+
+ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
+FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
+MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
+INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
+MOST_CHANGES = 20  # times the number of rows: changes of the passive set, at the most
+WORTH = 0.05  # share of the largest push from which on something counts as being in the way
+
+
+@dataclass(frozen=True)
+class Blocker:
+    """A limit, constraint or contact that blocks a better posture.
+
+    Attributes:
+        kind: "contact" between two owners, "limit" of a joint, "bound" on a joint (as by `Freeze`), or "constraint".
+        names: the two segments or objects; the joint; or the constraint as in "constraints[0], Hold".
+        share: its part of the gradient, relative to the strongest blocker, from 0 to 1.
+        violated: whether it is violated at the posture.
+        frame: name of the frame of a constraint on one frame.
+    """
+
+    kind: Literal["contact", "limit", "bound", "constraint"]
+    names: tuple[str, ...]
+    share: float
+    violated: bool
+    frame: str | None = None
+
+    def __str__(self) -> str:
+        """Describe it in words."""
+        if self.kind == "contact":
+            return f"{self.names[0]} against {self.names[1]}"
+        return {"limit": "the limit of ", "bound": "the bound on ", "constraint": ""}[self.kind] + self.names[0]
+
+
+class _Rows:
+    """Gradients of active constraints, with their labels."""
+
+    def __init__(self, nv: int) -> None:
+        self.rows, self.labels = [np.zeros((0, nv))], list[Label]()
+
+    def add(self, rows: Array, labels: list[Label]) -> None:
+        self.rows.append(rows)
+        self.labels += labels
+
+
+class _Asked(NamedTuple):
+    """What was asked of a posture when it was judged; `names` are those of the constraints."""
+
+    goals: tuple[Goal, ...]
+    constraints: tuple[Constraint, ...]
+    names: tuple[str, ...]
+    bounds: tuple[Bound, ...]
+    measures: tuple[Measure, ...]
+    figure: Figure
+
+
+class FirstOrder:
+    """Optimality and blockers of a judged posture: each is computed when it is first asked for, as things were then.
+
+    Both raise a `TermError` where a term of one's own has no finite derivative at the posture.
+
+    Attributes:
+        fits: whether goals are met and everything holds, so that nothing is in the way.
+    """
+
+    def __init__(self, problem: Problem, pairs: AllPairs, fits: bool) -> None:
+        """Keep what was asked, the posture where `pairs` are, and the pairs that push there."""
+        self.fits = fits
+        scene = problem.scene
+        self._asked = _Asked(
+            problem.goals, problem.constraints, problem.constraint_names, problem.bounds, problem.measures, scene.figure
+        )
+        self._built, self._q = scene.built, pairs.state.q.copy()
+        self._near = pairs.nearer(problem.clearances + ACTIVE)
+        self._clearances = problem.clearances[self._near.number]
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the answers: a copy in another process has nothing to compute them from."""
+        return {"fits": self.fits, "optimality": self.optimality, "blockers": self.blockers}
+
+    @cached_property
+    def optimality(self) -> float:
+        """See `wholebody.assessment.posture.Assessment`."""
+        with self._lent() as state:
+            return _optimality(self._asked, state, _active(self._asked, state, self._near))
+
+    @cached_property
+    def blockers(self) -> tuple[Blocker, ...]:
+        """See `wholebody.assessment.posture.Assessment`."""
+        if self.fits:
+            return ()
+        with self._lent() as state:
+            return _blockers(self._asked, state, self._near, self._clearances)
+
+    @contextmanager
+    def _lent(self) -> Iterator[State]:
+        """A state at the posture."""
+        with all_pairs(self._built).borrow() as pairs:
+            yield pairs.state.update(self._q)
+
+
+def _optimality(asked: _Asked, state: State, active: _Active) -> float:
+    """What is left of the objective's gradient after the best combination of all active gradients."""
+    nv = state.model.nv
+    goals = [(*values_and_rows(goal, goal.error, state), goal) for goal in asked.goals]
+    met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
+    signed, one_sided = active.signed, active.one_sided
+    if met:
+        objective = sum((term.weight * term.gradient(state) for term in asked.measures), np.zeros(nv))
+        curvature = sum((term.weight * term.curvature(state) for term in asked.measures), np.zeros(nv))
+        signed.rows += [jacobian for _, jacobian, _ in goals]
+        for term in (*asked.goals, *asked.constraints):
+            if (planes := term.supporting_planes(state)) is not None:
+                near = (planes.value >= -ACTIVE - planes.slack) & (planes.value <= ACTIVE)
+                one_sided.add(-planes.jacobian[near], [("constraint", ("",))] * int(near.sum()))
+    else:
+        objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))
+        curvature = sum((goal.weight * (jacobian**2).sum(axis=0) for _, jacobian, goal in goals), np.zeros(nv))
+    scale = np.maximum(curvature, FLAT * curvature.max(initial=0.0))
+    if not scale.any():
+        return 0.0
+    _, left = _balanced(objective, signed, one_sided)
+    return float((np.abs(left) / scale).max())
+
+
+def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
+    """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
+
+    If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
+    """
+    nv = state.model.nv
+    signed, one_sided, rows, numbers = _active(asked, state, near)
+    gradient = np.zeros(nv)
+    violated: dict[Label, float] = {}
+    violation = clearances - near.found[:, 0]
+    for row in np.flatnonzero(violation > MET).tolist():
+        violated[near.label(row)] = float(violation[row])
+    for number, constraint in enumerate(asked.constraints):
+        value, jacobian = values_and_rows(constraint, constraint.value, state)
+        missed = np.minimum(value - constraint.lower, 0.0) + np.maximum(value - constraint.upper, 0.0)
+        if np.abs(missed).max(initial=0.0) > MET:
+            violated["constraint", (asked.names[number],)] = float(np.abs(missed).max())
+            gradient += missed @ jacobian
+    if violated:
+        for row, number in zip(rows, numbers, strict=True):
+            gradient -= violated.get(near.label(number), 0.0) * row
+        signed, one_sided = _without(signed, violated), _without(one_sided, violated)
+    else:
+        for goal in asked.goals:
+            error, jacobian = values_and_rows(goal, goal.error, state)
+            gradient += goal.weight * error @ jacobian
+    multipliers, _ = _balanced(gradient, signed, one_sided)
+    found: dict[Label, float] = {}
+    for label, size in zip([*signed.labels, *one_sided.labels], multipliers.tolist(), strict=True):
+        found[label] = found.get(label, 0.0) + size
+    most, deepest = max(found.values(), default=0.0), max(violated.values(), default=0.0)
+    frames: dict[Label, str | None] = {
+        ("constraint", (name,)): getattr(term, "frame", None)
+        for name, term in zip(asked.names, asked.constraints, strict=True)
+    }
+    first = [Blocker(*label, size / deepest, True, frames.get(label)) for label, size in violated.items()]
+    second = [
+        Blocker(*label, size / most, False, frames.get(label)) for label, size in found.items() if size > WORTH * most
+    ]
+    return tuple(part for group in (first, second) for part in sorted(group, key=lambda blocker: -blocker.share))
+
+
+def _without(rows: _Rows, labels: dict[Label, float]) -> _Rows:
+    kept = np.array([label not in labels for label in rows.labels], dtype=bool)
+    left = _Rows(rows.rows[0].shape[1])
+    left.add(np.vstack(rows.rows)[kept], [label for label, keep in zip(rows.labels, kept, strict=True) if keep])
+    return left
+
+
+class _Active(NamedTuple):
+    """Gradients of everything at work.
+
+    Attributes:
+        signed: of what works to both sides.
+        one_sided: of what only pushes one way.
+        gaps: (n, nv) those of contacts among them.
+        contacts: (n,) the pair that each of these is of.
+    """
+
+    signed: _Rows
+    one_sided: _Rows
+    gaps: Array
+    contacts: list[int]
+
+
+def _active(asked: _Asked, state: State, near: NearPairs) -> _Active:
+    nv = state.model.nv
+    signed, one_sided = _Rows(nv), _Rows(nv)
+    gaps, contacts = near.gradients(state)
+    one_sided.add(gaps, [near.label(number) for number in contacts])
+    for number, constraint in enumerate(asked.constraints):
+        value, jacobian = values_and_rows(constraint, constraint.value, state)
+        low, high = value <= constraint.lower + ACTIVE, value >= constraint.upper - ACTIVE
+        label: Label = ("constraint", (asked.names[number],))
+        signed.add(jacobian[low & high], [label] * int((low & high).sum()))
+        one_sided.add(jacobian[low & ~high], [label] * int((low & ~high).sum()))
+        one_sided.add(-jacobian[high & ~low], [label] * int((high & ~low).sum()))
+    lower, upper = asked.figure.tangent_bounds(state.q)
+    limited_low, limited_high = lower >= -ACTIVE, upper <= ACTIVE
+    for bound in asked.bounds:
+        low_bound, high_bound = bound.bounds(state, None)
+        lower, upper = np.maximum(lower, low_bound), np.minimum(upper, high_bound)
+    identity = np.eye(nv)
+    for at_work, sign, limited in ((lower >= -ACTIVE, 1.0, limited_low), (upper <= ACTIVE, -1.0, limited_high)):
+        columns = np.flatnonzero(at_work)
+        one_sided.add(sign * identity[columns], [_of_joint(state.model, int(k), bool(limited[k])) for k in columns])
+    return _Active(signed, one_sided, gaps, contacts)
+
+
+def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
+    joint = next(j for j in range(1, model.njoints) if model.joints[j].idx_v <= column < model.idx_vs[j] + model.nvs[j])
+    return ("limit" if limited else "bound"), (model.names[joint],)
+
+
+def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
+    """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
+    equal, one_way = np.vstack(signed.rows), np.vstack(one_sided.rows)
+    basis = _row_space(equal)
+    room = objective - objective @ basis.T @ basis
+    multipliers, left = nonnegative_least_squares(
+        one_way - one_way @ basis.T @ basis, room, np.linalg.norm(one_way, axis=1)
+    )
+    turned = np.linalg.lstsq(equal.T, objective - multipliers @ one_way, rcond=None)[0] if len(equal) else np.zeros(0)
+    sizes = [np.abs(turned) * np.linalg.norm(equal, axis=1), multipliers * np.linalg.norm(one_way, axis=1)]
+    return np.concatenate([sizes[0][: len(signed.labels)], sizes[1]]), left
+
+
+def _row_space(rows: Array) -> Array:
+    """Orthonormal rows (r, n) that span the same as the rows (m, n)."""
+    if not len(rows):
+        return rows
+    _, values, basis = np.linalg.svd(rows, full_matrices=False)
+    return np.asarray(basis[values > INDEPENDENT * values[0]])
+
+
+def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tuple[Array, Array]:
+    """The nonnegative combination of rows (m, n) that is nearest to a right side (n,), and what it leaves (n,).
+
+    Lawson and Hanson 1974, "Solving least squares problems", chapter 23: the row that agrees most with what is left
+    joins the passive set, and rows whose share would turn negative leave it. scipy's does the same, but loading
+    scipy.optimize takes longer than a whole solve.
+
+    Args:
+        rows: (m, n).
+        right: (n,).
+        lengths: (m,) what is long for each row; one that is shorter than `INDEPENDENT` of it counts as zero.
+
+    Returns:
+        The shares (m,), nonnegative, and right - shares @ rows.
+    """
+    norms = np.linalg.norm(rows, axis=1)
+    counts = norms > INDEPENDENT * lengths
+    scale = np.where(counts, norms, 1.0)
+    units = np.where(counts[:, None], rows / scale[:, None], 0.0)
+    products = units @ units.T
+    share, passive, excluded = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
+    left, enough = right, INDEPENDENT * float(np.linalg.norm(right))
+    for _ in range(MOST_CHANGES * len(rows)):
+        agrees = np.where(passive | excluded, -np.inf, units @ left)
+        new = int(agrees.argmax())
+        if agrees[new] <= enough:
+            break
+        before = share.copy(), passive.copy()
+        passive[new] = True
+        trial = _least_squares_on(units, products, right, passive)
+        if trial is None or trial[new] <= 0.0:  # to rounding it is a combination of the passive rows
+            passive[new], excluded[new] = False, True
+            continue
+        for _ in range(int(passive.sum())):  # each time at least one row leaves
+            if trial is None or not (falling := passive & (trial <= 0.0)).any():
+                break
+            part, way = np.full(len(rows), np.inf), share[falling] - trial[falling]
+            part[falling] = share[falling] / np.where(way > 0.0, way, 1.0)  # 0 for a share that is 0 and stays 0
+            share += part.min() * (trial - share)
+            passive[part <= part.min()] = False
+            share[~passive] = 0.0
+            trial = _least_squares_on(units, products, right, passive)
+        share = share if trial is None else trial
+        rest = right - share @ units
+        if np.linalg.norm(rest) < np.linalg.norm(left):
+            left, excluded = rest, ~counts
+        else:  # rows that nearly depend: what rounding leaves would join and leave in turn for ever
+            share, passive = before
+            excluded[new] = True
+    return share / scale, left
+
+
+def _least_squares_on(units: Array, products: Array, right: Array, passive: Mask) -> Array | None:
+    """Shares (m,) of the passive rows in the combination nearest to a right side, any sign; None: they depend."""
+    share, rows, square = np.zeros(len(units)), units[passive], products[np.ix_(passive, passive)]
+    try:
+        first = np.linalg.solve(square, rows @ right)
+        share[passive] = first + np.linalg.solve(square, rows @ (right - first @ rows))  # refined once
+    except np.linalg.LinAlgError:
+        return None
+    return share

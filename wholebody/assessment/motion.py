@@ -1,0 +1,177 @@
+"""The assessment of a motion, a sequence of postures, computed from the postures alone.
+
+The distances of all pairs are computed at every posture, without culling, as `wholebody.assess` does for one posture.
+The motions between postures are swept. No code of a method is used. Frame loops, drags, streams of hard cases, and the
+steps of compared tools are all judged by this module.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.assessment.all_pairs import AllPairs, all_pairs
+from wholebody.base.arrays import Array
+from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
+from wholebody.geometry.continuous.sweep import Sweep
+from wholebody.scene.scene import Scene
+from wholebody.tasks import ReachCones
+
+Counts = NDArray[np.intp]
+
+OVERLAPS = 1e-5  # m: a pair overlaps if it is deeper than this
+PARTS = 41  # postures of a motion at which its depth is measured
+
+DEPTHS = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2)
+"""Depths, metres, that are tried in turn as a bound on the depth of a motion between two postures."""
+
+
+@dataclass(frozen=True, eq=False)
+class MotionAssessment:
+    """How good a motion is.
+
+    Attributes:
+        depth: (n,) deepest overlap of any pair at each posture, metres; 0 if there is none.
+        overlapping: (n,) number of pairs that overlap by more than 0.01 mm.
+        limit_violation: largest violation of a joint limit at any posture, radians or metres.
+        velocity: (n - 1, nv) from posture to posture, radians and metres a second.
+        jerk: (n - 3,) root of the mean square of the third difference of the joint angles over time, rad/s^3.
+    """
+
+    depth: Array
+    overlapping: Counts
+    limit_violation: float
+    velocity: Array
+    jerk: Array
+
+
+def assess_motion(
+    scene: Scene, q: Array, dt: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
+) -> MotionAssessment:
+    """Assess postures (n, nq), `dt` seconds apart.
+
+    Args:
+        scene: figure and things.
+        q: (n, nq) postures.
+        dt: seconds from one to the next.
+        moves: thing to its n placements, at the postures; all others stay.
+    """
+    depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
+    for frame, pairs in enumerate(pairs_along(scene, q, moves)):
+        depth[frame] = max(0.0, -pairs.least)
+        overlapping[frame] = int((pairs.distance < -OVERLAPS).sum())
+    return MotionAssessment(
+        depth, overlapping, limit_violation(scene.figure, q), velocities(scene.model, q, dt), jerk(scene.model, q, dt)
+    )
+
+
+def pairs_along(scene: Scene, q: Array, moves: Mapping[str, Sequence[pin.SE3]] | None = None) -> Iterator[AllPairs]:
+    """All pairs at each of the postures (n, nq), with the kinematic state; each is valid until the next one.
+
+    `moves` has n placements of each thing that moves; the scene itself stays as it is.
+    """
+    scene = copy.copy(scene) if moves else scene
+    built = scene.built
+    with all_pairs(built).borrow() as pairs:
+        for frame, posture in enumerate(q):
+            for name, places in (moves or {}).items():
+                scene.move(name, at=places[frame])
+            pairs.move(np.asarray(posture, dtype=float))
+            yield pairs
+
+
+def limit_violation(figure: Figure, q: Array) -> float:
+    """Largest violation of a joint limit at any posture (n, nq), radians or metres."""
+    limits = figure.limits
+    values = np.atleast_2d(q)[:, limits.idx_q]
+    return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
+
+
+def cone_violation(scene: Scene, q: Array) -> float:
+    """Largest angle of a limb outside its reach cone at any posture (n, nq), radians."""
+    if not scene.figure.cones:
+        return 0.0
+    cones, state = ReachCones().resolve(scene, q[0]), State(scene.model)
+    return float(np.max([0.0, *(-float(cones.value(state.update(posture)).min()) for posture in q)]))
+
+
+def velocities(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 1, nv) from posture to posture of (n, nq), `dt` seconds apart, radians and metres a second."""
+    return np.array([pin.difference(model, *pair) for pair in pairwise(q)]).reshape(-1, model.nv) / dt
+
+
+def jerk(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 3,) root of the mean square of the third difference of the joint angles, rad/s^3."""
+    joints = slice(6 if model.nq != model.nv else 0, None)
+    return root_mean_square(third_differences(model, q, dt)[:, joints])
+
+
+def third_differences(model: pin.Model, q: Array, dt: float) -> Array:
+    """(n - 3, nv) of postures (n, nq) over time, rad/s^3 and m/s^3."""
+    return np.diff(velocities(model, q, dt), n=2, axis=0) / dt**2 if len(q) > 3 else np.zeros((0, model.nv))
+
+
+def root_mean_square(values: Array) -> Array:
+    """(n,) root mean square of each row of (n, k); 0 where the rows are empty."""
+    return np.asarray(np.sqrt((values**2).sum(axis=1) / max(1, values.shape[1])))
+
+
+def frames_passed_through(
+    scene: Scene, q: Array, depth: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
+) -> tuple[int, ...]:
+    """Indices of postures of (n, nq): some pair gets deeper than `depth` metres between the previous one and it.
+
+    `moves` has n placements of each thing that moves, at the postures; it goes straight from one to the next.
+    """
+    if moves:
+        return tuple(
+            frame
+            for frame, (before, after) in enumerate(pairwise(q), start=1)
+            if scene.sweep(
+                before, after, depth, moves={name: (way[frame - 1], way[frame]) for name, way in moves.items()}
+            )
+            is not None
+        )
+    sweep, ways = Sweep(scene.model, scene.geometry), enumerate(pairwise(q), start=1)
+    return tuple(frame for frame, way in ways if sweep.first_contact(*way, tolerance=depth) is not None)
+
+
+def deepened(scene: Scene, q: Array) -> Array:
+    """(n - 1,) bound on how much deeper any pair gets between two of the postures (n, nq) than at both, metres.
+
+    It is the least of `DEPTHS` that no pair exceeds in a sweep from either end; inf if some pair exceeds all of them.
+    """
+    sweep = Sweep(scene.model, scene.geometry)
+    return np.array([_deepened(sweep, *way) for way in pairwise(q)])
+
+
+def _deepened(sweep: Sweep, before: Array, after: Array) -> float:
+    for depth in DEPTHS:
+        if sweep.first_contact(before, after, tolerance=depth) is None:
+            return depth
+        if sweep.first_contact(after, before, tolerance=depth) is None:
+            return depth
+    return np.inf
+
+
+def depth_between(scene: Scene, before: Array, after: Array, depth: float) -> tuple[float, str]:
+    """Depth of the motion between two postures (nq,), metres, and the names of the pair; things stay in place.
+
+    The sweep tests whether the motion gets deeper than `depth`, however thin the thing; the depth is measured at
+    postures along the motion.
+    """
+    contact = scene.sweep(before, after, depth)
+    if contact is None or not contact.certain:
+        return 0.0, ""
+    deepest = depth
+    for share in np.linspace(0.0, 1.0, PARTS):
+        found = scene.contacts(np.asarray(pin.interpolate(scene.model, before, after, float(share))), within=0.0)
+        deepest = max(deepest, float(-found.distance.min(initial=0.0)))
+    return deepest, " and ".join(scene.piece_owner[piece] for piece in contact.pair)

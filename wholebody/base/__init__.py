@@ -1,0 +1,1 @@
+"""What every room stands on: errors, arrays, checks of arguments, files, compilation, processes."""

@@ -1,0 +1,380 @@
+"""Checks of arguments: each returns the value in the form in which it is used, or raises one sentence with its name.
+
+`what` is the name of the value in the sentence: the argument's name, with the callable in front if that is not obvious.
+"""
+
+from __future__ import annotations
+
+import inspect
+import math
+import os
+import warnings
+from collections.abc import Collection, Iterable
+from difflib import get_close_matches
+from numbers import Number
+from operator import index
+from pathlib import Path
+from reprlib import Repr
+from typing import Any, ClassVar, TypeVar
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import ALIKE, InputError, UnknownNameError
+
+_T = TypeVar("_T")
+
+NUMERIC = "fiu"
+"""Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
+
+FAR = 1e15  # values beyond this get no hint at a wrong unit
+TIME_STEP = (1e-6, 1e6)
+"""Least and greatest time step, seconds: beyond them velocities have no significant digits."""
+TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
+"""The end of a message about a time step that is out of that range."""
+
+LONGEST_LIKELY = 10.0
+"""Seconds of a step beyond which a number of frames a second was probably meant."""
+
+LONGEST = 200
+"""Characters of a name or a title."""
+
+SHOWN_NAMES = 6
+"""Names that a list in a sentence has at most."""
+
+_INSIDE = (str(Path(__file__).parents[1]) + os.sep, "<string>")  # the package's files, and code that dataclasses make
+_SHORT = Repr()
+_SHORT.maxstring = _SHORT.maxother = 60
+
+
+def shown(value: object) -> str:
+    """A value as messages quote it: its representation in one line, shortened, or its type if it has none."""
+    if isinstance(value, np.generic):
+        value = value.item()
+    try:
+        return " ".join(_SHORT.repr(value).split())
+    except Exception:  # a user's __repr__ may raise anything; Python refuses that of an int beyond 4300 digits
+        return f"a {type(value).__name__} that cannot be shown"
+
+
+def a(kind: object) -> str:
+    """The name of a type with its article."""
+    name = getattr(kind, "__name__", str(kind))
+    return f"an {name}" if name[:1].lower() in "aeio" else f"a {name}"
+
+
+def some(names: Iterable[str]) -> str:
+    """The first six names, and how many more there are; "" for none."""
+    listed = list(names)
+    more = f" and {len(listed) - SHOWN_NAMES} more" if len(listed) > SHOWN_NAMES else ""
+    return ", ".join(listed[:SHOWN_NAMES]) + more
+
+
+def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, correction: str) -> _T:
+    """A value of a type, or of one of several.
+
+    Args:
+        value: the argument.
+        kind: the type.
+        what: its name in the message.
+        correction: such as "load one with wb.load('human')".
+
+    Raises:
+        InputError: it is of another type.
+    """
+    if not isinstance(value, kind):
+        wanted = " or ".join(a(one) for one in (kind if isinstance(kind, tuple) else (kind,)))
+        raise InputError(f"{what} is {a(type(value))}, not {wanted}; {correction}")
+    return value
+
+
+def number(value: object, what: str, low: float, high: float, unit: str = "") -> float:
+    """A finite number within a range, both ends included.
+
+    Raises:
+        InputError: it is none.
+    """
+    found = _real(value)
+    if found is None or not low <= found <= high:
+        if math.isinf(high):
+            wanted = f"a finite number of {low:g} or more" if math.isfinite(low) else "a finite number"
+        else:
+            odd = isinstance(value, float) and not math.isfinite(value)
+            wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
+        slip = unit_hint(found, low, high) if unit == "m" and found is not None else ""
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}{slip}")
+    return found
+
+
+def warn(told: str) -> None:
+    """Warn, at the place that called the package."""
+    frame, level = inspect.currentframe(), 1
+    while frame is not None and frame.f_code.co_filename.startswith(_INSIDE):
+        frame, level = frame.f_back, level + 1
+    warnings.warn(told, stacklevel=level)
+
+
+def unit_hint(value: float, low: float, high: float) -> str:
+    """A hint that a length out of a range [m] may be in millimetres or centimetres; empty if it is in neither."""
+    fits = [
+        f"{value * factor:.6g} if it is in {unit}"
+        for factor, unit in ((1e-3, "millimetres"), (1e-2, "centimetres"))
+        if abs(value) < FAR and low <= value * factor <= high  # a large int times a float overflows
+    ]
+    return f"; write {' or '.join(fits)}" if fits else ""
+
+
+def time_step(value: object, what: str) -> float:
+    """Seconds of a step or a frame.
+
+    Raises:
+        InputError: no number within `TIME_STEP`.
+    """
+    found = number(value, what, *TIME_STEP, "s, such as 0.02")
+    if found > LONGEST_LIKELY:
+        told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
+        warn(told)
+    return found
+
+
+def whole(value: object, what: str, low: int, high: int) -> int:
+    """A whole number within a range, both ends included.
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        found = None if isinstance(value, (bool, np.bool_)) else index(value)  # type: ignore[arg-type]
+    except TypeError:
+        found = None
+    if found is None or not low <= found <= high:
+        raise InputError(f"{what} is {shown(value)}; give a whole number between {low} and {high}")
+    return found
+
+
+def flag(value: object, what: str) -> bool:
+    """True or false.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if not isinstance(value, (bool, np.bool_)):
+        raise InputError(f"{what} is {shown(value)}; give True or False")
+    return bool(value)
+
+
+def text(value: object, what: str) -> str:
+    """A line of text: not empty, at most `LONGEST` characters, all of which can be shown.
+
+    Raises:
+        InputError: it is none.
+    """
+    if not isinstance(value, str) or not value.strip() or len(value) > LONGEST or not value.isprintable():
+        raise InputError(f"{what} is {shown(value)}; give a line of text, at most {LONGEST} characters")
+    return value
+
+
+def choice(value: object, options: Collection[str], what: str) -> str:
+    """One of a few words.
+
+    Raises:
+        InputError: it is another value.
+    """
+    if not isinstance(value, str) or value not in options:
+        raise InputError(f"{what} is {shown(value)}; give {' or '.join(map(repr, options))}")
+    return value
+
+
+def known(
+    value: object, names: Collection[str], kind: str, where: str = "", offered: Collection[str] | None = None
+) -> str:
+    """A known name.
+
+    Args:
+        value: the argument.
+        names: all known names.
+        kind: the kind of object, singular: "frame", "posture".
+        where: the place, for the message.
+        offered: the names that the message may suggest, if not all.
+
+    Raises:
+        UnknownNameError: the name is unknown.
+        InputError: it is not a text.
+    """
+    if not isinstance(value, str):
+        raise InputError(f"{f'{where}: ' if where else ''}{shown(value)} is not the name of {a(kind)}; give a text")
+    if value not in names:
+        raise UnknownNameError(kind, value, names if offered is None else offered, where)
+    return value
+
+
+def listed(value: object, what: str, example: str) -> list[Any]:
+    """The entries of a list, a tuple or another iterable that is no text.
+
+    Raises:
+        InputError: it is not iterable.
+    """
+    if isinstance(value, Iterable) and not isinstance(value, (str, bytes)):
+        try:
+            return list(value)
+        except TypeError:  # an array without dimensions
+            pass
+    raise InputError(f"{what} is {shown(value)}, not a list; give one, such as {example}")
+
+
+class FixedAttributes:
+    """Base of objects whose public attributes are decided when they are made.
+
+    Setting one later is an InputError, except those that `_settable` names, which `_checked_value` checks. Methods and
+    private attributes are set as usual.
+    """
+
+    _settable: ClassVar[frozenset[str]] = frozenset()
+    _correction: ClassVar[str] = "make another one"
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        given = name in vars(self)
+        if not name.startswith("_") and (given or isinstance(getattr(type(self), name, None), property)):
+            if name not in self._settable:
+                raise InputError(f"{name} of a {type(self).__name__} cannot be set; {self._correction}")
+            value = self._checked_value(name, value)
+        object.__setattr__(self, name, value)
+
+    def _checked_value(self, name: str, value: Any) -> Any:
+        """The value in the form in which it is kept; an InputError if it does not fit."""
+        return value
+
+
+def settle(record: object, name: str, value: object) -> None:
+    """Keep a value of a record as its check returned it: what counts on with it gets a float, not a fraction."""
+    object.__setattr__(record, name, value)
+
+
+def function(value: _T, what: str) -> _T:
+    """Something that can be called, or None.
+
+    Raises:
+        InputError: it is neither.
+    """
+    if value is not None and not callable(value):
+        raise InputError(f"{what} is {shown(value)}; give a function, or leave it out")
+    return value
+
+
+def path(value: object, what: str) -> Path:
+    """The path of a file.
+
+    Raises:
+        InputError: it is neither text nor a path, or no file system takes it.
+    """
+    given = value.__fspath__() if isinstance(value, os.PathLike) else value
+    if not isinstance(given, str) or not given or "\0" in given:
+        raise InputError(f"{what} is {shown(value)}; give the path of a file")
+    return Path(given)
+
+
+def array(value: object, what: str, wanted: str) -> Array:
+    """Real numbers as an array of any shape; an array of floats is returned without a copy.
+
+    Args:
+        value: the argument.
+        what: its name in the message.
+        wanted: the accepted values, such as "corners, shape (k, 3), metres".
+
+    Raises:
+        InputError: it does not consist of real numbers. Infinite values and NaN are accepted.
+    """
+    if type(value) is np.ndarray and value.dtype == np.float64:
+        return value
+    try:
+        found = np.asarray(value)
+    except (TypeError, ValueError, OverflowError, RecursionError):
+        found = np.empty(0, dtype=object)
+    if found.dtype.kind == "O" and found.size and all(isinstance(one, Number) for one in found.flat):
+        real_ones = [_real(one) for one in found.flat]  # fractions and decimals
+        if None not in real_ones:
+            return np.array(real_ones, dtype=np.float64).reshape(found.shape)
+    if found.dtype.kind not in NUMERIC:
+        raise InputError(f"{what} is {shown(value)}, not numbers; give {wanted}")
+    real: Array = found if found.dtype == np.float64 else found.astype(np.float64)
+    return real
+
+
+def numbers(value: object, shape: tuple[int, ...], what: str) -> Array:
+    """Read-only copy with finite numbers of this shape.
+
+    Raises:
+        InputError: it is none.
+    """
+    plain = "one number" if not shape else f"numbers of shape {shape}"
+    found: Array = array(value, what, plain).copy()
+    if found.shape != shape:
+        raise InputError(f"{what} has shape {shape}, not {found.shape}; give {math.prod(shape)} numbers")
+    if not np.isfinite(found).all():
+        raise InputError(f"{what} is {shown(found.tolist())}; give finite numbers")
+    found.flags.writeable = False
+    return found
+
+
+def posture(value: object, size: int, what: str = "a posture") -> Array:
+    """A posture (size,) of finite numbers; an array of floats is returned without a copy.
+
+    Raises:
+        InputError: it has another shape, or a value that is not finite.
+    """
+    found = array(value, what, f"{size} numbers; start from figure.posture(...)")
+    if found.shape != (size,):
+        raise InputError(f"{what} has shape ({size},), not {found.shape}; start from figure.posture(...)")
+    if np.count_nonzero(np.isfinite(found)) != size:  # called at every step: a third of the time of all()
+        wrong = int(np.flatnonzero(~np.isfinite(found))[0])
+        raise InputError(f"{what} entry {wrong} is not finite; give finite numbers")
+    return found
+
+
+def color(value: object, what: str) -> tuple[float, float, float, float]:
+    """Red, green, blue and alpha, each from 0 to 1; alpha is 1 if it is missing.
+
+    Args:
+        value: three or four such numbers, a name of CSS such as "steelblue", or "#rrggbb" or "#rrggbbaa".
+        what: is painted, for the message.
+
+    Raises:
+        InputError: it is none of these.
+    """
+    wanted = "red, green, blue and, if wanted, alpha, each from 0 to 1, such as (1.0, 0.0, 0.0), a name or '#rrggbb'"
+    if isinstance(value, str):
+        from PIL import ImageColor  # the names of CSS
+
+        try:
+            parts = (*ImageColor.getrgb(value), 255)[:4]
+        except ValueError:
+            near = get_close_matches("".join(value[:LONGEST].lower().split()), ImageColor.colormap, 3, ALIKE)
+            hint = f"; did you mean {', '.join(near)}?" if near else f"; give {wanted}"
+            raise InputError(f"{what} is {shown(value)}{hint}") from None
+        return parts[0] / 255.0, parts[1] / 255.0, parts[2] / 255.0, parts[3] / 255.0
+    found = array(value, what, wanted)
+    if found.shape not in ((3,), (4,)) or not ((found >= 0.0) & (found <= 1.0)).all():
+        bytes_ = found.shape in ((3,), (4,)) and ((found >= 0.0) & (found <= 255.0)).all()
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{'; divide bytes by 255' if bytes_ else ''}")
+    red, green, blue, alpha = (*found.tolist(), 1.0)[:4]
+    return red, green, blue, alpha
+
+
+def _real(value: object) -> float | None:
+    """A finite number as a float; None for anything else, also for booleans, texts, and arrays of one number."""
+    if isinstance(value, (bool, np.bool_, str, bytes, bytearray)) or getattr(value, "shape", ()) != ():
+        return None
+    try:
+        found = float(value)  # type: ignore[arg-type]
+    except (TypeError, ValueError, OverflowError):
+        return None
+    return found if math.isfinite(found) else None
+
+
+def is_number(word: str) -> bool:
+    """Whether a text is a number."""
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,200 @@
+"""Compilation by numba: compiled code is cached, the first compilation is logged, and its time is counted.
+
+``python -m wholebody.base.compiled`` compiles all loops, on as many cores as there are, so that no solve has to.
+"""
+
+from __future__ import annotations
+
+import gc
+import logging
+import os
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from functools import lru_cache
+from importlib import import_module
+from itertools import zip_longest
+from typing import Any, TypeVar
+
+TOGETHER = (
+    (
+        "wholebody.methods.qp.active_set",
+        "wholebody.methods.qp.semismooth_newton",
+        "wholebody.methods.qp.step_program",
+        "wholebody.methods.qp.subproblem",
+    ),
+    ("wholebody.dynamics.loops",),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.unobstructed"),
+    (
+        "wholebody.geometry.contact_rows",
+        "wholebody.geometry.proximity",
+        "wholebody.geometry.continuous.moved_pairs",
+        "wholebody.geometry.continuous.swept_depth",
+        "wholebody.methods.ccd.limbs",
+        "wholebody.methods.newton.linear_algebra.normal_equations",
+        "wholebody.motion.trajectory.band",
+    ),
+    (
+        "wholebody.methods.qp.curved_reach",
+        "wholebody.methods.qp.escaping",
+        "wholebody.methods.qp.turning",
+        "wholebody.methods.qp.solvers.osqp_solver",
+        "wholebody.methods.qp.solvers.split_form",
+    ),
+)
+"""Modules with compiled loops, in groups that call no loops of each other, those first that take longest to compile.
+
+Each module has a function `compiled_kernel`, which compiles or loads its loops.
+"""
+
+LOOPS = tuple(name for names in TOGETHER for name in names)
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_compiling = {"depth": 0, "since": 0.0, "seconds": 0.0, "collects": True}
+
+
+def compiled(*, inner: bool = False, **options: Any) -> Callable[[F], F]:
+    """Let numba compile a function at its first call, and cache the result.
+
+    The cache is beside the file, or in the user's cache folder if that is not writable; NUMBA_CACHE_DIR names another
+    folder. If no folder is writable, every process compiles anew.
+
+    Args:
+        inner: whether only compiled functions call it. It is compiled sooner then, and calling it from Python raises a
+            TypeError.
+        options: what `numba.njit` takes, such as error_model and fastmath.
+    """
+    loop_type = _inner_type() if inner else _loop_type()
+    _watch()
+
+    def decorate(function: F) -> F:
+        target = {
+            "nopython": True,
+            "boundscheck": None,
+            "no_cfunc_wrapper": True,
+            "no_cpython_wrapper": inner,
+            **options,
+        }
+        loop: F = loop_type(function, targetoptions=target)
+        with suppress(RuntimeError):  # numba: cannot cache function, no locator available
+            loop.enable_caching()  # type: ignore[attr-defined]
+        return loop
+
+    return decorate
+
+
+def compile_all(names: Sequence[str] = LOOPS) -> None:
+    """Compile all loops of these modules, or load them from the cache."""
+    for name in names:
+        import_module(name).compiled_kernel()
+
+
+def compile_in_processes(processes: int, groups: Sequence[Sequence[str]] = TOGETHER) -> None:
+    """Compile groups of modules in processes beside each other, as far as they are not in the cache.
+
+    A process that ends early, for want of memory say, leaves its loops to this one.
+    """
+    if processes > 1:
+        from concurrent.futures import ProcessPoolExecutor
+        from concurrent.futures.process import BrokenProcessPool
+        from multiprocessing import get_context
+
+        logging.getLogger(__name__).info("compiling the inner loops in %d processes, unless they are kept", processes)
+        with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+            tasks = []
+            with suppress(BrokenProcessPool):
+                tasks += [pool.submit(compile_all, names) for names in groups]
+        groups = [names for names, task in zip_longest(groups, tasks) if task is None or task.exception() is not None]
+    for names in groups:
+        compile_all(names)
+
+
+def compile_seconds() -> float:
+    """Processor time of all compilation so far, seconds; time limits of solves do not count it."""
+    return _compiling["seconds"]
+
+
+@lru_cache(maxsize=1)
+def _loop_type() -> Any:
+    """A compiled function of numba, read back from what is kept without all that compiling needs.
+
+    numba loads its tables of types and functions first, which takes 0.4 of 0.5 s. What compiles loads them by itself.
+
+    numba would compile a function anew for every constant that a caller gives, 22 times one that finds a table by its
+    number. Here a constant is a value as any: where that is faster, LLVM puts the function into its caller anyway.
+    """
+    from numba.core.caching import FunctionCache
+    from numba.core.registry import CPUDispatcher
+    from numba.core.runtime import rtsys
+    from numba.core.types.misc import unliteral
+
+    class Kept(FunctionCache):  # type: ignore[misc]
+        def load_overload(self, sig: Any, target_context: Any) -> Any:
+            rtsys.initialize(target_context)
+            try:
+                return self._load_overload(sig, target_context)
+            except Exception as error:  # cut short or unreadable, pickle raises anything: as if nothing were kept
+                logging.getLogger(__name__).info("%s: what was kept of it cannot be read (%s)", self._name, error)
+                with suppress(OSError):
+                    self.flush()
+                return None
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with suppress(Exception):  # a folder that is full or read-only: the next process compiles anew
+                self._save_overload(sig, data)
+
+    class Loop(CPUDispatcher):  # type: ignore[misc]
+        def enable_caching(self) -> None:
+            self._cache = Kept(self.py_func)
+
+        def get_call_template(self, args: Any, kws: Any) -> Any:
+            args = tuple(unliteral(kind) for kind in args)
+            return super().get_call_template(args, {name: unliteral(kind) for name, kind in kws.items()})
+
+    return Loop
+
+
+@lru_cache(maxsize=1)
+def _inner_type() -> Any:
+    """A compiled function that Python cannot call: what numba would compile to unpack its arguments is left out."""
+
+    class Inner(_loop_type()):  # type: ignore[misc]
+        def __call__(self, *args: Any, **named: Any) -> Any:
+            raise TypeError(f"{self.py_func.__name__} is compiled for calls from compiled functions only")
+
+    return Inner
+
+
+@lru_cache(maxsize=1)
+def _watch() -> None:
+    """Log the first compilation, count the time of all, and let none be stopped by the garbage collector."""
+    from numba.core import event
+
+    class Listener(event.Listener):  # type: ignore[misc]
+        told = False
+
+        def on_start(self, event: Any) -> None:
+            if _compiling["depth"] == 0:
+                _compiling["since"] = time.thread_time()
+                _compiling["collects"] = gc.isenabled()
+                gc.disable()  # numba makes millions of objects that stay: to look through them is an eighth of the time
+            _compiling["depth"] += 1
+            if not self.told and event.data["dispatcher"].__module__.startswith("wholebody."):
+                self.told = True
+                logging.getLogger(__name__).info("compiling the inner loops: up to a minute, once on a machine")
+
+        def on_end(self, event: Any) -> None:
+            _compiling["depth"] -= 1
+            if _compiling["depth"] == 0:
+                _compiling["seconds"] += time.thread_time() - _compiling["since"]
+                if _compiling["collects"]:
+                    gc.enable()
+
+    event.register("numba:compile", Listener())
+
+
+if __name__ == "__main__":
+    logging.basicConfig(level=logging.INFO, format="%(message)s")
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    compile_in_processes(min(cores, len(TOGETHER)))

@@ -1,0 +1,340 @@
+"""Files: read with bounds, written whole or not at all, and scratch folders that are removed after a crash.
+
+All code that reads users' files uses this module, so that devices, pipes, folders, huge files and wrong encodings give
+one sentence each. All code that writes files uses it too.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import time
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager, suppress
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from wholebody.base import checks
+from wholebody.base.errors import FileFormatError, InputError, one_line
+
+LARGEST_TEXT = 10_000_000
+"""Bytes of a file that people write by hand, such as a task."""
+
+LARGEST = 1_000_000_000
+"""Bytes of any other file, such as a mesh or a recorded track."""
+
+LONGEST_NAME = 200
+"""Largest number of characters of a path in a message."""
+
+DEEPEST_KEY = 20
+"""Largest number of parts of a dotted key of TOML."""
+
+LONGEST_QUOTE = 300
+"""Largest number of characters of a message of the TOML reader that our message quotes."""
+
+_DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST_KEY}}}""")
+_LONG_NUMBER = re.compile(r"[\d_]{4000}")
+
+PREFIX = "wholebody-scratch-"
+"""Beginning of the names of our scratch folders."""
+
+LOCK = "in-use"
+"""A file in each scratch folder that its process keeps locked; the system releases the lock when the process ends."""
+
+UNLOCKED = 60.0
+"""Seconds for which a scratch folder may be without its lock file; making the file takes far less."""
+
+
+def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST) -> bytes:
+    """Read a regular file.
+
+    Args:
+        path: the file.
+        kind: its name in messages: "task file", "mesh".
+        largest: largest size, bytes.
+
+    Raises:
+        FileFormatError: there is no such file, it is no regular file (a folder, a device, a pipe), it is too large, or
+            it cannot be read.
+    """
+    with _opened(path, kind, largest) as descriptor, open(descriptor, "rb", closefd=False) as file:
+        try:
+            data = file.read(largest + 1)
+        except OSError as error:
+            raise FileFormatError(f"{kind} {_named(path)}: cannot be read ({error.strerror})") from None
+    if len(data) > largest:  # a file whose size is reported as 0, such as those of /proc
+        raise _too_large(path, kind, largest)
+    return data
+
+
+def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
+    """Read a text file in UTF-8, with or without a byte order mark.
+
+    Line ends are kept as they are.
+
+    Raises:
+        FileFormatError: as for `read_bytes`, or the text is not in UTF-8.
+    """
+    data = read_bytes(path, kind, largest)
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = data.count(b"\n", 0, error.start) + 1
+        raise FileFormatError(f"{kind} {_named(path)}, line {line}: is no UTF-8 text; save it in UTF-8") from None
+
+
+def parsed_toml(text: str, name: str) -> dict[str, Any]:
+    """What a text in TOML says.
+
+    Args:
+        text: of the file.
+        name: of the file, for messages.
+
+    Raises:
+        FileFormatError: it is not TOML, or has keys, tables or numbers that a reader of TOML does not bear.
+    """
+    if sys.version_info >= (3, 11):
+        import tomllib
+    else:
+        import tomli as tomllib
+    name = one_line(name)
+    if _DEEP_KEY.search(text):  # the reader's memory grows with the square of a key's parts
+        raise FileFormatError(f"{name}: a key has more than {DEEPEST_KEY} parts; two are the most that is needed")
+    try:
+        data: dict[str, Any] = tomllib.loads(text)
+        return data
+    except tomllib.TOMLDecodeError as error:
+        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST_QUOTE)}") from None
+    except RecursionError:
+        raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; three are enough") from None
+    except ValueError:  # Python reads no whole number of more than 4300 digits
+        line = next((n for n, said in enumerate(text.splitlines(), 1) if _LONG_NUMBER.search(said)), 1)
+        raise FileFormatError(f"{name}:{line}: a number has thousands of digits; write fewer") from None
+
+
+def check_file(path: str | PathLike[str], kind: str) -> None:
+    """Check a path before a library reads it: raises like `read_bytes`, without reading."""
+    with _opened(path, kind, LARGEST):
+        pass
+
+
+def is_file(path: str | PathLike[str]) -> bool:
+    """Whether there is a regular file; false, and no error, for a path that no file system accepts."""
+    try:
+        return stat.S_ISREG(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+def is_folder(path: str | PathLike[str]) -> bool:
+    """Whether there is a folder; false, and no error, for a path that no file system accepts."""
+    try:
+        return stat.S_ISDIR(os.stat(path).st_mode)
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def _opened(path: str | PathLike[str], kind: str, largest: int) -> Iterator[int]:
+    try:
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)  # a pipe would wait for its writer
+    except FileNotFoundError:
+        raise FileFormatError(f"{kind} {_named(path)}: there is no such file{_looked_in(path)}") from None
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "no file system takes the name"
+        raise FileFormatError(f"{kind} {_named(path)}: cannot be opened ({why}); give another file") from None
+    try:
+        found = os.fstat(descriptor)
+        if not stat.S_ISREG(found.st_mode):
+            what = "a folder" if stat.S_ISDIR(found.st_mode) else "a device or a pipe"
+            raise FileFormatError(f"{kind} {_named(path)}: is {what}; give a file")
+        if found.st_size > largest:
+            raise _too_large(path, kind, largest)
+        yield descriptor
+    finally:
+        os.close(descriptor)
+
+
+def _looked_in(path: str | PathLike[str]) -> str:
+    """The folder in which a relative path was looked for, for a message."""
+    with suppress(OSError):  # the folder itself may be gone
+        return "" if os.path.isabs(path) else f" in {_named(Path.cwd())}"
+    return ""
+
+
+def _too_large(path: str | PathLike[str], kind: str, largest: int) -> FileFormatError:
+    return FileFormatError(f"{kind} {_named(path)}: is larger than {largest / 1e6:g} MB; give a smaller one")
+
+
+def _named(path: str | PathLike[str]) -> str:
+    """A path as messages quote it: in one line; of a long path its end."""
+    text = str(path)
+    return one_line(text if len(text) <= LONGEST_NAME else f"...{text[-LONGEST_NAME:]}", 2 * LONGEST_NAME)
+
+
+# ---- writing
+
+
+def write(path: str | PathLike[str], content: str | bytes) -> Path:
+    """Write a file whole or not at all; text as UTF-8.
+
+    A process that is killed during the call may leave a temporary file; the next process that writes to the folder
+    removes it.
+
+    Returns:
+        The path.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    target = Path(path)
+    data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
+    try:
+        _remove_left_behind(target.parent)
+        descriptor, name = tempfile.mkstemp(prefix=f".{PREFIX}", suffix=".part", dir=target.parent)
+    except (OSError, ValueError) as error:
+        raise _unwritable(path, error) from None
+    try:
+        with open(descriptor, "wb") as file:
+            with suppress(OSError):  # a network file system may have no locks
+                fcntl.flock(file, fcntl.LOCK_EX)  # held until the file has its own name
+            file.write(data)
+            file.flush()
+            mask = os.umask(0)
+            os.umask(mask)
+            os.fchmod(file.fileno(), 0o666 & ~mask)
+            os.replace(name, target)
+    except BaseException as error:
+        with suppress(OSError):
+            os.unlink(name)
+        if isinstance(error, (OSError, ValueError)):
+            raise _unwritable(path, error) from None
+        raise
+    return target
+
+
+def check_writable(path: Path) -> Path:
+    """The path of a file whose folder is writable; call it before long work.
+
+    Raises:
+        InputError: the folder is missing or not writable.
+    """
+    if not is_folder(path.parent):
+        raise _unwritable(path, FileNotFoundError())
+    if not os.access(path.parent, os.W_OK | os.X_OK):
+        raise InputError(f"{_named(path)} cannot be written: its folder may not be written to; give another place")
+    return path
+
+
+def checked_target(path: object, what: str, content: str, endings: Collection[str]) -> Path:
+    """The path of a file to write, checked before long work: its ending as by `checked_ending`, and its folder.
+
+    Raises:
+        InputError: no path, another ending, or its folder is missing or not writable.
+    """
+    return check_writable(checked_ending(path, what, content, endings))
+
+
+def checked_ending(path: object, what: str, content: str, endings: Collection[str]) -> Path:
+    """The path of a file to write in the format that the ending of its name says.
+
+    Args:
+        path: the argument.
+        what: its name in the message about what is no path.
+        content: what the file has, in messages: "a scene".
+        endings: of names, in lower case, each with its dot: the formats in which it can be written.
+
+    Raises:
+        InputError: no path, or the ending of its name is no such format.
+    """
+    place = checks.path(path, what)
+    if place.suffix.lower() not in endings:
+        given = one_line(place.suffix) or "a file without ending"
+        raise InputError(
+            f"{_named(place.name)}: {content} cannot be written as {given}; give the name the ending "
+            f"{' or '.join(sorted(endings))}"
+        )
+    return place
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder and those above it, if they do not exist.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        why = error.strerror if isinstance(error, OSError) else "no file system takes the name"
+        raise InputError(f"the folder {_named(path)} cannot be made ({why}); give another place") from None
+
+
+def _unwritable(path: str | PathLike[str], error: Exception) -> InputError:
+    if isinstance(error, FileNotFoundError):
+        return InputError(f"{_named(path)} cannot be written: there is no such folder; make the folder first")
+    why = error.strerror if isinstance(error, OSError) else "no file system takes the name"
+    return InputError(f"{_named(path)} cannot be written ({why}); give another place")
+
+
+def _remove_left_behind(folder: Path) -> None:
+    """Remove our temporary files in a folder whose processes have ended."""
+    for left in folder.glob(f".{PREFIX}*.part"):
+        with suppress(OSError), left.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if time.time() - os.fstat(file.fileno()).st_mtime > UNLOCKED:
+                left.unlink()
+
+
+# ---- scratch
+
+
+class Scratch:
+    """A folder for temporary files. `close` removes it; after a crash, the next `Scratch` of any process does.
+
+    Attributes:
+        path: the folder.
+    """
+
+    def __init__(self) -> None:
+        """Make the folder, and remove those of processes that have ended."""
+        _remove_abandoned()
+        self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+        unseen = self.path / f"{LOCK}.new"  # others take a lock that they see and that is free as left by the dead
+        self._lock = unseen.open("wb")
+        fcntl.flock(self._lock, fcntl.LOCK_EX)
+        unseen.rename(self.path / LOCK)
+
+    def close(self) -> None:
+        """Remove the folder. Calling it again does nothing."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        self._lock.close()
+
+    def __enter__(self) -> Path:
+        """Return the folder."""
+        return self.path
+
+    def __exit__(self, *_: object) -> None:
+        """Remove it."""
+        self.close()
+
+
+def _remove_abandoned() -> None:
+    """Remove our scratch folders whose lock is free: their processes ended without removing them."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
+        with suppress(OSError):
+            if folder.is_symlink() or folder.stat().st_uid != os.getuid():
+                continue
+            try:
+                with (folder / LOCK).open("rb") as lock:
+                    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                    shutil.rmtree(folder, ignore_errors=True)
+            except FileNotFoundError:
+                if time.time() - folder.stat().st_mtime > UNLOCKED:
+                    shutil.rmtree(folder, ignore_errors=True)

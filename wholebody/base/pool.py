@@ -1,0 +1,58 @@
+"""A pool of objects of which each run borrows one, and a guard against calls from a second thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from threading import Lock
+from typing import Generic, TypeVar
+
+from wholebody.base.errors import InputError
+
+T = TypeVar("T")
+
+
+class Pool(Generic[T]):
+    """A thread-safe free list; no two threads hold the same object at a time."""
+
+    def __init__(self, make: Callable[[], T], at_most: int | None = None) -> None:
+        """Make an empty pool.
+
+        Args:
+            make: makes an object if none is free.
+            at_most: as many free objects are kept; None keeps all.
+        """
+        self._make, self._at_most = make, at_most
+        self._free: list[T] = []
+
+    @contextmanager
+    def borrow(self) -> Iterator[T]:
+        """Borrow an object while the context lasts. After an exception in the context, the object is discarded."""
+        try:
+            item = self._free.pop()  # this and append are atomic
+        except IndexError:
+            item = self._make()
+        yield item
+        if self._at_most is None or len(self._free) < self._at_most:
+            self._free.append(item)
+
+
+class OneAtATime:
+    """Guard of an object that serves one call at a time: it refuses a call while another one runs."""
+
+    def __init__(self, what: str) -> None:
+        """Name the object for the error message, such as "tracker"."""
+        self._what, self._lock = what, Lock()
+
+    def __enter__(self) -> None:
+        """Enter a call.
+
+        Raises:
+            InputError: another call runs.
+        """
+        if not self._lock.acquire(blocking=False):
+            raise InputError(f"this {self._what} is within another call; make one {self._what} for each thread")
+
+    def __exit__(self, *_: object) -> None:
+        """Leave the call."""
+        self._lock.release()

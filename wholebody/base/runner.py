@@ -1,0 +1,374 @@
+"""Jobs in child processes: a job that crashes, hangs or fills the memory ends only its own process.
+
+A job is a function with arguments and a deadline. An alarm of the system, which compiled code cannot block, ends the
+process at the deadline. The job may move its deadline (`allow`) and send notes before its answer (`tell`). A process
+serves one job after the other and is replaced after it ended. It ends by itself when its parent has ended.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import pickle
+import resource
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from multiprocessing.connection import Connection, wait
+from multiprocessing.process import BaseProcess
+from os import _exit
+from pathlib import Path
+from typing import IO, Any, NamedTuple
+
+from wholebody.base.errors import WholebodyError
+
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"), "1")
+"""Environment of a process whose libraries compute on one core."""
+
+FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
+BY_THE_CLOCK = 10.0  # a deadline by the clock in units of that of the processor: others use the machine too
+ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
+LONGEST_LINE = 200  # most characters kept of the last line that a process wrote
+
+_START = (
+    "import sys; sys.path[:] = [{root!r}, *filter(None, {path!r})]; from wholebody.base.runner import serve; "
+    "sys.path[:] = {path!r} + [{root!r}]; serve({descriptor}, {parent})"
+)
+"""The code of a new interpreter: it imports our package first, and then searches where its parent does."""
+
+_parent: Connection | None = None  # in a process that serves jobs: the connection to the parent
+
+
+class EndedError(WholebodyError):
+    """The process of a job has ended before its answer.
+
+    Attributes:
+        overtime: whether the deadline ended it.
+        code: its exit code; the negative number of the signal that ended it.
+        said: the last line that it wrote; "" if it wrote none, or was forked.
+    """
+
+    def __init__(self, code: int, said: str = "") -> None:
+        """Build the message from the exit code and the last line."""
+        self.overtime, self.code, self.said = -code in (signal.SIGALRM, signal.SIGPROF), code, said
+        message = "it took too long" if self.overtime else f"the process ended with {self.how}"
+        super().__init__(message + (f": {said}" if said and not self.overtime else ""))
+
+    @property
+    def how(self) -> str:
+        """The exit code or the signal, in words."""
+        return signal.Signals(-self.code).name if self.code < 0 else f"exit code {self.code}"
+
+
+class Job(NamedTuple):
+    """A job for a child process.
+
+    Attributes:
+        name: any value by which the caller identifies the job; it is not sent to the process.
+        function: called in the process.
+        arguments: of the function.
+        seconds: time to the deadline, unless the job moves it; 0 for none.
+    """
+
+    name: Any
+    function: Callable[..., Any]
+    arguments: tuple[Any, ...]
+    seconds: float
+
+
+class Outcome(NamedTuple):
+    """The outcome of a job.
+
+    Attributes:
+        job: the job.
+        notes: the notes that it sent before its answer.
+        answer: the return value of the function; None if the process ended.
+        error: how the process ended; None if there is an answer.
+    """
+
+    job: Job
+    notes: tuple[Any, ...]
+    answer: Any
+    error: EndedError | None
+
+
+class Started(NamedTuple):
+    """A process that reads jobs.
+
+    Attributes:
+        process: it.
+        connection: over which it gets jobs and answers.
+        output: what it writes.
+    """
+
+    process: subprocess.Popen[bytes] | BaseProcess
+    connection: Connection
+    output: IO[bytes]
+
+
+class Child:
+    """A child process that does one job at a time; a new one replaces it when it has ended."""
+
+    def __init__(self, environment: Mapping[str, str] | None = None, forked: bool = False) -> None:
+        """Prepare; the first job starts the process.
+
+        Args:
+            environment: variables of the process that differ from those of this process.
+            forked: whether each job has a process of its own, forked from this one. Such a process has everything that
+                was imported and compiled here, and neither functions nor arguments have to be importable.
+        """
+        self._environment, self._forked = dict(environment or {}), forked
+        self._process: subprocess.Popen[bytes] | BaseProcess | None = None
+        self._output: IO[bytes] | None = None
+        self._connection: Connection | None = None
+        self._job: Job | None = None
+        self._notes: list[Any] = []
+
+    @property
+    def process(self) -> int | None:
+        """Id of the process; None if none runs."""
+        return None if self._process is None else self._process.pid
+
+    @property
+    def connection(self) -> Connection:
+        """The connection that becomes readable when a job sent something; see `multiprocessing.connection.wait`."""
+        assert self._connection is not None
+        return self._connection
+
+    def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
+        """Do a job, and wait for its answer.
+
+        Raises:
+            EndedError: the process ended during the job; the next call starts another process.
+        """
+        self.begin(Job(None, function, arguments, seconds))
+        while (outcome := self.listen()) is None:
+            pass
+        if outcome.error is not None:
+            raise outcome.error
+        return outcome.answer
+
+    def begin(self, job: Job) -> None:
+        """Send a job; `listen` returns its outcome."""
+        self._job, self._notes = job, []
+        if self._forked:
+            self._fork(job)
+            return
+        if self._process is None:
+            self._process, self._connection, self._output = start_process(os.environ | self._environment)
+        try:
+            self.connection.send((job.seconds, packed((job.function, job.arguments))))
+        except (BrokenPipeError, ConnectionResetError):
+            return  # the process ended after its last job: `listen` reports it
+
+    def listen(self) -> Outcome | None:
+        """Wait for the next message of a job: its outcome, or None after a note."""
+        assert self._job is not None
+        try:
+            last, value = self.connection.recv()
+        except (EOFError, ConnectionResetError):
+            return Outcome(self._job, tuple(self._notes), None, self._ended())
+        if not last:
+            self._notes.append(value)
+            return None
+        if self._forked:
+            self.close()
+        return Outcome(self._job, tuple(self._notes), value, None)
+
+    def close_if_full(self) -> None:
+        """End an idle process that holds more memory than `FULL`; the next job starts another."""
+        if self._process is not None and _memory(self._process.pid) > FULL:
+            self.close()
+
+    def close(self) -> None:
+        """Kill the process."""
+        if self._process is not None:
+            self._process.kill()
+            _wait_for(self._process)
+        for stream in (self._connection, self._output):
+            if stream is not None:
+                stream.close()
+        self._process = self._output = self._connection = None
+
+    def _fork(self, job: Job) -> None:
+        """Fork a process for the job."""
+        context = multiprocessing.get_context("fork")
+        self._connection, theirs = context.Pipe()
+        self._process = context.Process(target=_serve_one, args=(theirs, job, self._environment), daemon=True)
+        self._process.start()
+        theirs.close()
+
+    def _ended(self) -> EndedError:
+        assert self._process is not None
+        code, said = _wait_for(self._process), ""
+        if self._output is not None:
+            self._output.seek(0)
+            lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
+            said = lines[-1].strip()[:LONGEST_LINE] if lines else ""
+        self.close()
+        return EndedError(code, said)
+
+
+def start_process(environment: Mapping[str, str]) -> Started:
+    """Start an interpreter that reads jobs, with these variables and no others."""
+    import wholebody
+
+    ours, theirs = socket.socketpair()
+    root, path = str(Path(wholebody.__file__).parents[1]), [str(folder) for folder in sys.path]
+    output = tempfile.TemporaryFile()  # noqa: SIM115 (closed with the process)
+    with theirs:
+        process = subprocess.Popen(
+            [sys.executable, "-c", _START.format(root=root, path=path, descriptor=theirs.fileno(), parent=os.getpid())],
+            stdin=subprocess.DEVNULL,
+            stdout=output,
+            stderr=output,
+            pass_fds=[theirs.fileno()],
+            env=environment,
+        )
+    return Started(process, Connection(ours.detach()), output)
+
+
+def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
+    """Run jobs in parallel, and yield their outcomes as they end; the children are closed at the end.
+
+    Args:
+        next_job: called for a job whenever a process is free; returns None if there is none (now, or any more).
+        children: the processes, each of which does one job at a time.
+    """
+    free, busy = list(children), list[Child]()
+    try:
+        while True:
+            while free and (job := next_job()) is not None:
+                busy.append(free.pop())
+                busy[-1].begin(job)
+            if not busy:
+                return
+            ready = wait([child.connection for child in busy])
+            for child in [child for child in busy if child.connection in ready]:
+                outcome = child.listen()
+                if outcome is not None:
+                    busy.remove(child)
+                    free.append(child)
+                    yield outcome
+    finally:
+        for child in children:
+            child.close()
+
+
+def allow(seconds: float, processor: float = 0.0) -> None:
+    """Move the deadline of the running job to so many seconds from now; does nothing outside a job.
+
+    Args:
+        seconds: by the clock; 0 for no deadline.
+        processor: of the processor's time, which passes slowly where others use it too; 0 for no such deadline.
+    """
+    if _parent is not None:
+        signal.setitimer(signal.ITIMER_REAL, seconds)
+        signal.setitimer(signal.ITIMER_PROF, processor)
+
+
+def allow_processor(seconds: float) -> None:
+    """Move the deadline of the running job to so many seconds of the processor's time from now.
+
+    Others' work on the machine does not shorten that. By the clock it is `BY_THE_CLOCK` times as far, for a job that
+    waits for ever.
+    """
+    allow(BY_THE_CLOCK * seconds, seconds)
+
+
+def processor_time() -> float:
+    """Processor's time of all threads of this process, seconds from an arbitrary zero.
+
+    `time.process_time` goes by ticks of 4 ms while a deadline of the processor's time runs; this does not.
+    """
+    usage = resource.getrusage(resource.RUSAGE_SELF)
+    return usage.ru_utime + usage.ru_stime
+
+
+def tell(note: Any) -> None:
+    """Send a note from the running job to its parent; does nothing outside a job."""
+    if _parent is not None:
+        _parent.send((False, note))
+
+
+def end_with(parent: int) -> None:
+    """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
+
+    Args:
+        parent: process id; whoever began this process says it, for an orphan's parent is another process.
+    """
+    threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
+
+
+def _end_after(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(ORPHANED)
+    _exit(1)
+
+
+def serve(descriptor: int, parent: int) -> None:
+    """Do jobs until the parent, a process id, has ended; the main loop of a process of `Child`.
+
+    Ctrl-C reaches all processes of a terminal; the parent decides what it ends.
+    """
+    global _parent
+    _parent = Connection(descriptor)
+    _end_at_alarms()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    end_with(parent)
+    try:
+        while True:
+            seconds, sent = _parent.recv()
+            allow(seconds)
+            function, arguments = pickle.loads(sent)
+            answer = function(*arguments)
+            allow(0.0)
+            _parent.send((True, answer))
+    except (EOFError, BrokenPipeError, ConnectionResetError):
+        return
+
+
+def _serve_one(parent: Connection, job: Job, environment: Mapping[str, str]) -> None:
+    """Do one job in a forked process."""
+    global _parent
+    _parent = parent
+    os.environ.update(environment)
+    _end_at_alarms()
+    allow(job.seconds)
+    parent.send((True, job.function(*job.arguments)))
+    _exit(0)  # the process must not close resources of the parent
+
+
+def _end_at_alarms() -> None:
+    for alarm in (signal.SIGALRM, signal.SIGPROF):
+        signal.signal(alarm, signal.SIG_DFL)
+
+
+def _wait_for(process: subprocess.Popen[bytes] | BaseProcess) -> int:
+    """Wait until a process has ended; return its exit code."""
+    if isinstance(process, subprocess.Popen):
+        return process.wait()
+    process.join()
+    return process.exitcode or 0
+
+
+def _memory(process: int | None) -> float:
+    """Return the bytes of memory that a process holds; 0 if the system does not report it."""
+    try:
+        pages = int(Path(f"/proc/{process}/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return float(pages * os.sysconf("SC_PAGE_SIZE"))
+
+
+def packed(value: Any) -> bytes:
+    """Pickle by cloudpickle, which includes code that is not importable."""
+    import cloudpickle
+
+    made: bytes = cloudpickle.dumps(value)
+    return made

@@ -1,0 +1,281 @@
+"""The geometry model of a scene: pieces of a figure, of carried things and of things around, and their pairs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from threading import Lock
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Indices
+from wholebody.base.pool import Pool
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.continuous.moved_pairs import compiled_kernel
+from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.scene.matter.materials import DEFAULT, Material
+
+if TYPE_CHECKING:
+    from wholebody.figures.figure import Figure
+    from wholebody.geometry.shapes import Shape
+    from wholebody.scene.matter.body import Body
+
+T = TypeVar("T")
+
+RESTING = 1e-3  # m: a carried thing nearer than this to a segment in the first posture rests on it
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How a thing came to where it is.
+
+    Attributes:
+        start: where it was before, in the world, or in the segment's frame for a carried thing.
+        seconds: how long it took.
+    """
+
+    start: pin.SE3
+    seconds: float
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One thing in a scene.
+
+    Attributes:
+        name: its name, unique among the objects and segments of the scene.
+        shape: its shape.
+        placement: in the world, or in the segment's frame for a carried thing.
+        segment: the segment that carries it; None for a thing in the world.
+        color: red, green, blue, alpha from 0 to 1, or None for the viewer's choice.
+        rests_on: segments and carried things that a carried thing is not tested against.
+        motion: how it came to its placement; None if it was put there.
+        body: mass and velocity of a thing that `wholebody.dynamics` moves; None for one that it does not.
+        material: what it is made of; a body's own.
+    """
+
+    name: str
+    shape: Shape
+    placement: pin.SE3
+    segment: str | None = None
+    color: tuple[float, float, float, float] | None = None
+    rests_on: tuple[str, ...] = ()
+    motion: Motion | None = None
+    body: Body | None = None
+    material: Material = DEFAULT
+
+
+class SceneGeometry:
+    """The geometry model of the list of objects, with the indices into it.
+
+    Only the placements of the pieces of things change, by `place`. Any number of runs may share it; the data that a run
+    changes come from `pool`.
+
+    Attributes:
+        model: Pinocchio's model of the figure.
+        geometry: the geometry model of all pieces and pairs.
+        table: pieces and pairs as arrays.
+        rows: builds contact rows.
+        owners: name of the segment or object that each piece is part of.
+        pieces_of: object to its pieces: index, and placement in the object.
+        number_of: object to a number from 1 on.
+        standing: pieces (m,) that the world carries, and the number of the object of each (m,); 0 for the figure's.
+        lock: held while pieces are placed, and while more than one placement is copied.
+        moves: how often a thing was placed.
+    """
+
+    def __init__(
+        self,
+        model: pin.Model,
+        geometry: pin.GeometryModel,
+        owners: tuple[str, ...],
+        pieces_of: dict[str, list[tuple[int, pin.SE3]]],
+        pairs: Indices | None = None,
+    ) -> None:
+        self.model, self.geometry, self.owners, self.pieces_of = model, geometry, owners, pieces_of
+        self.table = PairTable(model, geometry, pairs)
+        self.number_of = {name: number for number, name in enumerate(pieces_of, start=1)}
+        standing: Indices = np.flatnonzero(self.table.joint == 0).astype(np.intp)
+        self.standing = standing, np.array([self.number_of.get(owners[k], 0) for k in standing], dtype=np.intp)
+        self.rows = ContactRowBuilder(self.table)
+        compiled_kernel()  # of `far_moved`: compile now, not during a solve
+        self.lock = Lock()
+        self.moves = 0
+        self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
+        self._put_at: dict[str, int] = {}
+        self._pools: dict[Any, Pool[Any]] = {}
+
+    def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
+        """Place the pieces of an object whose placement in its joint's frame is `base`.
+
+        Args:
+            name: of the object.
+            base: its placement.
+            moving: whether it moves there, along the way in between; otherwise it was put there.
+        """
+        with self.lock:
+            self.moves += 1
+            if not moving:
+                self._put_at[name] = self.moves
+            for index, local in self.pieces_of[name]:
+                self.geometry.geometryObjects[index].placement = base * local
+                self._moved_at[index] = self.moves
+
+    def update_placements(
+        self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]] | None = None
+    ) -> int:
+        """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
+
+        Args:
+            proximity: of a run.
+            seen: number of moves that it has seen.
+            moved: takes the objects that moved, with their placements before and after; of those put, after as both.
+        """
+        if seen == self.moves:
+            return seen
+        with self.lock:
+            if moved is not None:
+                self._note_moved(proximity, seen, moved)
+            for index in np.flatnonzero(self._moved_at > seen).tolist():
+                proximity.place_piece(index, self.geometry.geometryObjects[index].placement)
+            return self.moves
+
+    def _note_moved(self, proximity: Proximity, seen: int, moved: dict[str, tuple[pin.SE3, pin.SE3]]) -> None:
+        for name, pieces in self.pieces_of.items():
+            if not pieces or self._moved_at[pieces[0][0]] <= seen:
+                continue
+            index, local = pieces[0]
+            before, after = (
+                model.geometryObjects[index].placement * local.inverse()
+                for model in (proximity.geometry, self.geometry)
+            )
+            if self._put_at.get(name, 0) > seen:
+                moved[name] = (after, after)
+                continue
+            moved[name] = (moved[name][0] if name in moved else before, after)
+
+    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
+        """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
+        pool: Pool[T] | None = self._pools.get(kind)
+        return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
+
+    def copied(self) -> SceneGeometry:
+        """A copy with placements of its own."""
+        with self.lock:
+            return SceneGeometry(
+                self.model, self.geometry.copy(), self.owners, dict(self.pieces_of), self.table.pairs
+            )  # fmt: skip
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the arguments that it is made from."""
+        return {
+            "model": self.model,
+            "geometry": self.geometry,
+            "owners": self.owners,
+            "pieces_of": self.pieces_of,
+            "pairs": self.table.pairs,
+        }
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__init__(**state)  # type: ignore[misc]
+
+
+def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
+    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
+    model = figure.model
+    pieces = [pin.GeometryObject(piece) for piece in figure.geometry.geometryObjects]
+    owners = [model.frames[piece.parentFrame].name for piece in pieces]
+    pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
+    body = len(pieces)
+
+    things = sorted(objects, key=lambda item: item.segment is None)
+    for thing in things:
+        frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
+        base = frame.placement * thing.placement if frame is not None else thing.placement
+        joint = frame.parentJoint if frame is not None else 0
+        parent = figure.frame_id(thing.segment) if thing.segment is not None else 0
+        pieces_of[thing.name] = []
+        for number, part in enumerate(thing.shape.pieces()):
+            name = f"{thing.name}:{number}"
+            pieces_of[thing.name].append((len(pieces), part.placement))
+            pieces.append(pin.GeometryObject(name, joint, parent, base * part.placement, part.geometry))
+            owners.append(thing.name)
+
+    joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
+    carried = {thing.name: thing for thing in things if thing.segment is not None}
+    excluded.update(_leaning(figure, pieces, body, joints, owners, carried))
+    pairs = np.concatenate([_own_pairs(figure), _pairs_of_things(body, joints, owners, excluded)])
+    return SceneGeometry(model, geometry_model(pieces, pairs), tuple(owners), pieces_of, pairs)
+
+
+def _own_pairs(figure: Figure) -> Indices:
+    """(k, 2) the figure's own pairs."""
+    listed = [[pair.first, pair.second] for pair in figure.geometry.collisionPairs]
+    return np.array(listed, dtype=np.intp).reshape(-1, 2)
+
+
+def _pairs_of_things(
+    body: int, joints: NDArray[np.int_], owners: list[str], excluded: Mapping[tuple[str, str], str]
+) -> Indices:
+    """(k, 2) pairs of a thing's piece, from `body` on, and an earlier one that another joint carries."""
+    moving = int(np.flatnonzero(joints > 0).max(initial=-1)) + 1  # what stands in the world comes last, and meets these
+    found = [np.zeros((0, 2), dtype=np.intp)]
+    earlier = np.arange(moving)
+    for joint in np.unique(joints[body:]).tolist():
+        seconds = np.flatnonzero(joints == joint)
+        seconds = seconds[seconds >= body]
+        firsts = earlier[joints[:moving] != joint] if moving else earlier
+        pairs = np.column_stack([np.tile(firsts, len(seconds)), np.repeat(seconds, len(firsts))])
+        found.append(pairs[pairs[:, 0] < pairs[:, 1]])
+    pairs = np.concatenate(found)
+    pairs = pairs[np.lexsort((pairs[:, 0], pairs[:, 1]))]
+    if excluded:
+        kept = [(owners[first], owners[second]) not in excluded for first, second in pairs.tolist()]
+        pairs = pairs[np.array(kept, dtype=bool)] if len(pairs) else pairs
+    return np.asarray(pairs, dtype=np.intp)
+
+
+def _leaning(
+    figure: Figure,
+    pieces: list[pin.GeometryObject],
+    body: int,
+    joints: NDArray[np.int_],
+    owners: list[str],
+    carried: Mapping[str, SceneObject],
+) -> dict[tuple[str, str], str]:
+    """Pairs (segment, carried thing) that are not tested, with the reason."""
+    if not carried:
+        return {}
+    count = len(figure.geometry.geometryObjects)
+    segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
+    tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
+    joint_of = dict(zip(segments, joints[:count], strict=True))
+    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
+    probe = geometry_model(pieces[: held[-1] + 1])
+    for second in held:
+        for first in range(body):
+            if joints[first] != joints[second]:
+                probe.addCollisionPair(pin.CollisionPair(first, second))
+    rest = figure.posture(figure.postures[0])
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, rest)
+    touching = {
+        (owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), RESTING).pair
+    }
+
+    found: dict[tuple[str, str], str] = {}
+    for name, thing in carried.items():
+        # A thing rests on things that were attached before it, whose pieces come first.
+        found.update({(other, name): "said to rest on it" for other in thing.rests_on if other in carried})
+        carrier = figure.model.frames[figure.frame_id(str(thing.segment))].parentJoint
+        for segment in dict.fromkeys(segments):
+            near = [other for other, joint in joint_of.items() if joint == carrier]
+            if segment in thing.rests_on:
+                found[segment, name] = "said to rest on it"
+            elif (segment, name) in touching and not any(frozenset((segment, other)) in tested for other in near):
+                found[segment, name] = f"a neighbour of {thing.segment} that it leans on in {figure.postures[0]!r}"
+    return found

@@ -1,0 +1,105 @@
+"""Mass, centre of mass and inertia of a shape of uniform density."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.geometry.shapes import (
+    Box,
+    Capsule,
+    Cylinder,
+    Ellipsoid,
+    HalfSpace,
+    Hull,
+    Mesh,
+    Shape,
+    Sphere,
+    Torus,
+)
+from wholebody.scene.matter.body import HEAVIEST, LIGHTEST, Body
+
+
+class MassProperties(NamedTuple):
+    """What a rigid body is to dynamics.
+
+    Attributes:
+        mass: kg.
+        centre: (3,) centre of mass in the shape's axes, metres.
+        inertia: (3, 3) about the centre, along the shape's axes, kg m2.
+        note: what was assumed about a shape that is no closed surface; empty if nothing.
+    """
+
+    mass: float
+    centre: Array
+    inertia: Array
+    note: str = ""
+
+
+def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassProperties:
+    """Mass, centre and inertia of a shape with the density or the mass of a body.
+
+    A closed mesh counts as it is; of one that is not closed the convex pieces count, each whole, also where they
+    overlap.
+
+    Raises:
+        InputError: a shape without a finite volume, or a mass that is too small or too large.
+    """
+    unit, note = _of_density_one(shape, name)
+    density = body.density if body.mass is None else body.mass / unit.mass
+    mass = float(unit.mass * density)
+    if not LIGHTEST <= mass <= HEAVIEST:
+        raise InputError(f"{name!r} has a mass of {mass:.3g} kg; give {LIGHTEST:g} to {HEAVIEST:g} kg")
+    return MassProperties(mass, np.array(unit.lever), np.array(unit.inertia) * (mass / unit.mass), note)
+
+
+def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
+    if isinstance(shape, HalfSpace):
+        raise InputError(f"{name!r} is a half-space, which has no finite mass and cannot move; leave its body out")
+    if isinstance(shape, Box):
+        return pin.Inertia.FromBox(float(np.prod(shape.size)), *shape.size), ""
+    if isinstance(shape, Sphere):
+        return pin.Inertia.FromSphere(4.0 / 3.0 * np.pi * shape.radius**3, shape.radius), ""
+    if isinstance(shape, Ellipsoid):
+        axes = shape.semi_axes
+        return pin.Inertia.FromEllipsoid(4.0 / 3.0 * np.pi * float(np.prod(axes)), *axes), ""
+    if isinstance(shape, Capsule):
+        volume = np.pi * shape.radius**2 * (shape.length + 4.0 / 3.0 * shape.radius)
+        return pin.Inertia.FromCapsule(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Cylinder):
+        volume = np.pi * shape.radius**2 * shape.length
+        return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
+    if isinstance(shape, Torus):
+        return _of_torus(shape), ""
+    import trimesh
+
+    if isinstance(shape, Mesh):
+        mesh = trimesh.Trimesh(shape.vertices, shape.faces, process=True)
+        if mesh.is_watertight and mesh.is_winding_consistent and mesh.volume > 0.0:
+            return _of_mesh(mesh), ""
+    elif isinstance(shape, Hull):
+        return _of_mesh(trimesh.convex.convex_hull(shape.points)), ""
+    total = pin.Inertia.Zero()
+    for piece in shape.pieces():
+        if not np.isfinite(piece.volume):
+            raise InputError(f"{name!r} has a piece without a finite volume and cannot move; leave its body out")
+        hull = trimesh.convex.convex_hull(np.array(piece.geometry.points()))
+        total = total + piece.placement.act(_of_mesh(hull))
+    return total, f"{name!r} is no closed mesh: its mass is that of its convex pieces"
+
+
+def _of_torus(shape: Torus) -> pin.Inertia:
+    """Of a ring with the radii R and r: I_z = m (R^2 + 3/4 r^2), I_x = I_y = m (R^2 / 2 + 5/8 r^2)."""
+    big, small = shape.radius**2, shape.tube**2
+    mass = 2.0 * np.pi**2 * shape.radius * small
+    moments = (0.5 * big + 0.625 * small, 0.5 * big + 0.625 * small, big + 0.75 * small)
+    return pin.Inertia(mass, np.zeros(3), mass * np.diag(moments))
+
+
+def _of_mesh(mesh: Any) -> pin.Inertia:
+    found = mesh.mass_properties
+    return pin.Inertia(float(found["mass"]), np.array(found["center_mass"]), np.array(found["inertia"]))

@@ -1,0 +1,184 @@
+"""Things that move during a frame while the figure moves: by what shares to follow them, and what they pass.
+
+Between the start and the end of a frame the centre of a thing goes straight and the thing turns about it, both with
+constant velocity (`wholebody.scene.moving_scene`). The figure goes from posture to posture of its path.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Mask
+from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, entered
+from wholebody.geometry.continuous.sweep import FirstContact, Sweep
+from wholebody.geometry.continuous.swept_depth import SweptDepth
+from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.scene.geometry_model import SceneGeometry
+from wholebody.scene.moving_scene import MovingScene
+
+APPROACH = 0.25
+"""Share of the width of two pieces by which one may come into the other before the figure gives way. More = fewer steps
+a frame; from a half on a figure may be pushed out on the far side."""
+
+LEAST_APPROACH, LARGEST_APPROACH = 5e-4, 0.02  # m: the same at least, and at most: rows are of first order only
+MOST_SHARES = 128  # of a frame; what is too fast for them comes in deeper, and is found by the sweep
+
+
+class Collision(NamedTuple):
+    """Two that a frame could not keep apart.
+
+    Attributes:
+        first: name of a segment or thing.
+        second: name of the other.
+        depth: how deep they overlap at the end, metres; where they do not, how deep they did at most on the way.
+        inside: whether they overlap at the end; otherwise one went into the other and came out, or through it.
+    """
+
+    first: str
+    second: str
+    depth: float
+    inside: bool
+
+    def __str__(self) -> str:
+        """Return the collision in words."""
+        if self.inside:
+            return f"{self.first} and {self.second} overlap by {1e3 * self.depth:.1f} mm"
+        return f"{self.second} passed through {self.first}, or {1e3 * self.depth:.1f} mm into it and out"
+
+
+class MovingThings:
+    """The things that move in one run; sweeps of both sides are made for each set of them, and kept."""
+
+    def __init__(self, built: SceneGeometry, geometry: pin.GeometryModel) -> None:
+        """Begin without any.
+
+        Args:
+            built: the scene's geometry.
+            geometry: the same with the placements that the run sees.
+        """
+        self._built, self._geometry = built, geometry
+        self._made: dict[tuple[str, ...], _BothSides] = {}
+
+    def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
+        """A frame in which things move from one placement to another, both in the frame of the joint that carries them.
+
+        Raises:
+            UnknownNameError: there is no such thing.
+        """
+        names = tuple(moved)
+        both = self._made.get(names)
+        if both is None:
+            both = self._made[names] = _BothSides(MovingScene(self._built, names, between_things=False))
+        both.scene.refresh(self._geometry)
+        return FrameMotion(both, moved)
+
+
+class FrameMotion:
+    """How things move during one frame.
+
+    Attributes:
+        names: of the things.
+        way: (n,) longest way of any point of each piece that moves by itself, metres; 0 for all others.
+        still: whether nothing moves: things were put into the figure, or are still in it.
+    """
+
+    def __init__(self, both: _BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
+        """Take the placements of the things that move, at the start and at the end."""
+        self._both, self._scene, self.names = both, both.scene, both.scene.names
+        nothing = np.zeros(self._scene.figure_nq)
+        self._start, self._end = (
+            self._scene.configuration(nothing, {name: way[end] for name, way in moved.items()})[len(nothing) :]
+            for end in (0, 1)
+        )
+        self.way = self._ways(moved)
+        self._fastest = float(self.way.max(initial=0.0))
+        self.still = self._fastest == 0.0
+
+    def placements(self, share: float) -> dict[str, pin.SE3]:
+        """Where each thing is after a share of the frame, in the frame of the joint that carries it."""
+        at = self._at(np.zeros(self._scene.figure_nq), share)
+        return {name: self._scene.placement(at, name) for name in self._scene.names}
+
+    def next_share(self, share: float, near: Contacts, within: float) -> float:
+        """The share of the frame up to which things may move before the figure is asked again.
+
+        No pair comes nearer until then than it is apart now, and a part of its width.
+
+        Args:
+            share: where things are now.
+            near: the pairs that are nearer than `within` metres.
+            within: query distance.
+        """
+        pairs, table = near.pair, self._both.table
+        coming = self.way[pairs].sum(axis=1)
+        room = np.clip(APPROACH * table.widths[near.number], LEAST_APPROACH, LARGEST_APPROACH)
+        room += np.maximum(near.distance, 0.0)
+        least = float((room / np.maximum(coming, 1e-12)).min(initial=np.inf))
+        step = min(least, (max(within, 0.0) + LEAST_APPROACH) / max(self._fastest, 1e-12))
+        return min(1.0, share + max(step, 1.0 / MOST_SHARES))
+
+    def first_contact(self, q0: Array, q1: Array, tolerance: float) -> FirstContact | None:
+        """First contact while the figure goes from q0 to q1 (nq,); see `Sweep.first_contact`."""
+        return self._both.sweep.first_contact(self._at(q0, 0.0), self._at(q1, 1.0), tolerance=tolerance)
+
+    def collisions(self, path: Sequence[tuple[float, Array]]) -> tuple[Collision, ...]:
+        """What the figure and things could not avoid, the deepest first.
+
+        Nothing is in the way if the straight motion from the first posture to the last is free, or that along the path.
+
+        Args:
+            path: shares of the frame, from 0 to 1, and postures (nq,) of the figure at them.
+        """
+        along = [self._at(q, share) for share, q in path]
+        found: list[Entered] = []
+        for way in ([along[0], along[-1]], along):
+            found = entered(self._both.sweep, self._both.depths, way, self._both.moves)
+            if not found:
+                return ()
+        owners, pairs = self._scene.owners, self._both.table.pairs
+        deepest: dict[tuple[str, str], Collision] = {}
+        for one in found:
+            first, second = (owners[piece] for piece in pairs[one.number])
+            known = deepest.get((first, second))
+            if known is None or (one.inside, one.depth) > (known.inside, known.depth):
+                deepest[first, second] = Collision(first, second, one.depth, one.inside)
+        return tuple(sorted(deepest.values(), key=lambda one: (not one.inside, -one.depth)))
+
+    def _at(self, q: Array, share: float) -> Array:
+        """The configuration of figure and things after a share of the frame."""
+        scene = self._scene
+        if share in (0.0, 1.0):
+            return np.concatenate([q, self._start if share == 0.0 else self._end])
+        at = pin.interpolate(
+            scene.model, np.concatenate([self._both.rest, self._start]), np.concatenate([self._both.rest, self._end]),
+            share,
+        )  # fmt: skip
+        return np.concatenate([q, at[scene.figure_nq :]])
+
+    def _ways(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> Array:
+        way = np.zeros(len(self._scene.owners))
+        for name, (start, end) in moved.items():
+            centre = self._scene.centres[name]
+            gone = float(np.linalg.norm(end.act(centre) - start.act(centre)))
+            turn = float(np.linalg.norm(pin.log3(start.rotation.T @ end.rotation)))
+            for index, local in self._scene.built.pieces_of[name]:
+                lever = float(np.linalg.norm(local.translation - centre)) + self._both.table.reach[index]
+                way[index] = gone + (turn * lever if turn > 0.0 else 0.0)
+        return way
+
+
+class _BothSides:
+    """A moving scene with its sweeps."""
+
+    def __init__(self, scene: MovingScene) -> None:
+        self.scene = scene
+        self.table = PairTable(scene.model, scene.geometry)
+        self.sweep = Sweep(scene.model, scene.geometry)
+        self.depths = SweptDepth(self.table, scene.geometry, OVERLAP)
+        self.rest = pin.neutral(scene.built.model)
+        owners = np.array([owner in scene.joints for owner in scene.owners], dtype=bool)
+        self.moves: Mask = np.asarray(owners[self.table.pairs].any(axis=1))

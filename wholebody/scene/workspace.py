@@ -1,0 +1,181 @@
+"""What one run changes as it goes: a kinematic state, the distances at it, a sweep. No two runs share one."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, NoReturn
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import a
+from wholebody.base.errors import InputError
+from wholebody.figures.state import State
+from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.geometry.continuous.approach import largest_approach
+from wholebody.geometry.continuous.passing_through import INSIDE
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
+from wholebody.scene.geometry_model import SceneGeometry
+
+if TYPE_CHECKING:
+    from wholebody.geometry.continuous.sweep import Sweep
+    from wholebody.geometry.continuous.swept_depth import SweptDepth
+    from wholebody.scene.moving_obstacles import Collision, FrameMotion, MovingThings
+
+
+class NotCopyable:
+    """What belongs to the run that made it, and is neither pickled nor copied."""
+
+    def __reduce__(self) -> NoReturn:
+        """Refuse.
+
+        Raises:
+            InputError: always.
+        """
+        raise InputError(
+            f"{a(type(self))} belongs to the run that made it and cannot be pickled or copied; make another one from "
+            "its problem or scene"
+        )
+
+
+class Workspace(NotCopyable):
+    """Room for one run on a scene; borrowed by `Scene.borrow`, or made by `Scene.workspace` for what lives on.
+
+    A run sees things where they were at its last `begin` or `refresh`, whoever moves them meanwhile. After `begin` the
+    same questions have the same answers, whatever was asked before.
+
+    Attributes:
+        model: Pinocchio's model of the figure.
+        table: pieces and pairs of the scene.
+        rows: builds their contact rows.
+        owners: the segment or object that each piece is part of.
+        state: moves from posture to posture.
+        proximity: distances between the pieces.
+        moved: things that moved since the last `next_frame`, with their placements before and after; those that were
+            put somewhere did not move, and have where they are as both.
+    """
+
+    def __init__(self, built: SceneGeometry) -> None:
+        """Allocate, which takes some 3 ms for a person."""
+        self._built = built
+        self.model: pin.Model = built.model
+        self.table: PairTable = built.table
+        self.rows: ContactRowBuilder = built.rows
+        self.owners = built.owners
+        self.state = State(built.model)
+        self.moved: dict[str, tuple[pin.SE3, pin.SE3]] = {}
+        self._inside: tuple[str, ...] = ()
+        self.proximity = Proximity(built.table)
+        self._sweep: Sweep | None = None
+        self._depths: dict[float, SweptDepth] = {}
+        self._moving: MovingThings | None = None
+        self._seen = built.update_placements(self.proximity, -1)
+
+    def begin(self) -> None:
+        """Forget what was asked before, and see things where they are now."""
+        self.proximity.reset()
+        self.refresh()
+        self.moved.clear()
+        self._inside = ()
+
+    def refresh(self) -> None:
+        """See things where they are now; `moved` has those that moved there."""
+        self._seen = self._built.update_placements(self.proximity, self._seen, self.moved)
+
+    def place(self, placements: Mapping[str, pin.SE3]) -> None:
+        """See things at placements in their joints' frames; the scene keeps its own."""
+        for name, base in placements.items():
+            for index, local in self._built.pieces_of[name]:
+                self.proximity.place_piece(index, base * local)
+
+    def where(self, name: str) -> pin.SE3:
+        """Where this run sees a thing, in its joint's frame."""
+        index, local = self._built.pieces_of[name][0]
+        return self.geometry.geometryObjects[index].placement * local.inverse()
+
+    def next_frame(self, q: Array) -> FrameMotion | None:
+        """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
+
+        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told.
+
+        Args:
+            q: (nq,) posture of the figure at the beginning.
+        """
+        still = [name for name, (before, after) in self.moved.items() if before == after]
+        if still:
+            overlapping = self.near(q, -INSIDE).pair
+            inside = {self.owners[piece] for piece in overlapping.ravel().tolist()}
+            for name in still:
+                if name not in inside:
+                    del self.moved[name]
+        if not (self.moved or self._inside):
+            return None
+        moved = {name: (self.where(name),) * 2 for name in self._inside} | self.moved
+        self.moved.clear()
+        return self.frame(moved)
+
+    def keep(self, motion: FrameMotion, collisions: Collection[Collision]) -> None:
+        """Let the next frame look after the things of this one too, if it could not keep them out of the figure."""
+        self._inside = tuple(motion.names) if collisions else ()
+
+    def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
+        """A frame in which these things move, from one placement to another in the frame of their joint."""
+        if self._moving is None:
+            from wholebody.scene.moving_obstacles import MovingThings
+
+            self._moving = MovingThings(self._built, self.geometry)
+        return self._moving.frame(moved)
+
+    @property
+    def geometry(self) -> pin.GeometryModel:
+        """The scene's geometry model, with the placements that this run sees."""
+        return self.proximity.geometry
+
+    @property
+    def sweep(self) -> Sweep:
+        """Continuous collision detection; made when it is first needed."""
+        if self._sweep is None:
+            from wholebody.geometry.continuous.sweep import Sweep
+
+            self._sweep = Sweep(self.model, self.geometry)
+        return self._sweep
+
+    def depths(self, tolerance: float) -> SweptDepth:
+        """Depths along postures, to a tolerance in metres; `start` forgets what was asked before."""
+        if tolerance not in self._depths:
+            from wholebody.geometry.continuous.swept_depth import SweptDepth
+
+            self._depths[tolerance] = SweptDepth(self.table, self.geometry, tolerance)
+        return self._depths[tolerance]
+
+    def near(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+        """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
+        return self.proximity.query(self.state.update(q), within, most)
+
+    def near_views(self, q: Array, within: float, most: Array | None = None) -> Contacts:
+        """What `near` returns, in arrays that the next call of this overwrites."""
+        return self.proximity.query_views(self.state.update(q), within, most)
+
+    def largest_approach(self, most: Array) -> Array:
+        """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
+
+        Things that are carried may be placed anew at any time; nothing is known of them.
+        """
+        centres = np.array([np.linalg.norm(piece.placement.translation) for piece in self.geometry.geometryObjects])
+        for pieces in self._built.pieces_of.values():
+            centres[[index for index, _ in pieces]] = np.inf
+        return largest_approach(self.table, centres, most)
+
+    def placements(self, q: Array) -> Array:
+        """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""
+        return self.proximity.placements(self.state.update(q))
+
+
+@contextmanager
+def borrowed(built: SceneGeometry) -> Iterator[Workspace]:
+    """A workspace of a scene for one run; it is used again when the context ends."""
+    with built.pool(Workspace, lambda: Workspace(built)).borrow() as workspace:
+        workspace.begin()
+        yield workspace

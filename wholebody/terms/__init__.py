@@ -1,0 +1,1 @@
+"""Goals, constraints and measures as arrays: residuals, compiled evaluation, linearisation, checked derivatives."""

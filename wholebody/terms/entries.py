@@ -1,0 +1,209 @@
+"""Built-in goals and constraints as rows of tables: what `term_plan` puts together and `term_kernel` evaluates."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody import tasks
+from wholebody.base.arrays import Array
+from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.inputs import WORLD, Place
+from wholebody.tasks.range_of_motion import Coordinate, CoupledRow, EllipticRow
+from wholebody.tasks.residuals import PlacementResidual
+
+RESIDUAL, PLANE, AXIS, MASS_CENTER, COORDINATE, TURN, ROOT, CONE, COUPLED, ELLIPSE, TWIST = range(11)
+"""The tables of goals and constraints, by what a row of them stands for."""
+
+DISTANCE, DISCOMFORT, HEIGHT, BOX, LIMIT, BODY, CURVATURE, COLUMN = range(11, 19)
+ROOT_DISTANCE, ELEVATION, LUMBAR, BALL, EDGE = range(19, 24)
+"""The other tables of a plan: of measures, of bounds, of the model, and of the edges of reach cones."""
+
+WIDTHS = {
+    RESIDUAL: (36, 6),  # place in the joint (12), base in its joint (12), target (3), rotation back from it (9)
+    PLANE: (7, 2),  # origin in the joint (3), normal (3), height
+    AXIS: (24, 3),  # place in the joint (12), basis (9), target (3)
+    MASS_CENTER: (4, 1),  # direction (3), offset
+    COORDINATE: (1, 3),  # target
+    TURN: (2, 3),  # cosine and sine of the target
+    ROOT: (12, 3),  # target
+    CONE: (12, 5),  # axis of the limb in its joint (3), rotation of the reference in its joint (9)
+    COUPLED: (3, 5),  # factors of two coordinates, bound
+    ELLIPSE: (10, 13),  # offsets (3), lower limits (3), upper limits (3), size
+    TWIST: (23, 3),  # limb in its joint (9), center in the joint of the reference (9), slope (3), bound, sign
+}
+"""Floats and integers of a goal or constraint in its table. The first integer is its first row, then:
+
+RESIDUAL: joint, joint of the base, whether the place and the rotation count, whether there is a base other than the
+world; PLANE: joint; AXIS: joint, whether the target is a place; COORDINATE, TURN, ROOT: place in the posture and in the
+tangent; CONE: joint, joint of the reference, how many edges, the first of them; COUPLED, ELLIPSE: place in the posture
+and in the tangent of each coordinate, -1 for none, two of them for each angle of an ellipse; TWIST: joint, joint of the
+reference.
+"""
+
+Integers: TypeAlias = NDArray[np.int64]
+Row: TypeAlias = tuple[tuple[int, ...], Array]
+"""Integers and floats of a row of a table."""
+
+_NO_EDGES: Array = np.zeros((0, 15))
+
+
+class Entry(NamedTuple):
+    """One row of a table of goals or constraints.
+
+    Attributes:
+        table: which.
+        integers: its integers without the first.
+        floats: its floats.
+        rows: how many rows of the Jacobian it makes.
+        edges: (k, 15) planes of the edges of a reach cone, see `ReachCone.planes`; each edge is a row.
+    """
+
+    table: int
+    integers: tuple[int, ...]
+    floats: Array
+    rows: int
+    edges: Array = _NO_EDGES
+
+
+def entries_of(term: Goal | Constraint, model: pin.Model) -> list[Entry] | None:
+    """The entries of a goal or constraint, in the order of its rows; None for one of another class."""
+    write = _WRITERS.get(type(term))
+    return None if write is None else write(term, model)
+
+
+def placement_floats(place: Any) -> Array:
+    """The columns of the rotation, then the translation."""
+    return np.concatenate([place.rotation.T.ravel(), place.translation])
+
+
+def _in_joint(place: Place, model: pin.Model) -> pin.SE3:
+    return model.frames[place.frame].placement
+
+
+def _residual(residual: PlacementResidual, model: pin.Model) -> list[Entry]:
+    based = residual.base.frame != WORLD.frame
+    base = _in_joint(residual.base, model) if based else pin.SE3.Identity()
+    floats = np.concatenate(
+        [
+            placement_floats(_in_joint(residual.place, model)), placement_floats(base), residual.target,
+            residual.undo.rotation.T.ravel(),
+        ]
+    )  # fmt: skip
+    integers = (residual.place.joint, residual.base.joint, residual.position, residual.orientation, based)
+    rows = 3 * (residual.position + residual.orientation)
+    return [Entry(RESIDUAL, tuple(map(int, integers)), floats, rows)]
+
+
+def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:
+    frame = _in_joint(term.place, model)
+    place = pin.SE3(frame.rotation, frame.act(term.resolved_offset))
+    floats = np.concatenate([placement_floats(place), np.zeros(12), term.resolved_target, np.zeros(9)])
+    return [Entry(RESIDUAL, (term.place.joint, 0, 1, 0, 0), floats, 3)]
+
+
+def _plane(term: tasks.Plane, model: pin.Model) -> list[Entry]:
+    origin = _in_joint(term.place, model).translation
+    return [Entry(PLANE, (term.place.joint,), np.array([*origin, *term.resolved_normal, term.height]), 1)]
+
+
+def _axis(term: tasks.Axis, model: pin.Model) -> list[Entry]:
+    floats = np.concatenate([placement_floats(_in_joint(term.place, model)), term.basis.ravel(), term.resolved_target])
+    return [Entry(AXIS, (term.place.joint, int(term.toward is not None)), floats, 2)]
+
+
+def _mass_center(term: tasks.CenterOfMass, model: pin.Model) -> list[Entry]:
+    axes = np.eye(3)
+    return [
+        Entry(MASS_CENTER, (), np.array([*axes[k], target]), 1)
+        for k, target in enumerate(term.resolved_target.tolist())
+    ]
+
+
+def _balance(term: tasks.Balance, model: pin.Model) -> list[Entry]:
+    return [
+        Entry(MASS_CENTER, (), np.array([x, y, 0.0, offset]), 1)
+        for (x, y), offset in zip(term.normals.tolist(), term.offsets.tolist(), strict=True)
+    ]
+
+
+def _posture(term: tasks.Posture, model: pin.Model) -> list[Entry] | None:
+    entries: list[Entry] = []
+    dofs, target = term.dofs.tolist(), term.resolved_target
+    for joint in list(model.joints)[1:]:
+        q, v = int(joint.idx_q), int(joint.idx_v)
+        mine = [dof for dof in dofs if v <= dof < v + joint.nv]
+        if not mine:
+            continue
+        if joint.nq == joint.nv:
+            shifts = [dof - v for dof in mine]
+            entries += [Entry(COORDINATE, (q + k, v + k), target[q + k : q + k + 1], 1) for k in shifts]
+        elif (joint.nq, joint.nv) == (2, 1):
+            entries.append(Entry(TURN, (q, v), target[q : q + 2], 1))
+        elif joint.nq == 7 and len(mine) == 6:
+            entries.append(Entry(ROOT, (q, v), placement_floats(pin.XYZQUATToSE3(target[q : q + 7])), 6))
+        else:
+            return None
+    in_order = [entry.integers[1] + k for entry in entries for k in range(entry.rows)] == dofs
+    return entries if in_order else None
+
+
+def _cones(term: tasks.ReachCones, model: pin.Model) -> list[Entry]:
+    entries = []
+    for limb in term.limbs:
+        axis = _in_joint(limb.limb, model).rotation @ limb.axis
+        reference = _in_joint(limb.reference, model).rotation
+        edges = np.hstack(limb.cone.planes.reshape(5, -1, 3))
+        floats = np.concatenate([axis, reference.T.ravel()])
+        entries.append(Entry(CONE, (limb.limb.joint, limb.reference.joint), floats, 1, edges))
+    return entries
+
+
+def _ranges(term: tasks.RangeOfMotion, model: pin.Model) -> list[Entry] | None:
+    entries = []
+    for row in term.rows:
+        if isinstance(row, CoupledRow):
+            if len(row.coordinates) > 2:
+                return None
+            factors = [part.factor for part in row.coordinates] + [0.0] * (2 - len(row.coordinates))
+            entries.append(Entry(COUPLED, _places(row.coordinates, 2), np.array([*factors, row.bound]), 1))
+        elif isinstance(row, EllipticRow):
+            if len(row.axes) > 3 or any(len(axis) > 2 for axis in row.axes):
+                return None
+            missing = 3 - len(row.axes)
+            places = sum((_places(axis, 2) for axis in (*row.axes, *[()] * missing)), ())
+            limits = np.pad(np.vstack([row.offset, row.limits]), ((0, 0), (0, missing)))
+            limits[1:, len(row.axes) :] = np.array([[-1.0], [1.0]])
+            entries.append(Entry(ELLIPSE, places, np.array([*limits.ravel(), row.size]), 1))
+        else:
+            limb = _in_joint(row.limb, model).rotation
+            center = _in_joint(row.reference, model).rotation @ row.part.center
+            slope = row.part.slope @ row.part.center
+            floats = np.concatenate([limb.T.ravel(), center.T.ravel(), slope, [row.part.bound, row.part.sign]])
+            entries.append(Entry(TWIST, (row.limb.joint, row.reference.joint), floats, 1))
+    return entries
+
+
+def _places(coordinates: Sequence[Coordinate], count: int) -> tuple[int, ...]:
+    found = [place for part in coordinates for place in (part.idx_q, part.idx_v)]
+    return (*found, *[-1] * (2 * count - len(found)))
+
+
+_WRITERS: dict[type, Callable[[Any, pin.Model], list[Entry] | None]] = {
+    tasks.Point: _point,
+    tasks.Frame: lambda term, model: _residual(term.residual, model),
+    tasks.Orientation: lambda term, model: _residual(term.residual, model),
+    tasks.Relative: lambda term, model: _residual(term.residual, model),
+    tasks.Hold: lambda term, model: _residual(term.residual, model),
+    tasks.Plane: _plane,
+    tasks.Axis: _axis,
+    tasks.CenterOfMass: _mass_center,
+    tasks.Balance: _balance,
+    tasks.Posture: _posture,
+    tasks.ReachCones: _cones,
+    tasks.RangeOfMotion: _ranges,
+}

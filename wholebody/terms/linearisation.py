@@ -1,0 +1,437 @@
+"""The one thing a method asks of a problem at a posture: everything that counts, to first order.
+
+One pass of Pinocchio, one cull, coal for the pairs that survive, and one compiled pass over all built-in terms and
+contacts. Terms of other classes join through their own methods, and cost only themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from copy import copy
+from functools import lru_cache
+from math import sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError, UndefinedTermError
+from wholebody.figures.description import Limits
+from wholebody.figures.state import State, Wrench
+from wholebody.geometry.contact_rows import MOST_ENDS
+from wholebody.geometry.proximity import Contacts
+from wholebody.scene.workspace import Workspace
+from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure
+from wholebody.tasks.bounds import StepLimit
+from wholebody.tasks.checks import undefined
+from wholebody.terms.plan import OtherTerm, TermPlan, checked_count, checked_rows, make_plan
+
+MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
+
+
+class Linearisation(NamedTuple):
+    """A problem at one posture, to first order in the tangent displacement dq of shape (nv,).
+
+    Attributes:
+        q: (nq,) the posture.
+        goal_error: (g,) errors of the goals, metres and radians; ``goal_error + goal_jacobian @ dq`` should vanish.
+        goal_jacobian: (g, nv).
+        value: (c,) values of the constraints, to stay between the problem's lower and upper.
+        value_jacobian: (c, nv).
+        contacts: the pairs near enough to count.
+        gap: (r,) gaps of the contact rows, metres; the first k are the distances of the k contacts.
+        gap_jacobian: (r, nv); ``gap + gap_jacobian @ dq`` is to be at least `clearance`.
+        gap_contact: (r,) the contact a row belongs to.
+        clearance: (r,) least gap asked of each row.
+        measure: weighted sum of the measures.
+        gradient: (nv,) its derivative.
+        curvature: (nv,) its positive diagonal.
+        lower, upper: (nv,) bounds on dq.
+        squares: (s, nv) rows S of measures that are sums of squares (`Measure.squares`), with the second derivative
+            S' S.
+        squared: (nv,) their part of the curvature, which stands for S' S where rows are not taken; zero without rows.
+        planes: supporting planes of the terms; None where no term has any.
+    """
+
+    q: Array
+    goal_error: Array
+    goal_jacobian: Array
+    value: Array
+    value_jacobian: Array
+    contacts: Contacts
+    gap: Array
+    gap_jacobian: Array
+    gap_contact: Indices
+    clearance: Array
+    measure: float
+    gradient: Array
+    curvature: Array
+    lower: Array
+    upper: Array
+    squares: Array = np.zeros((0, 0))
+    squared: Array = np.zeros(0)
+    planes: TermPlanes | None = None
+
+
+class TermPlanes(NamedTuple):
+    """Supporting planes of all terms; see `Goal.supporting_planes`.
+
+    Attributes:
+        value: (p,) not positive where the terms are met.
+        jacobian: (p, nv).
+        row: (p,) the first row of the term that a plane is of, goals' before constraints'.
+        key: (p,) names a plane from one posture to the next.
+        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
+        bend_row: (b,) the row that a bend is of, goals' before constraints'.
+    """
+
+    value: Array
+    jacobian: Array
+    row: Indices
+    key: Indices
+    bend: Array
+    bend_row: Indices
+
+
+_NO_CONTACTS = Contacts(
+    np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
+    np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
+)  # fmt: skip
+
+
+_NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
+_NO_WRENCHES, _NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
+
+
+class PackedLinearisation(NamedTuple):
+    """A linearisation in as few arrays as can be, which the next one overwrites; `Linearisation` says what they mean.
+
+    Attributes:
+        q: (nq,) the posture.
+        goals: how many rows goals have.
+        value: (g + c,) errors of the goals, then values of the constraints.
+        jacobian: (g + c + r, nv) their rows, then those of the gaps.
+        contacts: the pairs near enough to count.
+        gap: (r,) gaps of the contact rows.
+        gap_contact: (r,) the contact a row belongs to.
+        clearance: (r,) least gap asked of each row.
+        measure: (2, nv + 1) derivative and curvature of the measures; the last column holds their sum.
+        box: (2, nv) lower and upper bounds on dq.
+    """
+
+    q: Array
+    goals: int
+    value: Array
+    jacobian: Array
+    contacts: Contacts
+    gap: Array
+    gap_contact: Indices
+    clearance: Array
+    measure: Array
+    box: Array
+
+
+class Lineariser:
+    """Linearises one problem at many postures, in the room of one run.
+
+    Attributes:
+        workspace: moves from posture to posture, and sees things where they were when the run began.
+        goals: what is linearised; see `take`.
+    """
+
+    def __init__(
+        self,
+        workspace: Workspace,
+        limits: Limits,
+        goals: Sequence[Goal],
+        constraints: Sequence[Constraint],
+        bounds: Sequence[Bound],
+        measures: Sequence[Measure],
+        clearances: Array,
+        dt: float | None = None,
+        plan: TermPlan | None = None,
+    ) -> None:
+        """Take the resolved terms of a problem.
+
+        Args:
+            workspace: of this run alone.
+            limits: of the figure's joints; see `Figure.limits`.
+            goals: resolved goals.
+            constraints: resolved constraints.
+            bounds: resolved bounds on the displacement.
+            measures: resolved measures.
+            clearances: (pairs,) least distance asked of every collision pair, metres.
+            dt: step in seconds for bounds that need one.
+            plan: of the same constraints, bounds, measures and step, and of any goals; None to make it here.
+        """
+        self.workspace, self.state, self._limits = workspace, workspace.state, limits
+        self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
+        self._kernel = compiled_kernel()
+        self._no_squares = np.zeros((0, self.state.model.nv))
+        self.goals: Sequence[Goal] = goals
+        self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
+        self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
+        self._packed: PackedLinearisation | None = None
+        self._grow(64)
+        self._approach = self._largest_approach()
+        self._most: Array | None = None
+        self.take(goals, clearances)
+
+    def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> None:
+        """Put other goals and clearances in the place of the present ones, and other constraints where they are given.
+
+        Raises:
+            InputError: there is not one clearance for each pair.
+        """
+        if clearances.shape != (len(self.workspace.table.pairs),):
+            count = len(self.workspace.table.pairs)
+            raise InputError(f"clearances have shape {clearances.shape}; give one for each of the {count} pairs")
+        others = None if constraints is self.constraints else constraints
+        if goals is not self.goals or others is not None:
+            self.constraints = self.constraints if others is None else others
+            before, self._plan = self._plan, self._again(self._plan, goals, others)
+            if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
+                self._term_wrench, self._packed = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
+        self.goals, self.clearances = goals, clearances
+        self._largest_clearance = float(np.maximum.reduce(clearances)) if len(clearances) else 0.0
+        if self._approach is not None:
+            self._most = np.add(clearances, self._approach, out=self._most)
+
+    @property
+    def plan(self) -> TermPlan:
+        """The terms as arrays."""
+        return self._plan
+
+    def rows(self) -> list[int]:
+        """How many rows each goal, and then each constraint, has."""
+        others = iter(self._plan.others)
+        return [
+            next(others).rows if entries is None else sum(entry.rows for entry in entries)
+            for entries in (*self._plan.goals, *self._plan.constraints)
+        ]
+
+    def relaxed(self, depth: float) -> Lineariser:
+        """The same, with less distance asked of every pair by `depth` metres; both move one workspace."""
+        other = copy(self)
+        other._most = None  # it needs its own room
+        other.take(self.goals, self.clearances - depth)
+        return other
+
+    def at(self, q: Array, within: float, planes: bool = False) -> Linearisation:
+        """Everything at the posture q, shape (nq,), with the pairs nearer than `within` metres plus their clearance.
+
+        Pairs that cannot come as near as their clearance are left out, where speeds are bounded and `dt` is given.
+        Supporting planes of the terms are added if they are asked for.
+
+        Raises:
+            InputError: q is no posture, or a term of one's own has another number of rows than at the start.
+        """
+        contacts, clearance, count = self._contacts(self.workspace.near, q, within)
+        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
+        value, jacobian = np.empty(rows), np.empty((rows + count, nv))
+        squares = np.empty((self._plan.squares, nv))
+        box, measure = np.empty((2, nv)), np.empty((3 if len(squares) else 2, nv + 1))
+        self._terms(count, value, jacobian, box, measure, squares)
+        squared = measure[2, :nv] if len(squares) else np.zeros(nv)
+        for term in self._plan.other_measures:
+            part = term.squares(self.state)
+            if part is not None:
+                squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
+                squared = squared + term.weight * term.curvature(self.state)
+        goals, contact = self._plan.goal_rows, self._contact[:count].copy()
+        return Linearisation(
+            self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
+            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
+            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, self._planes() if planes else None,
+        )  # fmt: skip
+
+    def packed(self, q: Array, within: float) -> PackedLinearisation:
+        """What `at` returns, in arrays that the next call of this overwrites.
+
+        Raises:
+            InputError: as for `at`.
+        """
+        contacts, clearance, count = self._contacts(self.workspace.near_views, q, within)
+        if self._packed is None or len(self._packed.jacobian) < len(self._packed.value) + count:
+            self._packed = self._buffers()
+        room = self._packed
+        jacobian = room.jacobian[: len(room.value) + count]
+        self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
+        contact = self._contact[:count]
+        return PackedLinearisation(
+            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
+            room.measure, room.box,
+        )  # fmt: skip
+
+    def _buffers(self) -> PackedLinearisation:
+        nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
+        none = np.zeros(0)
+        return PackedLinearisation(
+            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
+            none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
+        )  # fmt: skip
+
+    def _contacts(
+        self, near: Callable[[Array, float, Array | None], Contacts], q: Array, within: float
+    ) -> tuple[Contacts, Array, int]:
+        """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
+        contacts = near(q, within + self._largest_clearance, self._most)
+        clearance = self.clearances[contacts.number]
+        if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
+            self._grow(2 * len(clearance))
+        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        return contacts, clearance, count
+
+    def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
+        """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
+        state, plan = self.state, self._plan
+        self._kernel.linearise(
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure, squares,
+        )  # fmt: skip
+        if plan.others:
+            self._evaluate(plan.others, value, jacobian)
+        if plan.other_bounds:
+            self._bound(plan.other_bounds, box)
+        if plan.other_measures:
+            self._measure(plan.other_measures, measure)
+
+    def undefined(self, q: Array) -> UndefinedTermError | None:
+        """Why a term of one's own is not finite at a posture (nq,); None where all are, or where there are none."""
+        plan = self._plan
+        if not (plan.others or plan.other_bounds or plan.other_measures):
+            return None
+        own = [*(other.term for other in plan.others), *plan.other_bounds, *plan.other_measures]
+        return undefined(own, self.state.update(q), self.dt)
+
+    def defined(self, postures: Iterable[Array]) -> Iterator[Array]:
+        """Those of some postures (nq,) where all terms of one's own are finite."""
+        return (q for q in postures if self.undefined(q) is None)
+
+    def _planned(self, goals: Sequence[Goal]) -> TermPlan:
+        return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+
+    def _again(
+        self, plan: TermPlan, goals: Sequence[Goal], constraints: Sequence[Constraint] | None = None
+    ) -> TermPlan:
+        """The plan with other terms; made anew where they, or terms of one's own, have other rows than before."""
+        again = plan.with_terms(goals, self.state.model, constraints)
+        if again is None or any(np.size(term.value(self.state)) != term.rows for term in again.others):
+            return self._planned(goals)
+        return again
+
+    def _largest_approach(self) -> Array | None:
+        """Most by which every pair (pairs,) can come nearer in a step; None where speeds are not bounded."""
+        limits = [bound for bound in self.bounds if type(bound) is StepLimit]
+        if self.dt is None or not limits:
+            return None
+        most = np.min([bound.bounds(self.state, self.dt)[1] for bound in limits], axis=0)
+        return self.workspace.largest_approach(most) + MORE
+
+    def _grow(self, contacts: int) -> None:
+        """Make room for the rows of so many contacts."""
+        rows = contacts * (1 + MOST_ENDS)
+        self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
+        self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
+        self._packed = None
+
+    def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
+        """Write values and rows of terms of other classes."""
+        state = self.state
+        for term, evaluate, row, rows in others:
+            part, derivative = evaluate(state), term.jacobian(state)
+            if np.ndim(part) != 1:
+                part = np.atleast_1d(part)
+            checked_rows(term, part, derivative, rows)
+            value[row : row + rows] = part
+            if isinstance(derivative, Wrench):
+                self._write_rows(derivative, jacobian[row : row + rows])
+            else:
+                jacobian[row : row + rows] = derivative
+
+    def _write_rows(self, wrench: Wrench, rows: Array) -> None:
+        """Write the rows (m, nv) of a wrench."""
+        wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
+        self._kernel.wrench_rows(
+            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
+        )
+
+    def _planes(self) -> TermPlanes | None:
+        """Supporting planes of the terms that have some, where the state is."""
+        if not self._plan.others:
+            return None
+        found: list[TermPlanes] = []
+        row = 0
+        for term, count in zip((*self.goals, *self.constraints), self.rows(), strict=True):
+            planes = term.supporting_planes(self.state)
+            if planes is not None:
+                rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
+                found.append(TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row))
+            row += count
+        return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
+
+    def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
+        for bound in bounds:
+            # a joint out of its limits comes back no faster than the bound lets it
+            low, high = bound.bounds(self.state, self.dt)
+            np.clip(box, low, high, out=box)
+
+    def _measure(self, measures: Sequence[Measure], measure: Array) -> None:
+        state = self.state
+        for term in measures:
+            measure[0, -1] += term.weight * term.value(state)
+            measure[0, :-1] += term.weight * term.gradient(state)
+            measure[1, :-1] += term.weight * term.curvature(state)
+
+
+class ConstraintValues:
+    """Values of some constraints, and of nothing else, at any state of one model."""
+
+    def __init__(self, constraints: Sequence[Constraint], state: State) -> None:
+        """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
+        self._kernel = compiled_kernel()
+        self._plan = plan = make_plan(_NO_LIMITS, (), constraints, (), (), None, state)
+        self._model, rows, nv = state.model, plan.value_rows, state.model.nv
+        self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
+        self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
+        self._no_squares = np.zeros((0, nv))
+
+    def take(self, constraints: Sequence[Constraint]) -> bool:
+        """Put others in their place; False, and nothing is done, where these are not of the same classes and frames."""
+        plan = self._plan.with_terms((), self._model, constraints)
+        self._plan = self._plan if plan is None else plan
+        return plan is not None
+
+    def at(self, state: State) -> Array:
+        """The values (c,) where a state is; overwritten by the next call."""
+        plan, value = self._plan, self._value
+        self._kernel.linearise(
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            _NO_WRENCHES, _NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
+            self._no_squares,
+        )  # fmt: skip
+        for term, evaluate, row, rows in plan.others:
+            part = np.atleast_1d(evaluate(state))
+            checked_count(term, len(part), rows)
+            value[row : row + rows] = part
+        return value
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.terms import kernel as term_kernel
+
+    state = State(pin.buildSampleModelManipulator())
+    plan = make_plan(_NO_LIMITS, (), (), (), (), None, state)
+    nv = state.model.nv
+    term_kernel.linearise(
+        state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+        _NO_WRENCHES, _NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
+        np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
+    )  # fmt: skip
+    term_kernel.wrench_rows(
+        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
+    )  # fmt: skip
+    return term_kernel

@@ -1,0 +1,334 @@
+"""Built-in goals, constraints, bounds and measures as arrays, so that one compiled pass evaluates all of them.
+
+A plan is made for a problem and never changed. Terms of other classes are evaluated by their own methods: a plan only
+says in which rows they stand. `term_kernel` evaluates a plan.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody import tasks
+from wholebody.base.arrays import Array
+from wholebody.base.errors import TermError
+from wholebody.base.records import with_values
+from wholebody.figures.description import Limits
+from wholebody.figures.state import State, Wrench, extended_columns
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.distance import LEAST_CURVATURE, SquaredDistance
+from wholebody.tasks.rhythm import LUMBAR_MOST, LUMBAR_RATE, LUMBAR_WEIGHT
+from wholebody.terms.entries import (
+    BALL,
+    BODY,
+    BOX,
+    COLUMN,
+    CONE,
+    CURVATURE,
+    DISCOMFORT,
+    DISTANCE,
+    EDGE,
+    ELEVATION,
+    HEIGHT,
+    LIMIT,
+    LUMBAR,
+    ROOT_DISTANCE,
+    WIDTHS,
+    Entry,
+    Integers,
+    Row,
+    entries_of,
+    placement_floats,
+)
+
+
+class OtherTerm(NamedTuple):
+    """A goal or constraint that is evaluated by its own methods.
+
+    Attributes:
+        term: the goal or constraint.
+        value: its error or value at a state.
+        row: its first row.
+        rows: how many rows it has.
+    """
+
+    term: Goal | Constraint
+    value: Callable[[State], Array]
+    row: int
+    rows: int
+
+
+class TermPlan(NamedTuple):
+    """The terms of a problem as arrays.
+
+    Attributes:
+        floats: all tables of floats, one after the other.
+        integers: all tables of integers.
+        layout: (tables, 6) where each table of floats begins, its rows and columns, and the same of integers.
+        support: (njoints, n) 1 where a column of the joint Jacobian moves a joint.
+        goal_rows: rows of all goals.
+        value_rows: rows of all constraints.
+        others: goals and constraints of other classes.
+        other_bounds: bounds of other classes.
+        other_measures: measures of other classes.
+        goals: entries of each goal; None for one of another class.
+        constraints: the same of each constraint.
+    """
+
+    floats: Array
+    integers: Integers
+    layout: Integers
+    support: NDArray[np.int8]
+    goal_rows: int
+    value_rows: int
+    others: tuple[OtherTerm, ...]
+    other_bounds: tuple[Bound, ...]
+    other_measures: tuple[Measure, ...]
+    goals: tuple[list[Entry] | None, ...]
+    constraints: tuple[list[Entry] | None, ...]
+
+    @property
+    def squares(self) -> int:
+        """Number of squares that built-in measures are the sum of."""
+        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1] + 3 * self.layout[BALL, 1])
+
+    def with_terms(
+        self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
+    ) -> TermPlan | None:
+        """The plan with other terms, or None where they are not of the same classes for the same frames.
+
+        Args:
+            goals: resolved goals.
+            model: Pinocchio's model.
+            constraints: resolved constraints; None to keep those that it has.
+        """
+        terms: list[Goal | Constraint] = [*goals, *(constraints or ())]
+        old = self.goals if constraints is None else (*self.goals, *self.constraints)
+        if len(goals) != len(self.goals) or len(terms) != len(old):
+            return None
+        floats = self.floats.copy()
+        filled = dict.fromkeys(WIDTHS, 0)
+        found: list[list[Entry] | None] = []
+        others = list(self.others)
+        number = 0
+        for term, known in zip(terms, old, strict=True):
+            entries = entries_of(term, model)
+            found.append(entries)
+            if entries is None or known is None:
+                if entries is not known or type(term) is not type(others[number].term):
+                    return None
+                value = term.error if isinstance(term, Goal) else term.value
+                others[number] = with_values(others[number], term=term, value=value)
+                number += 1
+                continue
+            if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
+                return None
+            for entry, before in zip(entries, known, strict=True):
+                if not np.array_equal(entry.edges, before.edges):
+                    return None
+                start, _, columns = self.layout[entry.table, :3].tolist()
+                place = start + columns * filled[entry.table]
+                floats[place : place + columns] = entry.floats
+                filled[entry.table] += 1
+        kept = self.constraints if constraints is None else tuple(found[len(goals) :])
+        goal_entries = tuple(found[: len(goals)])
+        return with_values(self, floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
+
+
+def make_plan(
+    limits: Limits,
+    goals: Sequence[Goal],
+    constraints: Sequence[Constraint],
+    bounds: Sequence[Bound],
+    measures: Sequence[Measure],
+    dt: float | None,
+    state: State,
+) -> TermPlan:
+    """The plan of resolved terms.
+
+    Args:
+        limits: of the figure's joints; see `Figure.limits`.
+        goals: resolved goals.
+        constraints: resolved constraints.
+        bounds: resolved bounds.
+        measures: resolved measures.
+        dt: seconds of a step, for bounds that need them; None for a whole solve.
+        state: tells how many rows terms of other classes have; stays where it is.
+    """
+    model = state.model
+    parts: dict[int, list[Row]] = {table: [] for table in range(EDGE + 1)}
+    others: list[OtherTerm] = []
+    row = 0
+
+    def add(term: Goal | Constraint, value: Callable[[State], Array]) -> list[Entry] | None:
+        nonlocal row
+        entries = entries_of(term, model)
+        if entries is None:
+            others.append(OtherTerm(term, value, row, int(np.size(value(state)))))
+            row += others[-1].rows
+            return None
+        for entry in entries:
+            numbers = (row, *entry.integers)
+            if entry.table == CONE:
+                numbers += (len(entry.edges), len(parts[EDGE]))
+                parts[EDGE] += [((0,), edge) for edge in entry.edges]
+            parts[entry.table].append((numbers, entry.floats))
+            row += entry.rows
+        return entries
+
+    goal_entries = tuple(add(goal, goal.error) for goal in goals)
+    goal_rows = row
+    constraint_entries = tuple(add(constraint, constraint.value) for constraint in constraints)
+    parts[BOX], other_bounds = _boxes(bounds, state, dt)
+    other_measures, curvature = _measures(measures, model, parts)
+    parts[CURVATURE] = [((0,), curvature)]
+    braking = _braking(bounds, model.nv, dt)
+    parts[LIMIT] = [
+        ((int(q), int(v)), np.array([low, high, braking[v]]))
+        for q, v, low, high in zip(limits.idx_q, limits.idx_v, limits.lower, limits.upper, strict=True)
+    ]
+    parts[BODY] = [
+        ((parent, first, width), np.array([inertia.mass, *inertia.lever]))
+        for parent, first, width, inertia in zip(
+            model.parents.tolist(),
+            model.idx_vExtendeds.tolist(),
+            model.nvExtendeds.tolist(),
+            model.inertias,
+            strict=True,
+        )
+    ]
+    columns = extended_columns(model)
+    places = np.arange(len(state.column_joint)) if columns is None else columns
+    parts[COLUMN] = [
+        ((int(place), int(joint)), np.zeros(0)) for place, joint in zip(places, state.column_joint, strict=True)
+    ]
+    floats, integers, layout = _packed(parts)
+    return TermPlan(
+        floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
+        other_bounds, other_measures, goal_entries, constraint_entries,
+    )  # fmt: skip
+
+
+def _packed(parts: dict[int, list[Row]]) -> tuple[Array, Integers, Integers]:
+    layout = np.zeros((len(parts), 6), dtype=np.int64)
+    floats: list[Array] = [np.zeros(0)]
+    integers: list[int] = []
+    begun = 0
+    for table in sorted(parts):
+        rows = parts[table]
+        wide = len(rows[0][1]) if rows else WIDTHS.get(table, (0, 0))[0]
+        layout[table] = (begun, len(rows), wide, len(integers), len(rows), len(rows[0][0]) if rows else 0)
+        begun += len(rows) * wide
+        floats += [part for _, part in rows]
+        integers += [number for numbers, _ in rows for number in numbers]
+    return np.concatenate(floats), np.array(integers, dtype=np.int64), layout
+
+
+def coordinates(model: pin.Model) -> Integers:
+    """(nv,) place in the posture of each degree of freedom that is a plain coordinate; -1 for the others."""
+    places = np.full(model.nv, -1, dtype=np.int64)
+    for joint in list(model.joints)[1:]:
+        if joint.nq == joint.nv:
+            places[joint.idx_v : joint.idx_v + joint.nv] = np.arange(joint.idx_q, joint.idx_q + joint.nq)
+    return places
+
+
+def _boxes(bounds: Sequence[Bound], state: State, dt: float | None) -> tuple[list[Row], tuple[Bound, ...]]:
+    """Bounds that are the same at every posture, as pairs of rows, and the others."""
+    static = [bound for bound in bounds if type(bound) in (tasks.Freeze, tasks.StepLimit)]
+    rows: list[Row] = [((0,), np.array(side, dtype=float)) for bound in static for side in bound.bounds(state, dt)]
+    return rows, tuple(bound for bound in bounds if bound not in static)
+
+
+def _braking(bounds: Sequence[Bound], nv: int, dt: float | None) -> Array:
+    """Largest share (nv,) of the way to its limit that each freedom goes in a step."""
+    shares = [bound.braking(dt) for bound in bounds if type(bound) is tasks.StepLimit]
+    least: Array = np.min([np.ones(nv), *shares], axis=0)
+    return least
+
+
+def _measures(
+    measures: Sequence[Measure], model: pin.Model, parts: dict[int, list[Row]]
+) -> tuple[tuple[Measure, ...], Array]:
+    """Write the tables of measures; the measures of other classes, and the curvature (nv,) that is always the same."""
+    others: list[Measure] = []
+    curvature = np.zeros(model.nv)
+    places = coordinates(model)
+    for term in measures:
+        distance = _distance(term)
+        if distance is not None and _distances(distance, term.weight, model, places, parts):
+            curvature += term.weight * distance.curvature
+            for ball in term.balls if isinstance(term, tasks.RotationEffort) else ():
+                numbers = np.concatenate([ball.axes.ravel(), ball.start.ravel(), term.weight * ball.weights])
+                parts[BALL].append(((*ball.idx_q, *ball.idx_v), numbers))
+        elif type(term) is tasks.Discomfort:
+            curvature += term.weight * LEAST_CURVATURE
+            joints = term.limited
+            columns = np.column_stack([joints.neutral, joints.weights, joints.limits.T, joints.phase.T])
+            for q, v, floats in zip(joints.idx_q.tolist(), joints.idx_v.tolist(), columns, strict=True):
+                parts[DISCOMFORT].append(((q, v), np.array([term.weight, *floats])))
+        elif type(term) is tasks.PotentialEnergy:
+            curvature += term.weight * LEAST_CURVATURE
+            masses = term.masses
+            for joint, centre, weight, height in zip(
+                masses.joints.tolist(), masses.centres, masses.weights, masses.heights, strict=True
+            ):
+                parts[HEIGHT].append(((joint,), np.array([*centre, term.weight * weight, height])))
+        elif type(term) is tasks.Rhythm:
+            curvature += term.weight * LEAST_CURVATURE
+            for part in (*term.girdles, *term.knees):
+                numbers = np.array([term.weight * part.weight, part.most, part.rest, part.onset])
+                parts[ELEVATION].append(((*part.idx_q, *part.idx_v), numbers))
+            if term.lumbar is not None:
+                share = np.array([term.weight * LUMBAR_WEIGHT, LUMBAR_MOST, LUMBAR_RATE, term.lumbar.rest])
+                parts[LUMBAR].append(((*term.lumbar.idx_q, *term.lumbar.idx_v), share))
+        else:
+            others.append(term)
+    return tuple(others), curvature
+
+
+def _distance(term: Measure) -> SquaredDistance | None:
+    """The part of a measure that is a squared distance; None for other classes, and for a subclass."""
+    if type(term) is tasks.Effort or type(term) is tasks.Displacement:
+        return term.distance
+    return term.others if type(term) is tasks.RotationEffort else None
+
+
+def _distances(
+    distance: SquaredDistance, weight: float, model: pin.Model, places: Integers, parts: dict[int, list[Row]]
+) -> bool:
+    """Write the tables of a distance; false where a joint that counts is no free root and no coordinate."""
+    weighed = np.flatnonzero(distance.weights).tolist()
+    root = model.joints[1] if model.njoints > 1 and model.joints[1].nq == 7 else None
+    own = range(0, 6) if root is not None else range(0)
+    if any(places[v] < 0 for v in weighed if v not in own):
+        return False
+    if any(v in own for v in weighed):
+        target = placement_floats(pin.XYZQUATToSE3(distance.reference[:7]))
+        parts[ROOT_DISTANCE].append(((0, 0), np.concatenate([target, weight * distance.weights[:6]])))
+    for v in weighed:
+        if v not in own:
+            q = int(places[v])
+            parts[DISTANCE].append(((q, v), np.array([weight * distance.weights[v], distance.reference[q]])))
+    return True
+
+
+def checked_rows(term: Goal | Constraint, value: Array, jacobian: Wrench | Array, expected: int) -> None:
+    """Raise InputError where a term of one's own has not as many rows as values, or not as many as at the start."""
+    rows = len(jacobian.rows) if isinstance(jacobian, Wrench) else len(jacobian)
+    if rows != len(value):
+        raise TermError(
+            term, type(term).__name__, f"it has {len(value)} values and {rows} rows at a posture; give as many"
+        )
+    checked_count(term, rows, expected)
+
+
+def checked_count(term: Goal | Constraint | Measure, rows: int, expected: int) -> None:
+    """Raise InputError where a term of one's own has another number of rows than at the start."""
+    if rows != expected:
+        told = f"it has {rows} rows here, and had {expected} at the start; give each term one number of rows"
+        raise TermError(term, type(term).__name__, f"{told} at all postures")

@@ -1,0 +1,351 @@
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `term_plan`.
+
+Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compiled
+from wholebody.figures.reach_cones import PARALLEL
+from wholebody.figures.reach_cones import TOUCHING as ON_EDGE
+from wholebody.tasks.axis import NO_ANGLE, STEEPEST, TOUCHING
+from wholebody.tasks.range_of_motion import OPPOSITE
+from wholebody.terms.entries import Integers
+
+SMALL = 1e-4
+"""Angle [rad] below which the series of log and its derivative are exact to rounding."""
+
+
+@compiled(inner=True)
+def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
+    """Rotation (3, 3) and origin (3,) in the world of a frame with the place `part` (12,) in a joint (4, 3)."""
+    for i in range(3):
+        place[i] = joint[3, i]
+        for k in range(3):
+            place[i] += joint[k, i] * part[9 + k]
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += joint[k, i] * part[3 * j + k]
+
+
+@compiled(inner=True, error_model="numpy")
+def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.residuals.PlacementResidual`."""
+    if not len(tables):
+        return
+    turn, base_turn, relative, change = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    place, base_place, way, angle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    left = np.empty((3, 3))
+    for e in range(len(tables)):
+        row, position, orientation, based = entries[e, 0], entries[e, 3], entries[e, 4], entries[e, 5]
+        _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
+        if based:
+            _placed(joints[entries[e, 2]], tables[e, 12:24], base_turn, base_place)
+        else:
+            for i in range(3):
+                base_place[i] = 0.0
+                for j in range(3):
+                    base_turn[i, j] = 1.0 if i == j else 0.0
+        if position:
+            for i in range(3):
+                way[i] = place[i] - base_place[i]
+            for i in range(3):
+                value[row + i] = -tables[e, 24 + i]
+                for k in range(3):
+                    value[row + i] += base_turn[k, i] * way[k]
+                x, y, z = base_turn[0, i], base_turn[1, i], base_turn[2, i]  # axis i of the base, in the world
+                wrench[row + i, 0], wrench[row + i, 1], wrench[row + i, 2] = x, y, z
+                wrench[row + i, 3] = place[1] * z - place[2] * y
+                wrench[row + i, 4] = place[2] * x - place[0] * z
+                wrench[row + i, 5] = place[0] * y - place[1] * x
+            row += 3
+        if orientation:
+            for i in range(3):
+                for j in range(3):
+                    relative[i, j] = 0.0
+                    for k in range(3):
+                        relative[i, j] += base_turn[k, i] * turn[k, j]
+            for i in range(3):
+                for j in range(3):
+                    change[i, j] = 0.0
+                    for k in range(3):
+                        change[i, j] += relative[i, k] * tables[e, 27 + 3 * j + k]
+            rotation_vector(change, angle)
+            inverse_left(angle, left)
+            for i in range(3):
+                value[row + i] = angle[i]
+                for j in range(3):
+                    for k in range(3):
+                        wrench[row + i, 3 + j] += left[i, k] * base_turn[j, k]
+
+
+@compiled(inner=True, error_model="numpy")
+def rotation_vector(turn: Array, angle: Array) -> None:
+    """Rotation vector (3,) of a rotation (3, 3), by way of its quaternion, which is exact at every angle.
+
+    Shepperd 1978, "Quaternion from Rotation Matrix", Journal of Guidance and Control 1(3).
+    """
+    trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
+    largest, best = -1, trace
+    for i in range(3):
+        if turn[i, i] > best:
+            largest, best = i, turn[i, i]
+    if largest < 0:
+        w = 1.0 + trace
+        x, y, z = turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]
+    elif largest == 0:
+        w = turn[2, 1] - turn[1, 2]
+        x, y, z = 1.0 + 2.0 * turn[0, 0] - trace, turn[0, 1] + turn[1, 0], turn[0, 2] + turn[2, 0]
+    elif largest == 1:
+        w = turn[0, 2] - turn[2, 0]
+        x, y, z = turn[0, 1] + turn[1, 0], 1.0 + 2.0 * turn[1, 1] - trace, turn[1, 2] + turn[2, 1]
+    else:
+        w = turn[1, 0] - turn[0, 1]
+        x, y, z = turn[0, 2] + turn[2, 0], turn[1, 2] + turn[2, 1], 1.0 + 2.0 * turn[2, 2] - trace
+    if w < 0.0:
+        w, x, y, z = -w, -x, -y, -z
+    sine = np.sqrt(x * x + y * y + z * z)
+    scale = 2.0 / w if sine < 1e-12 * w else 2.0 * np.arctan2(sine, w) / sine
+    angle[0], angle[1], angle[2] = scale * x, scale * y, scale * z
+
+
+@compiled(inner=True, error_model="numpy")
+def inverse_left(angle: Array, left: Array) -> None:
+    """Inverse (3, 3) of the left Jacobian of SO(3) at a rotation vector (3,): 1 - [a]/2 + c [a]^2.
+
+    c = (1 - (t/2) cot(t/2)) / t^2 at the angle t (Chirikjian 2011, section 10.6).
+    """
+    x, y, z = angle[0], angle[1], angle[2]
+    square = x * x + y * y + z * z
+    if square < SMALL * SMALL:
+        c = 1.0 / 12.0 + square / 720.0
+    else:
+        half = 0.5 * np.sqrt(square)
+        c = (1.0 - half / np.tan(half)) / square
+    left[0, 0], left[1, 1], left[2, 2] = (
+        1.0 + c * (x * x - square),
+        1.0 + c * (y * y - square),
+        1.0 + c * (z * z - square),
+    )
+    left[0, 1], left[1, 0] = c * x * y + 0.5 * z, c * x * y - 0.5 * z
+    left[0, 2], left[2, 0] = c * x * z - 0.5 * y, c * x * z + 0.5 * y
+    left[1, 2], left[2, 1] = c * y * z + 0.5 * x, c * y * z - 0.5 * x
+
+
+@compiled(inner=True)
+def planes(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.Plane`."""
+    if not len(tables):
+        return
+    place = np.empty(3)
+    for e in range(len(tables)):
+        row, joint = entries[e, 0], joints[entries[e, 1]]
+        value[row] = -tables[e, 6]
+        for i in range(3):
+            place[i] = joint[3, i]
+            for k in range(3):
+                place[i] += joint[k, i] * tables[e, k]
+            value[row] += tables[e, 3 + i] * place[i]
+            wrench[row, i] = tables[e, 3 + i]
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            wrench[row, 3 + i] = place[j] * tables[e, 3 + k] - place[k] * tables[e, 3 + j]
+
+
+@compiled(inner=True, error_model="numpy")
+def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.Axis`."""
+    if not len(tables):
+        return
+    turn, axes, place, direction = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    change, move = np.empty((2, 3)), np.empty((2, 3))
+    for e in range(len(tables)):
+        row = entries[e, 0]
+        _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
+        distance = np.inf
+        for i in range(3):
+            direction[i] = tables[e, 21 + i]
+        if entries[e, 2]:
+            distance = 0.0
+            for i in range(3):
+                direction[i] -= place[i]
+                distance += direction[i] * direction[i]
+            distance = np.sqrt(distance)
+            for i in range(3):
+                direction[i] /= max(distance, TOUCHING)
+        if distance < TOUCHING:
+            value[row] = value[row + 1] = 0.0
+            continue
+        for i in range(3):
+            for j in range(3):
+                axes[i, j] = 0.0
+                for k in range(3):
+                    axes[i, j] += tables[e, 12 + 3 * i + k] * turn[j, k]
+        x = axes[0, 0] * direction[0] + axes[0, 1] * direction[1] + axes[0, 2] * direction[2]
+        y = axes[1, 0] * direction[0] + axes[1, 1] * direction[1] + axes[1, 2] * direction[2]
+        along = axes[2, 0] * direction[0] + axes[2, 1] * direction[1] + axes[2, 2] * direction[2]
+        sine = np.hypot(x, y)
+        angle = np.arctan2(sine, along)
+        if sine < NO_ANGLE:
+            value[row], value[row + 1] = angle, 0.0
+            gain = 1.0 if along > 0.0 else STEEPEST
+        else:
+            value[row], value[row + 1] = x * angle / sine, y * angle / sine
+            gain = min(angle / sine, STEEPEST)
+        ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
+        fall = along - gain
+        change[0, 0], change[0, 1], change[0, 2] = gain + fall * ux * ux, fall * ux * uy, -x
+        change[1, 0], change[1, 1], change[1, 2] = fall * ux * uy, gain + fall * uy * uy, -y
+        for r in range(2):
+            inner = 0.0
+            for j in range(3):
+                move[r, j] = change[r, 0] * axes[0, j] + change[r, 1] * axes[1, j] + change[r, 2] * axes[2, j]
+                inner += move[r, j] * direction[j]
+            for j in range(3):
+                k, m = (j + 1) % 3, (j + 2) % 3
+                wrench[row + r, 3 + j] = move[r, k] * direction[m] - move[r, m] * direction[k]
+            if entries[e, 2]:
+                for j in range(3):
+                    wrench[row + r, j] = (inner * direction[j] - move[r, j]) / distance
+                for j in range(3):
+                    k, m = (j + 1) % 3, (j + 2) % 3
+                    wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
+
+
+@compiled(inner=True, error_model="numpy")
+def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.ReachCones` and `figures.reach_cones.ReachCone.signed_angle`."""
+    if not len(tables):
+        return
+    turn, world, local, outward = np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(3)
+    for e in range(len(tables)):
+        row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
+        for i in range(3):
+            world[i] = limb[0, i] * tables[e, 0] + limb[1, i] * tables[e, 1] + limb[2, i] * tables[e, 2]
+            for j in range(3):
+                turn[i, j] = 0.0
+                for k in range(3):
+                    turn[i, j] += reference[k, i] * tables[e, 3 + 3 * j + k]
+        for j in range(3):
+            local[j] = turn[0, j] * world[0] + turn[1, j] * world[1] + turn[2, j] * world[2]
+        value[row] = signed_angle(edges[entries[e, 4] : entries[e, 4] + entries[e, 3]], local, outward)
+        for i in range(3):
+            local[i] = turn[i, 0] * outward[0] + turn[i, 1] * outward[1] + turn[i, 2] * outward[2]
+        # the direction turns as w x d, so the angle changes by g . (w x d) = w . (d x g)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            wrench[row, 3 + i] = world[j] * local[k] - world[k] * local[j]
+
+
+@compiled(inner=True, error_model="numpy")
+def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
+    """See `tasks.range_of_motion.TwistRow`."""
+    if not len(tables):
+        return
+    limb, base, seen, along = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for e in range(len(tables)):
+        row = entries[e, 0]
+        _turned(joints[entries[e, 1]], tables[e, :9], limb)
+        _turned(joints[entries[e, 2]], tables[e, 9:18], base)
+        for i in range(3):
+            for j in range(3):
+                seen[i, j] = base[0, i] * limb[0, j] + base[1, i] * limb[1, j] + base[2, i] * limb[2, j]
+        sine, cosine = seen[1, 0] - seen[0, 1], seen[0, 0] + seen[1, 1]
+        square = max(sine * sine + cosine * cosine, OPPOSITE)
+        sign = tables[e, 22]
+        value[row] = tables[e, 21] - sign * np.arctan2(sine, cosine)
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            value[row] += tables[e, 18 + i] * seen[i, 2]
+            along[i] = seen[j, 2] * tables[e, 18 + k] - seen[k, 2] * tables[e, 18 + j]
+        along[0] -= sign * (sine * seen[2, 1] - cosine * seen[2, 0]) / square
+        along[1] += sign * (cosine * seen[2, 1] + sine * seen[2, 0]) / square
+        along[2] -= sign
+        for i in range(3):
+            wrench[row, 3 + i] = base[i, 0] * along[0] + base[i, 1] * along[1] + base[i, 2] * along[2]
+
+
+@compiled(inner=True)
+def _turned(joint: Array, part: Array, turn: Array) -> None:
+    """Rotation (3, 3) in the world of a frame with the rotation `part` (9,) in a joint (4, 3)."""
+    for i in range(3):
+        for j in range(3):
+            turn[i, j] = 0.0
+            for k in range(3):
+                turn[i, j] += joint[k, i] * part[3 * j + k]
+
+
+@compiled(inner=True)
+def _dot(edge: Array, part: int, direction: Array) -> float:
+    """A plane of an edge times a direction (3,)."""
+    product: float = (
+        edge[3 * part] * direction[0] + edge[3 * part + 1] * direction[1] + edge[3 * part + 2] * direction[2]
+    )
+    return product
+
+
+@compiled(inner=True, error_model="numpy")
+def signed_angle(edges: Array, direction: Array, gradient: Array) -> float:
+    """Angle of a unit direction (3,) to the nearest edge (k, 15) of a cone, positive inside; writes its gradient."""
+    count = len(edges)
+    nearest, best, beside, wedge = 0, -2.0, False, -1
+    for i in range(count):
+        after = edges[(i + 1) % count]
+        height = _dot(edges[i], 0, direction)
+        within = _dot(edges[i], 1, direction) >= 0.0 and _dot(edges[i], 2, direction) >= 0.0
+        nearness = max(_dot(edges[i], 3, direction), _dot(after, 3, direction))
+        if within:
+            nearness = np.sqrt(max(1.0 - height * height, 0.0))
+        if nearness > best:
+            nearest, best, beside = i, nearness, within
+        if wedge < 0 and _dot(edges[i], 4, direction) >= 0.0 and _dot(after, 4, direction) < 0.0:
+            wedge = i
+    edge, after = edges[nearest], edges[(nearest + 1) % count]
+    height = _dot(edge, 0, direction)
+    place = gradient
+    if beside and best > PARALLEL:
+        length = 0.0
+        for k in range(3):
+            place[k] = direction[k] - height * edge[k]
+            length += place[k] * place[k]
+        for k in range(3):
+            place[k] /= np.sqrt(length)
+    else:
+        corner = after if _dot(after, 3, direction) > _dot(edge, 3, direction) else edge
+        for k in range(3):
+            place[k] = corner[9 + k]
+    sign = 1.0 if _dot(edges[max(wedge, 0)], 0, direction) >= 0.0 else -1.0
+    cosine = direction[0] * place[0] + direction[1] * place[1] + direction[2] * place[2]
+    square = 0.0
+    for k in range(3):
+        gradient[k] = cosine * direction[k] - place[k]
+        square += gradient[k] * gradient[k]
+    sine = np.sqrt(square)
+    if sine > ON_EDGE:
+        for k in range(3):
+            gradient[k] *= sign / sine
+    else:
+        _inward(edges, direction, gradient)
+    angle: float = sign * np.arctan2(sine, cosine)
+    return angle
+
+
+@compiled(inner=True, error_model="numpy")
+def _inward(edges: Array, direction: Array, gradient: Array) -> None:
+    """Direction into the cone at a place on its edge."""
+    nearest, least = 0, np.inf
+    for i in range(len(edges)):
+        height = abs(_dot(edges[i], 0, direction))
+        if height < least:
+            nearest, least = i, height
+    height, square = _dot(edges[nearest], 0, direction), 0.0
+    for k in range(3):
+        gradient[k] = edges[nearest, k] - height * direction[k]
+        square += gradient[k] * gradient[k]
+    for k in range(3):
+        gradient[k] /= np.sqrt(square)
