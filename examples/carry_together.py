@@ -38,7 +38,7 @@ def build() -> wb.Assembly:
     return made.add(wb.HalfSpace(), name="floor").ignore("ann", "floor").ignore("ben", "floor")
 
 
-def take_hold(made: wb.Assembly) -> wb.AssemblySolution:
+def take_hold(made: wb.Assembly) -> wb.methods.AssemblySolution:
     """Bring four palms to the box's sides, and join them to it there; the box stays where it is.
 
     Raises:

@@ -33,7 +33,7 @@ def main(
     figure = wb.load("human")
     walk = read(figure, clip)
     scene = wb.Scene(figure)
-    for piece in wb.equipment(worn, figure):
+    for piece in wb.motion.equipment(worn, figure):
         piece.attach(scene)
     freed = wb.avoid(walk, scene, method=method)
     report = freed.report

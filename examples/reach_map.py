@@ -24,7 +24,7 @@ def build() -> wb.Problem:
     )
 
 
-def main(out: Path = Path("pictures"), pictures: bool = True, step: float = 0.15) -> wb.ReachMap:
+def main(out: Path = Path("pictures"), pictures: bool = True, step: float = 0.15) -> wb.studies.ReachMap:
     """Search, report and draw."""
     found = wb.reach_map(build(), "right_index_tip", (0.15, -0.75, 0.80), (0.90, 0.45, 1.25), step)
     print(found)

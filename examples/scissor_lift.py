@@ -24,7 +24,7 @@ SIDE = 0.04  # m: the crossed bars are this far in front of and behind the middl
 FLAT = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # a capsule's z along a bar's x
 
 
-class CylinderLimit(wb.AssemblyConstraint):
+class CylinderLimit(wb.methods.AssemblyConstraint):
     """The horizontal cylinder at the foot of a scissor lift is strong enough for the load.
 
     With n stages of bars at the angle a, the load W rises by n L sin a while the cylinder moves by L cos a. So, by

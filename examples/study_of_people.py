@@ -24,14 +24,14 @@ def build(figure: wb.Figure, height: float, layout: Any = None) -> wb.Problem:
     )
 
 
-def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.Records:
+def main(out: Path = Path("pictures"), pictures: bool = True) -> wb.studies.Records:
     """Solve for everybody, print a table, and write it."""
     people = {name: wb.load("human", **given) for name, given in PEOPLE.items()}
     records = wb.study(build, people=people, targets=HEIGHTS, warm_start=True)
     print(records)
     for one in records:
         assert one.factors is not None
-        score = "" if one.q is None else wb.rula(people[one.factors["person"]], one.q).score
+        score = "" if one.q is None else wb.ergonomics.rula(people[one.factors["person"]], one.q).score
         print(f"  {one.name:<20} {one.outcome:<12} {1e3 * one.goal_error:7.1f} mm short, RULA {score}")
     if pictures:
         out.mkdir(parents=True, exist_ok=True)

@@ -58,11 +58,21 @@ LONG = (
     *("view/test_page.py", "examples/test_examples.py", "docs/test_pages.py", "motion/test_avoidance.py"),
     *("base/test_compiled.py", "test_odd_arguments.py", "cli/test_show.py", "motion/bisection/test_method.py"),
     *("view/test_live_page.py", "motion/test_batch.py", "cli/test_commands.py", "view/test_files.py"),
-    *("bench/compare/test_run.py", "methods/test_contradictions.py", "base/test_batches.py", "doctor/test_checks.py"),
+    *(
+        "bench/suite/compare/test_run.py",
+        "methods/test_contradictions.py",
+        "base/test_batches.py",
+        "doctor/test_checks.py",
+    ),
     *("view/test_server.py", "tracking/test_moving_things.py", "tasks/test_rhythm.py", "view/test_legend.py"),
-    *("tracking/test_scenes.py", "bench/test_daily.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
-    *("tracking/test_dragging.py", "bench/test_challenge.py", "base/test_runner.py", "methods/newton/test_method.py"),
-    *("view/surface/test_surface.py", "bench/stability/test_command.py", "bench/test_motion.py", "test_threads.py"),
+    *("tracking/test_scenes.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
+    *("tracking/test_dragging.py", "audits/test_challenge.py", "base/test_runner.py", "methods/newton/test_method.py"),
+    *(
+        "view/surface/test_surface.py",
+        "bench/suite/stability/test_command.py",
+        "bench/measure/test_motion.py",
+        "test_threads.py",
+    ),
     *("test_copies.py", "bench/test_commands.py"),
 )
 """Files that take longest by the clock, over six seconds each beside others: they begin first.

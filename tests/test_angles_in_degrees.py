@@ -39,7 +39,7 @@ def wrong(scene: wb.Scene) -> np.ndarray:
         lambda scene, q: Track.of(scene.figure, [q], 0.02).check(scene.figure),
         lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
         lambda scene, q: scene.figure.reduced("left_arm", q),
-        lambda scene, q: wb.body_angles(scene.figure, q),
+        lambda scene, q: wb.ergonomics.body_angles(scene.figure, q),
     ],
     ids=["with_joints", "start", "with_start", "goal", "assess", "clip", "track", "frame", "reduced", "body_angles"],
 )

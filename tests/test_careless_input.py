@@ -197,4 +197,4 @@ def test_warnings_are_of_the_line_that_called(person: wb.Figure) -> None:
 def test_a_long_time_that_is_no_frame_is_not_warned_of() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert wb.Spring(1.0, 1.0, 1.0).transition(20.0).shape == (2, 2)
+        assert wb.dynamics.Spring(1.0, 1.0, 1.0).transition(20.0).shape == (2, 2)

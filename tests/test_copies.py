@@ -170,7 +170,14 @@ def test_a_simplified_problem_and_its_scene(scene: wb.Scene) -> None:
 
 
 @pytest.mark.parametrize(
-    "method", [wb.QP(solver="daqp", seed=3), wb.CCD(), wb.Newton(seed=1), wb.Placo(), wb.DampedLeastSquares()]
+    "method",
+    [
+        wb.QP(solver="daqp", seed=3),
+        wb.methods.CCD(),
+        wb.Newton(seed=1),
+        wb.methods.Placo(),
+        wb.methods.DampedLeastSquares(),
+    ],
 )
 def test_settings_of_methods(method: Any) -> None:
     assert pickled(method) == copy.copy(method) == copy.deepcopy(method) == method

@@ -38,16 +38,16 @@ def shown() -> wb.Viewer:
     return viewer
 
 
-def reached() -> wb.ReachMap:
+def reached() -> wb.studies.ReachMap:
     axis = np.array([0.0, 0.1])
     empty = np.zeros((2, 2, 2))
     problem, verdict, q = wb.Problem(wb.Scene(hand())), empty.astype(np.int8), np.zeros((2, 2, 2, hand().model.nq))
-    return wb.ReachMap(problem, "right_palm", axis, axis, axis, verdict, empty, empty, q, 8)
+    return wb.studies.ReachMap(problem, "right_palm", axis, axis, axis, verdict, empty, empty, q, 8)
 
 
 def solved(path: Path) -> Path:
     task = wb.read_task(TASK)
-    return wb.write_result(task, wb.Solution.__new__(wb.Solution), path)
+    return wb.taskfile.write_result(task, wb.Solution.__new__(wb.Solution), path)
 
 
 WRITERS: dict[str, tuple[Callable[[Path], Any], tuple[str, ...]]] = {

@@ -25,10 +25,10 @@ AXES = {"revolute": "0 0 1", "continuous": "0 0 1", "prismatic": "0 1 0"}
 METHODS = {
     "qp": wb.QP(budget=60, restarts=2),
     "qp/daqp": wb.QP(solver="daqp", budget=60, restarts=2),
-    "ccd": wb.CCD(restarts=1),
+    "ccd": wb.methods.CCD(restarts=1),
     "newton": wb.Newton(restarts=1),
-    "placo": wb.Placo(iterations=60),
-    "dls": wb.DampedLeastSquares(),
+    "placo": wb.methods.Placo(iterations=60),
+    "dls": wb.methods.DampedLeastSquares(),
 }
 
 

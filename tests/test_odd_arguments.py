@@ -193,7 +193,7 @@ def fall(path: Path, body: wb.Body) -> None:
     RigidBodies(falling(path, body)).advance(0.001)
 
 
-class Level(wb.AssemblyConstraint):
+class Level(wb.methods.AssemblyConstraint):
     """A body at the height of another."""
 
     bodies = ("crank", "rod")
@@ -241,7 +241,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     for option, value in {"sex": "male", "stature": 1.7, "mass": 70.0, "detail": "spheres", "age": 50.0}.items():
         yield f"load({option})", Call(lambda _option=option, **given: wb.load("human", **given), {option: value})
     yield "load(proportions)", Call(lambda **given: wb.load("human", **given), {"proportions": {"span": 1.85}})
-    yield "finger_angles", Call(wb.finger_angles, {"shape": "fist", "side": "left"})
+    yield "finger_angles", Call(wb.figures.finger_angles, {"shape": "fist", "side": "left"})
     yield "load(hands)", Call(lambda **given: wb.load("human", **given), {"hands": "rigid"})
     yield "load(side)", Call(lambda **given: wb.load("hand", **given), {"side": "left", "stature": 1.7})
     yield "Figure.clamp", Call(arm.clamp, {"q": q})
@@ -284,7 +284,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Scene.state", Call(there.state, {"q": q})
     moves = {"ball": ((1.0, 1.0, 1.0), (1.0, 0.9, 1.0))}
     yield "Scene.sweep", Call(there.sweep, {"q0": q, "q1": q + 0.1, "tolerance": 1e-4, "moves": moves})
-    world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.Spring()}
+    world = {"scene": there, "start": q, "dt": 0.1, "overlap": "qp", "seed": 0, "spring": wb.dynamics.Spring()}
     yield "World", Call(wb.World, world, lambda made: made.step(q))
     yield "World.step", Call(wb.World(there, q).step, {"tracked": q})
     body = {"mass": 0.5, "material": "wood", "velocity": (0.1, 0.0, 0.0), "angular_velocity": (0.0, 0.0, 0.1)}
@@ -293,13 +293,13 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         return wb.Scene(arm).add(wb.Sphere(0.1), name="ball", at=(1.0, 1.0, 1.0), body=body)
 
     yield "Body", Call(wb.Body, body, lambda made: RigidBodies(loose(made)).advance(0.1))
-    for joint in (wb.BallJoint, wb.Hinge):
-        hung = {"at": (0.0, 0.0, 0.1), "to": None, **({"axis": (0.0, 1.0, 0.0)} if joint is wb.Hinge else {})}
+    for joint in (wb.dynamics.BallJoint, wb.dynamics.Hinge):
+        hung = {"at": (0.0, 0.0, 0.1), "to": None, **({"axis": (0.0, 1.0, 0.0)} if joint is wb.dynamics.Hinge else {})}
         yield joint.__name__, Call(joint, hung, lambda made: RigidBodies(loose(wb.Body(joints=[made]))).advance(0.1))
     yield "Body(joints)", Call(wb.Body, {"joints": ()}, lambda made: RigidBodies(loose(made)).advance(0.1))
     yield "Body(density)", Call(wb.Body, {"density": 500.0}, lambda made: RigidBodies(loose(made)).advance(0.1))
     material = {"name": "glass", "against": {"wood": (0.5, 0.1)}, "others": (0.5, 0.1)}
-    yield "Material", Call(wb.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
+    yield "Material", Call(wb.dynamics.Material, material, lambda made: RigidBodies(loose(wb.Body(material=made))))
     engine = RigidBodies(loose(wb.Body()))
     yield "RigidBodies", Call(RigidBodies, {"scene": loose(wb.Body()), "gravity": (0.0, 0.0, -9.8)})
     still = {"link1": (np.eye(4), np.eye(4))}
@@ -314,8 +314,8 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         yield f"RigidBodies.{name}", Call(getattr(engine, name), point)
     yield "RigidBodies.push", Call(engine.push, {**point, "impulse": (0.0, 0.1, 0.0)}, lambda _: engine.energy())
     spring = {"stiffness": 1000.0, "damping": 40.0, "mass": 0.4}
-    yield "Spring", Call(wb.Spring, spring, lambda made: made.transition(0.1))
-    yield "Spring.transition", Call(wb.Spring().transition, {"time": 0.1})
+    yield "Spring", Call(wb.dynamics.Spring, spring, lambda made: made.transition(0.1))
+    yield "Spring.transition", Call(wb.dynamics.Spring().transition, {"time": 0.1})
 
     def put(shape: Any) -> Any:
         return wb.Scene(arm).add(shape, name="it").contacts(q)
@@ -326,7 +326,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Body", Call(wb.Body, falls, lambda made: fall(path, made))
     yield "Body(mass)", Call(wb.Body, {"mass": 1.0}, lambda made: fall(path, made))
     against = {"name": "rubber", "against": {"wood": (0.8, 0.9)}, "others": (0.5, 0.5)}
-    yield "Material", Call(wb.Material, against, lambda made: fall(path, wb.Body(material=made)))
+    yield "Material", Call(wb.dynamics.Material, against, lambda made: fall(path, wb.Body(material=made)))
     moved = {**thing, "body": wb.Body()}
     yield "Scene.add(body)", Call(lambda **given: scene(path).add(**given), moved)
     yield "Scene.add(material)", Call(lambda **given: scene(path).add(**given), {**thing, "material": "metal"})
@@ -377,9 +377,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "write_task", Call(wb.write_task, given)
     answer = wb.solve(task.problem)
     stored = path / "result.json"
-    yield "write_result", Call(wb.write_result, {"task": task, "solution": answer, "path": stored})
-    wb.write_result(task, answer, stored)
-    yield "read_result", Call(wb.read_result, {"path": stored})
+    yield "write_result", Call(wb.taskfile.write_result, {"task": task, "solution": answer, "path": stored})
+    wb.taskfile.write_result(task, answer, stored)
+    yield "read_result", Call(wb.taskfile.read_result, {"path": stored})
     touch = {"part": "link4", "thing": "ball", "weight": 1.0}
     yield "Touch", Call(wb.Touch, touch, solve_it)
     lean = {"on": "crate", "part": "thorax", "side": at, "weight": 1.0}
@@ -453,10 +453,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "QPTracker.step", Call(wb.QP().tracker(ask, 0.1).step, {"q": q, "measures": True})
     for name, made in {
         "QP": wb.QP(budget=0),
-        "CCD": wb.CCD(),
+        "CCD": wb.methods.CCD(),
         "Newton": wb.Newton(restarts=0),
-        "Placo": wb.Placo(),
-        "DampedLeastSquares": wb.DampedLeastSquares(),
+        "Placo": wb.methods.Placo(),
+        "DampedLeastSquares": wb.methods.DampedLeastSquares(),
     }.items():
         yield f"{name}.accepts", Call(made.accepts, {"problem": ask})
         if name in ("CCD", "Placo", "DampedLeastSquares"):
@@ -464,7 +464,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     for name, made in {
         "QPTracker": wb.QP(budget=0).tracker(ask, 0.1),
         "NewtonTracker": wb.Newton(restarts=0).tracker(ask, 0.1),
-        "SolvingTracker": wb.DampedLeastSquares().tracker(ask, 0.1),
+        "SolvingTracker": wb.methods.DampedLeastSquares().tracker(ask, 0.1),
     }.items():
         yield f"{name}.frame", Call(made.frame, {"q": q, "tolerance": 1e-4})
         for method in ("solve", "nearest", "overlap_resolutions"):
@@ -472,22 +472,28 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
                 yield f"{name}.{method}", Call(getattr(made, method), {"q": q})
         if name == "SolvingTracker":
             yield "SolvingTracker.step", Call(made.step, {"q": q})
-    yield "CCD", Call(wb.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used)
-    yield "CCD.solve", Call(wb.CCD().solve, {"problem": ask, "progress": print})
-    yield "CCD.pushed_out", Call(wb.CCD().pushed_out, {"problem": ask, "q": q})
+    yield (
+        "CCD",
+        Call(wb.methods.CCD, {"tolerance": 1e-4, "iterations": 5, "restarts": 1, "seed": 0, "time_limit": None}, used),
+    )
+    yield "CCD.solve", Call(wb.methods.CCD().solve, {"problem": ask, "progress": print})
+    yield "CCD.pushed_out", Call(wb.methods.CCD().pushed_out, {"problem": ask, "q": q})
     newton = {"algebra": "auto", "inequalities": "slack", "restarts": 1, "seed": 0, "time_limit": 1.0}
     yield "Newton", Call(wb.Newton, {"tolerance": 1e-4, "iterations": 5, **newton}, used)
     yield "Newton.solve", Call(wb.Newton().solve, {"problem": ask, "progress": print})
     yield "Newton.tracker", Call(wb.Newton().tracker, {"problem": ask, "dt": 0.1}, lambda made: made.step(q))
     yield "NewtonTracker.step", Call(wb.Newton().tracker(ask).step, {"q": q, "tolerance": 1e-4})
     yield "NewtonTracker.solve", Call(wb.Newton().tracker(ask).solve, {"q": q})
-    yield "Placo", Call(wb.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0, "holds": "soft"}, used)
-    yield "Placo.solve", Call(wb.Placo().solve, {"problem": ask, "progress": print})
-    yield "Placo.prepare", Call(wb.Placo().prepare, {"problem": ask})
-    yield "Placo.pairs", Call(wb.Placo().pairs, {"problem": ask})
+    yield (
+        "Placo",
+        Call(wb.methods.Placo, {"tolerance": 1e-4, "iterations": 5, "time_limit": 1.0, "holds": "soft"}, used),
+    )
+    yield "Placo.solve", Call(wb.methods.Placo().solve, {"problem": ask, "progress": print})
+    yield "Placo.prepare", Call(wb.methods.Placo().prepare, {"problem": ask})
+    yield "Placo.pairs", Call(wb.methods.Placo().pairs, {"problem": ask})
     damped = {"tolerance": 1e-4, "iterations": 5, "damping": 1e-3, "time_limit": 1.0}
-    yield "DampedLeastSquares", Call(wb.DampedLeastSquares, damped, used)
-    yield "DampedLeastSquares.solve", Call(wb.DampedLeastSquares().solve, {"problem": ask, "progress": print})
+    yield "DampedLeastSquares", Call(wb.methods.DampedLeastSquares, damped, used)
+    yield "DampedLeastSquares.solve", Call(wb.methods.DampedLeastSquares().solve, {"problem": ask, "progress": print})
 
     dragged = {"problem": ask, "method": "qp", "goal": 0, "dt": 0.1}
     yield "Drag", Call(wb.Drag, dragged, lambda drag: drag.to(at))
@@ -610,30 +616,33 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
     for method in ("mirrored", "velocities", "accelerations", "jerk"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
-    yield "Strength", Call(wb.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
-    yield "Strength.limits", Call(wb.Strength().limits, {"figure": arm})
-    found = wb.torques(clip)
+    yield "Strength", Call(wb.motion.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
+    yield "Strength.limits", Call(wb.motion.Strength().limits, {"figure": arm})
+    found = wb.motion.torques(clip)
     yield "Torques.joint_of", Call(found.joint_of, {"column": 0})
     yield "Torques.largest", Call(found.largest, {})
     yield (
         "torques",
-        Call(wb.torques, {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.Strength(), "feet": ["link1"]}),
+        Call(
+            wb.motion.torques,
+            {"clip": clip, "friction": 0.5, "cutoff": 6.0, "strength": wb.motion.Strength(), "feet": ["link1"]},
+        ),
     )
     yield "Clip(frames)", Call(lambda frames: clip[frames], {"frames": slice(0, 1)})
     clip.write(path / "walk.npz")
     (path / "walk.bvh").write_text(BVH)
-    skeleton = wb.read_skeleton(path / "walk.bvh")
-    yield "read_skeleton", Call(wb.read_skeleton, {"path": path / "walk.bvh", "unit": "metres", "up": "y"})
+    skeleton = wb.motion.read_skeleton(path / "walk.bvh")
+    yield "read_skeleton", Call(wb.motion.read_skeleton, {"path": path / "walk.bvh", "unit": "metres", "up": "y"})
     moving_skeleton = {
         "names": ("hips", "head"), "parents": [-1, 0], "offsets": np.zeros((2, 3)),
         "dt": 0.1, "name": "it", "notes": (),
         "rotations": np.tile(np.eye(3), (3, 2, 1, 1)), "positions": np.zeros((3, 2, 3)),
     }  # fmt: skip
-    yield "SkeletonMotion", Call(wb.SkeletonMotion, moving_skeleton, lambda made: made.rest())
+    yield "SkeletonMotion", Call(wb.motion.SkeletonMotion, moving_skeleton, lambda made: made.rest())
     yield "SkeletonMotion.part", Call(skeleton.part, {"first": 0, "last": 1})
     local = {**moving_skeleton, "local": np.tile(np.eye(3), (3, 2, 1, 1)), "root": np.zeros((3, 3))}
     del local["rotations"], local["positions"]
-    yield "SkeletonMotion.moved", Call(wb.SkeletonMotion.moved, local)
+    yield "SkeletonMotion.moved", Call(wb.motion.SkeletonMotion.moved, local)
     for method in ("rest", "reversed", "length"):
         yield f"SkeletonMotion.{method}", Call(getattr(skeleton, method), {})
     bones = {
@@ -648,14 +657,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames", "hold_feet": False, "dynamics": False})
     yield "avoid", Call(wb.avoid, {**avoided, "method": "frames"})
     many = {"clips": [], "folder": path / "many", "equipment": ["nothing"], "methods": ["frames"], "jobs": 1}
-    yield "avoid_many", Call(wb.avoid_many, {**many, "hold_feet": True, "progress": print})
+    yield "avoid_many", Call(wb.motion.avoid_many, {**many, "hold_feet": True, "progress": print})
     given = {"clips": [clip], "constraints": []}
-    yield "avoid_many(case)", Call(partial(wb.avoid_many, folder=path / "many", methods=["frames"]), given)
-    yield "avoid_many(figure)", Call(partial(wb.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
+    yield "avoid_many(case)", Call(partial(wb.motion.avoid_many, folder=path / "many", methods=["frames"]), given)
+    yield "avoid_many(figure)", Call(partial(wb.motion.avoid_many, ["walk.npz"], path / "many"), {"figure": arm})
     clip.write(path / "read.npz")
     files = {"files": [], "folder": path / "many", "jobs": 1, "progress": print}
-    yield "read_many", Call(partial(wb.read_many, figure=arm), files)
-    yield "read_many(figure)", Call(partial(wb.read_many, [path / "read.npz"], path / "many"), {"figure": arm})
+    yield "read_many", Call(partial(wb.motion.read_many, figure=arm), files)
+    yield "read_many(figure)", Call(partial(wb.motion.read_many, [path / "read.npz"], path / "many"), {"figure": arm})
     at_once: dict[str, Any] = {"method": "qp", "jobs": 1, "seconds": 9.0, "warm_start": True}
     at_once |= {"folder": path / "records", "progress": lambda told: True}
     yield "solve_many", Call(wb.solve_many, {"problems": [], **at_once})
@@ -674,7 +683,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     for write, ending in ((mapped.save, "npz"), (mapped.to_vtk, "vtk"), (mapped.picture, "png"), (mapped.html, "html")):
         yield f"ReachMap.{write.__name__}", Call(write, {"path": path / f"reach.{ending}"})
     yield "ReachMap.counts", Call(mapped.counts, {})
-    kept = wb.Records([wb.SolveRecord("a")])
+    kept = wb.studies.Records([wb.studies.SolveRecord("a")])
     yield "Records.counts", Call(kept.counts, {})
     yield "Records.first_without_answer", Call(kept.first_without_answer, {})
     yield "Records.rows", Call(kept.rows, {})
@@ -683,71 +692,94 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "people", Call(wb.people, {"count": 2, "sexes": ["male"]})
     counted = {"task": path / "person.toml", "sees": (1.0, 0.0, 1.0), "count": 1, "sexes": ["male"]}
     yield "accommodation", Call(partial(wb.accommodation, jobs=1, progress=lambda told: True), counted)
-    upright, work = person.figure.neutral, wb.Work(load=5.0)
+    upright, work = person.figure.neutral, wb.ergonomics.Work(load=5.0)
     posed = {"figure": person.figure, "q": upright, "work": work}
-    for judge in (wb.rula, wb.reba, wb.owas):
+    for judge in (wb.ergonomics.rula, wb.ergonomics.reba, wb.ergonomics.owas):
         yield judge.__name__, Call(judge, posed)
-    yield "ergonomics_of", Call(wb.ergonomics_of, {**posed, "strength": wb.Strength()})
-    yield "body_angles", Call(wb.body_angles, {"figure": person.figure, "q": upright}, lambda made: made.side("left"))
+    yield "ergonomics_of", Call(wb.ergonomics.ergonomics_of, {**posed, "strength": wb.motion.Strength()})
+    yield (
+        "body_angles",
+        Call(wb.ergonomics.body_angles, {"figure": person.figure, "q": upright}, lambda made: made.side("left")),
+    )
     yield (
         "static_torques",
-        Call(wb.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
+        Call(wb.ergonomics.static_torques, {"figure": person.figure, "q": upright, "load": 5.0, "seated": True}),
     )
-    scored = wb.ergonomics_of(person.figure, upright)
+    scored = wb.ergonomics.ergonomics_of(person.figure, upright)
     yield "BodyAngles.side", Call(scored.angles.side, {"name": "left"})
     yield "StaticTorques.of_side", Call(scored.torques.of_side, {"side": "left"})
     yield "Ergonomics.rows", Call(scored.rows, {})
     yield "Ergonomics.summary", Call(scored.summary, {})
     yield "Ergonomics.colors", Call(scored.colors, {"figure": person.figure})
     yield "Work.sits", Call(work.sits, {"angles": scored.angles})
-    yield "FieldOfView.off", Call(wb.FieldOfView().off, {"direction": (1.0, 0.0, 0.0)})
+    yield "FieldOfView.off", Call(wb.ergonomics.FieldOfView().off, {"direction": (1.0, 0.0, 0.0)})
     lifted = {"figure": person.figure, "origin": upright, "destination": upright, "floor": 0.1}
-    yield "lift_between", Call(wb.lift_between, lifted)
+    yield "lift_between", Call(wb.ergonomics.lift_between, lifted)
     lift = {"horizontal": 0.3, "vertical": 0.7, "travel": 0.3, "asymmetry": 0.1, "frequency": 1.0, "duration": 1.0}
-    yield "Lift", Call(wb.Lift, {**lift, "coupling": "good", "load": 5.0}, lambda made: (made.limit, made.index))
-    yield "Work", Call(wb.Work, {"load": 5.0, "static": True, "coupling": "good", "seated": None})
-    yield "sight", Call(wb.sight, {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.FieldOfView()})
+    yield (
+        "Lift",
+        Call(wb.ergonomics.Lift, {**lift, "coupling": "good", "load": 5.0}, lambda made: (made.limit, made.index)),
+    )
+    yield "Work", Call(wb.ergonomics.Work, {"load": 5.0, "static": True, "coupling": "good", "seated": None})
+    yield (
+        "sight",
+        Call(
+            wb.ergonomics.sight,
+            {"scene": person, "q": upright, "point": (1.0, 0.0, 1.5), "field": wb.ergonomics.FieldOfView()},
+        ),
+    )
     cone = {"horizontal": 0.5, "up": 0.5, "down": 0.5, "declination": 0.2}
-    yield "FieldOfView", Call(wb.FieldOfView, cone, lambda made: made.off(np.array((1.0, 0.0, 0.0))))
+    yield "FieldOfView", Call(wb.ergonomics.FieldOfView, cone, lambda made: made.off(np.array((1.0, 0.0, 0.0))))
     yield (
         "RulaParts",
-        Call(wb.RulaParts, dict.fromkeys(list(wb.RulaParts.__dataclass_fields__), 1), lambda made: made.score),
+        Call(
+            wb.ergonomics.RulaParts,
+            dict.fromkeys(list(wb.ergonomics.RulaParts.__dataclass_fields__), 1),
+            lambda made: made.score,
+        ),
     )
     yield (
         "RebaParts",
-        Call(wb.RebaParts, dict.fromkeys(list(wb.RebaParts.__dataclass_fields__), 1), lambda made: made.score),
+        Call(
+            wb.ergonomics.RebaParts,
+            dict.fromkeys(list(wb.ergonomics.RebaParts.__dataclass_fields__), 1),
+            lambda made: made.score,
+        ),
     )
-    yield "Owas", Call(wb.Owas, {"back": 1, "arms": 1, "legs": 1, "load": 1}, lambda made: made.category)
-    record = wb.SolveRecord("a")
-    yield "Records", Call(wb.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows()))
-    for method in (wb.Trajectory, wb.PerFrame, wb.Fade, wb.Bisection):
+    yield "Owas", Call(wb.ergonomics.Owas, {"back": 1, "arms": 1, "legs": 1, "load": 1}, lambda made: made.category)
+    record = wb.studies.SolveRecord("a")
+    yield (
+        "Records",
+        Call(wb.studies.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows())),
+    )
+    for method in (wb.motion.Trajectory, wb.motion.PerFrame, wb.motion.Fade, wb.motion.Bisection):
         yield f"{method.__name__}.avoid", Call(method().avoid, avoided)
     settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
-    settings |= {"stretch": 1.5, "dynamics": wb.Strength()}
-    yield "Trajectory", Call(wb.Trajectory, settings)
-    yield "PerFrame", Call(wb.PerFrame, {"clearance": 0.01, "backward": True})
-    yield "Fade", Call(wb.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
+    settings |= {"stretch": 1.5, "dynamics": wb.motion.Strength()}
+    yield "Trajectory", Call(wb.motion.Trajectory, settings)
+    yield "PerFrame", Call(wb.motion.PerFrame, {"clearance": 0.01, "backward": True})
+    yield "Fade", Call(wb.motion.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2})
     bisection = {
         "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
         "room": 0.01, "method": "qp",
     }  # fmt: skip
-    yield "Bisection", Call(wb.Bisection, bisection)
+    yield "Bisection", Call(wb.motion.Bisection, bisection)
     worn = {"name": "bag", "shape": wb.Sphere(0.1), "to": "link2", "at": at, "rests_on": ("link1",), "color": None}
-    yield "Equipment", Call(wb.Equipment, worn, lambda made: made.attach(wb.Scene(arm)))
-    bag = wb.Equipment("bag", wb.Box((0.1, 0.1, 0.1)), "link2")
+    yield "Equipment", Call(wb.motion.Equipment, worn, lambda made: made.attach(wb.Scene(arm)))
+    bag = wb.motion.Equipment("bag", wb.Box((0.1, 0.1, 0.1)), "link2")
     yield "Equipment.filled", Call(bag.filled, {"count": 1, "envelope": False})
     yield "Equipment.attach", Call(lambda scene: bag.attach(scene), {"scene": wb.Scene(arm)})
     put = {"shape": wb.Sphere(0.1), "figure": hand, "name": "bag", "to": "left_hand", "side": "back"}
     put |= {"height": 0.0, "sideways": 0.0, "color": None}
-    yield "Equipment.worn", Call(wb.Equipment.worn, put)
-    yield "equipment", Call(wb.equipment, {"name": "pack", "figure": hand})
+    yield "Equipment.worn", Call(wb.motion.Equipment.worn, put)
+    yield "equipment", Call(wb.motion.equipment, {"name": "pack", "figure": hand})
     yield "fill_with_spheres", Call(fill_with_spheres, {"shape": wb.Sphere(0.1), "count": 1, "envelope": False})
     yield "Spheres", Call(Spheres, {"centers": [[0.0, 0.0, 0.0]], "radii": [0.1]})
     yield "Spheres.pieces", Call(Spheres([[0.0, 0.0, 0.0]], [0.1]).pieces, {})
     stance = {"feet": ["link1"], "speed": 0.1, "height": 0.05, "least": 0.1}
-    yield "MotionBounds", Call(wb.MotionBounds, {"jerk": 2.0, "speed": 1.5, "deviation": 0.5, "keep_ends": True})
-    yield "StanceFeet", Call(wb.StanceFeet, stance, lambda made: made.names(arm))
-    yield "StanceFeet.names", Call(wb.StanceFeet(["link1"]).names, {"figure": arm})
+    yield "MotionBounds", Call(wb.motion.MotionBounds, {"jerk": 2.0, "speed": 1.5, "deviation": 0.5, "keep_ends": True})
+    yield "StanceFeet", Call(wb.motion.StanceFeet, stance, lambda made: made.names(arm))
+    yield "StanceFeet.names", Call(wb.motion.StanceFeet(["link1"]).names, {"figure": arm})
     yield "timeline", Call(timeline, {"found": wb.check(clip), "scene": wb.Scene(arm)})
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):

@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from functools import cache
 from graphlib import TopologicalSorter
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -48,11 +49,21 @@ def test_an_unknown_name_is_an_attribute_error() -> None:
         _ = wholebody.no_such_name  # type: ignore[attr-defined]
 
 
-def test_names_for_type_checkers_are_the_names_that_load() -> None:
-    tree = ast.parse((PACKAGE / "__init__.py").read_text())
+@pytest.mark.parametrize("package", ["", *(f".{room}" for room in wholebody._ROOMS)])
+def test_names_for_type_checkers_are_the_names_that_load(package: str) -> None:
+    module = import_module(f"wholebody{package}")
+    tree = ast.parse(Path(str(module.__file__)).read_text())
     imports = [node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module != "typing"]
     stated = {alias.name: node.module for node in imports for alias in node.names}
-    assert {name: stated[name] for name in wholebody._HOME} == wholebody._HOME
+    for name in set(module.__all__) & stated.keys() - set(wholebody._ROOMS):
+        value = getattr(module, name)
+        assert value is getattr(import_module(str(stated[name])), name)
+        assert name == "__version__" or value.__doc__
+    assert set(module.__all__) <= set(dir(module))
+
+
+def test_some_sixty_names_stand_on_top() -> None:
+    assert len(dir(wholebody)) < 85
 
 
 def test_importing_loads_nothing_heavy() -> None:

@@ -184,7 +184,9 @@ def test_clearances_that_none_can_keep_are_refused_by_every_run(value: float) ->
             run(problem)
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), wb.CCD(), wb.DampedLeastSquares()], ids=lambda one: one.name)
+@pytest.mark.parametrize(
+    "method", [wb.QP(), wb.Newton(), wb.methods.CCD(), wb.methods.DampedLeastSquares()], ids=lambda one: one.name
+)
 @pytest.mark.parametrize("shape", [(3,), (1,), (0, 1)], ids=str)
 def test_clearances_of_another_shape_are_refused_by_every_method(method, shape):
     scene = wb.Scene(wb.load("hand"))

@@ -39,7 +39,7 @@ PLACES = {"within reach": (0.4, -0.25, 1.15), "out of reach": (1.1, 0.3, 1.5), "
     [
         wb.QP(budget=60, restarts=3, time_limit=None),
         wb.QP(solver="daqp", budget=60, restarts=3, time_limit=None),
-        wb.DampedLeastSquares(iterations=30, time_limit=None),
+        wb.methods.DampedLeastSquares(iterations=30, time_limit=None),
     ],
     ids=lambda method: method.name,
 )
@@ -64,9 +64,9 @@ def test_so_it_is_for_the_other_methods(scene: wb.Scene, name: str) -> None:
         return wb.Problem(scene, goals=[wb.Point("right_index_tip", PLACES[place])], constraints=holds)
 
     methods = {
-        "ccd": wb.CCD(restarts=1, iterations=40, time_limit=None),
+        "ccd": wb.methods.CCD(restarts=1, iterations=40, time_limit=None),
         "newton": wb.Newton(restarts=0, iterations=4, time_limit=None),
-        "placo": wb.Placo(iterations=10, time_limit=None),
+        "placo": wb.methods.Placo(iterations=10, time_limit=None),
     }
     method, problems = methods[name], [asked(place) for place in PLACES]
     before = [method.solve(one).q for one in problems]

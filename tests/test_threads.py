@@ -76,10 +76,10 @@ def same(one: wb.Solution, other: wb.Solution) -> bool:
 METHODS = {  # and how often the problems within reach are solved again
     "qp/osqp": (wb.QP(budget=20, restarts=1, time_limit=None), 1),
     "qp/daqp": (wb.QP(solver="daqp", budget=20, restarts=1, time_limit=None), 1),
-    "dls": (wb.DampedLeastSquares(iterations=40, time_limit=None), 3),
+    "dls": (wb.methods.DampedLeastSquares(iterations=40, time_limit=None), 3),
     "newton": (wb.Newton(restarts=0, iterations=4, time_limit=None), 0),
-    "placo": (wb.Placo(iterations=20, time_limit=None), 0),
-    "ccd": (wb.CCD(restarts=0, iterations=40, time_limit=None), 1),
+    "placo": (wb.methods.Placo(iterations=20, time_limit=None), 0),
+    "ccd": (wb.methods.CCD(restarts=0, iterations=40, time_limit=None), 1),
 }
 
 
@@ -263,10 +263,10 @@ def test_a_pool_keeps_no_more_than_it_is_allowed() -> None:
     "method",
     [
         wb.QP(time_limit=None),
-        wb.CCD(time_limit=None),
+        wb.methods.CCD(time_limit=None),
         wb.Newton(time_limit=None),
-        wb.Placo(time_limit=None),
-        wb.DampedLeastSquares(time_limit=None),
+        wb.methods.Placo(time_limit=None),
+        wb.methods.DampedLeastSquares(time_limit=None),
     ],
 )
 def test_settings_of_methods_cannot_be_changed_and_hold_no_run(method: Any, scene: wb.Scene) -> None:

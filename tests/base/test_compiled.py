@@ -200,7 +200,7 @@ figure = wb.load("hand")
 tip = wb.Point("right_index_tip", (0.1, 0.0, 0.1))
 free = wb.Scene(figure)
 steps(wb.Problem(free, goals=[tip]), 2)
-wb.solve(wb.Problem(free, goals=[tip]), wb.CCD(iterations=3, restarts=0))
+wb.solve(wb.Problem(free, goals=[tip]), wb.methods.CCD(iterations=3, restarts=0))
 figure = wb.load(sys.argv[1])
 near = set()
 for boxes in range(3):

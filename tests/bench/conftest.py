@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import pytest
 
 from wholebody.bench import plot_style
-from wholebody.bench.track import Track, track
+from wholebody.bench.measure.track import Track, track
 
 
 @pytest.fixture(scope="session", autouse=True)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.bench.adapters.base import Tool
-from wholebody.bench.adapters.registry import make_tool
-from wholebody.bench.track import Track, Verdict, judge
+from wholebody.bench.measure.track import Track, Verdict, judge
+from wholebody.bench.suite.adapters.base import Tool
+from wholebody.bench.suite.adapters.registry import make_tool
 
 
 def followed(name: str, reach: Track) -> tuple[Tool, Verdict]:

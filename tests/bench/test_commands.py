@@ -8,13 +8,12 @@ from pathlib import Path
 import pytest
 
 from wholebody.bench import plot_style
-from wholebody.bench.adapters.registry import STEPPING
-from wholebody.bench.person_cost import PersonCostRow
-from wholebody.bench.reaches import ReachRow
-from wholebody.bench.solve import MemoryRow, SolveRow
-from wholebody.bench.step import StepRow, StepTime
+from wholebody.bench.measure.reaches import ReachRow
+from wholebody.bench.measure.solve import MemoryRow, SolveRow
+from wholebody.bench.measure.step import StepRow, StepTime
+from wholebody.bench.measure.track import VARIANTS
+from wholebody.bench.suite.adapters.registry import STEPPING
 from wholebody.bench.tables import read_rows
-from wholebody.bench.track import VARIANTS
 from wholebody.cli.bench import add_to
 
 MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
@@ -37,8 +36,7 @@ def docs(tmp_path: Path) -> Path:
 
 def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     reaches = VARIANTS[1:]
-    monkeypatch.setattr("wholebody.cli.bench.methods.PAIRS_OF_RUNS", 2)
-    monkeypatch.setattr("wholebody.bench.track.VARIANTS", reaches)
+    monkeypatch.setattr("wholebody.bench.measure.track.VARIANTS", reaches)
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0
@@ -54,12 +52,8 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
         assert row.tool != "placo" or row.ratio.value == row.ratio_p95.value == 1.0
     _, times = read_rows(tmp_path / "out" / "step-times.csv", StepTime)
     assert len(times) == len(reaches) * 2 * 2 * 6
-    _, costs = read_rows(tmp_path / "out" / "step-person.csv", PersonCostRow)
-    assert [row.what for row in costs] == [*(f"{reach} step" for reach in reaches), "shelf solve"]
-    assert all(row.ratio.low <= row.ratio.value <= row.ratio.high for row in costs)
     page = (docs / "results.md").read_text()
     assert "| placo |" in page
-    assert "| shelf solve |" in page
     assert "assets/bench/step-times.svg" in page
     assert (docs / "assets" / "bench" / "step-times.svg").read_text().startswith("<?xml")
     assert (tmp_path / "out" / "step-distances.png").read_bytes().startswith(b"\x89PNG")
@@ -68,7 +62,7 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
 
 def test_reaches(tmp_path: Path, docs: Path) -> None:
     words = ("--count", "2", "--first", "5", "--methods", "qp/daqp", "--out", str(tmp_path / "out"))
-    assert bench("reaches", *words, "--update-docs", str(docs)) == 0
+    assert bench("solve", "--parts", "reaches", *words, "--update-docs", str(docs)) == 0
     _, rows = read_rows(tmp_path / "out" / "reaches.csv", ReachRow)
     assert [row.seed for row in rows] == [5, 6]
     assert "seeds 5 to 6" in (docs / "results.md").read_text()
@@ -83,7 +77,7 @@ def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: py
     monkeypatch.setattr(plot_style, "save", fails)
     out = tmp_path / "out"
     with pytest.raises(RuntimeError, match="no chart"):
-        bench("reaches", "--count", "1", "--first", "5", "--methods", "qp/daqp", "--out", str(out))
+        bench("solve", "--parts", "reaches", "--count", "1", "--first", "5", "--methods", "qp/daqp", "--out", str(out))
     _, rows = read_rows(out / "reaches.csv", ReachRow)
     assert [row.seed for row in rows] == [5]
     assert (out / "reaches.md").is_file()
@@ -107,7 +101,7 @@ def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("wholebody.cli.demo.packaged_tasks", lambda: {"shelf": task})
     monkeypatch.setenv("WHOLEBODY_CHROMIUM", str(tmp_path / "none"))
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
-    assert bench("solve", *words) == 0
+    assert bench("solve", "--parts", "task", *words) == 0
     _, rows = read_rows(tmp_path / "out" / "solve.csv", SolveRow)
     assert [row.way for row in rows] == ["cold", "warm"]
     assert all(row.median_ms > 0.0 and row.pairs > 0 for row in rows)
@@ -117,7 +111,7 @@ def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.Monke
 
 
 def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
-    from wholebody.bench import step as steps
+    from wholebody.bench.measure import step as steps
 
     times = [
         StepTime(reach, tool, 1, step, 100.0 + 13.0 * step, 90.0, 20.0 - step)
@@ -131,7 +125,7 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_a_tool_that_does_not_take_a_figure_is_named_in_the_chart(tmp_path: Path) -> None:
-    from wholebody.bench import step as steps
+    from wholebody.bench.measure import step as steps
 
     times = [StepTime(reach, "wholebody", 1, 1, 100.0, 90.0, 20.0) for reach in ("arm, free", "robot, free")]
     times += [StepTime("arm, free", "mink", 1, 1, 300.0, 290.0, 20.0)]
@@ -145,7 +139,7 @@ def test_every_tool_has_a_colour_of_its_own() -> None:
     assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
 
 
-@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("reaches", "--count", "0"), ("solve", "--count", "-1")])
+@pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--jobs", "0"), ("solve", "--count", "-1")])
 def test_counts_below_one_are_refused(words: tuple[str, ...]) -> None:
     with pytest.raises(ValueError, match="give 1 or more"):
         bench(*words)

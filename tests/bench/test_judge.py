@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.bench.track import DT, Track, judge
+from wholebody.bench.measure.track import DT, Track, judge
 
 
 def test_standing_still_is_judged_as_standing_still(short_free: Track) -> None:

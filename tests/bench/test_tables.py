@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 
 from wholebody.base.errors import FileFormatError
 from wholebody.bench.machine import machine, sentence
+from wholebody.bench.measure.step import StepRow
+from wholebody.bench.measure.step_goals import goal_lines
 from wholebody.bench.statistics import NOTHING, Interval
-from wholebody.bench.step import StepRow
-from wholebody.bench.step_goals import goal_lines
 from wholebody.bench.tables import filled, of, read_rows, replace_section, write_rows
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"

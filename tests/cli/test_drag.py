@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.task_text import box, figure, point, table
-from wholebody.bench.drag import DragFrameRow
+from wholebody.bench.measure.drag import DragFrameRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 

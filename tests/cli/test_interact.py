@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from wholebody.bench.interaction import FrameRow
+from wholebody.bench.measure.interaction import FrameRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 from wholebody.tracking import SCENES

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from wholebody.bench.measure.world_runs import WorldFrameRow
 from wholebody.bench.tables import read_rows
-from wholebody.bench.world_runs import WorldFrameRow
 from wholebody.cli import main
 from wholebody.dynamics.scenes import WORLD_SCENES
 

@@ -9,10 +9,10 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.world.closed_forms import colliding
-from wholebody.bench.world.drops import drops
-from wholebody.bench.world.engines import ENGINES
-from wholebody.bench.world.measuring import Judge
+from wholebody.bench.measure.world.closed_forms import colliding
+from wholebody.bench.measure.world.drops import drops
+from wholebody.bench.measure.world.engines import ENGINES
+from wholebody.bench.measure.world.measuring import Judge
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
 
@@ -49,7 +49,7 @@ def test_free_collisions_conserve_momentum(hand: wb.Figure, seed: int) -> None:
 
 
 def test_one_ball_of_newtons_cradle_leaves_as_fast_as_one_came(hand: wb.Figure) -> None:
-    steel = wb.Material("steel", others=(1.0, 0.0))
+    steel = wb.dynamics.Material("steel", others=(1.0, 0.0))
     pitch = 0.1 + SKIN
     row = [(wb.Sphere(0.05), (AWAY + pitch * k, 0, 0), wb.Body(8e3, material=steel)) for k in range(1, 5)]
     engine = still(
@@ -64,7 +64,7 @@ def test_one_ball_of_newtons_cradle_leaves_as_fast_as_one_came(hand: wb.Figure) 
 def test_an_oblique_impact_is_that_of_the_papers_equations(hand: wb.Figure) -> None:
     """A spinning rod strikes a ball off its centre, with sliding friction: eqs. 8 to 10 by hand."""
     e, mu = 0.4, 0.05
-    stuff = wb.Material("stuff", others=(e, mu))
+    stuff = wb.dynamics.Material("stuff", others=(e, mu))
     v, w = np.array([-3.0, 1.0, 0.0]), np.array([0.0, 0.0, 2.0])
     ball = wb.Body(mass=0.5, material=stuff, velocity=tuple(v), angular_velocity=tuple(w))
     start = AWAY + 0.2 + 0.05
@@ -100,7 +100,7 @@ def test_an_oblique_impact_is_that_of_the_papers_equations(hand: wb.Figure) -> N
 
 @pytest.mark.parametrize(("share", "friction"), [(0.0, 0.0), (0.5, 0.5), (1.0, 0.0), (1.0, 1.0)])
 def test_a_heap_never_gains_energy_and_stays_apart(hand: wb.Figure, share: float, friction: float) -> None:
-    stuff = wb.Material("stuff", others=(share, friction))
+    stuff = wb.dynamics.Material("stuff", others=(share, friction))
     scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
     rng = np.random.default_rng(3)
     for k in range(8):
@@ -183,7 +183,7 @@ def test_the_case_of_kane_and_levinson_gains_nothing(hand: wb.Figure) -> None:
     turned = pin.utils.rotate("y", 0.7)
     tip = turned @ np.array([0.0, 0.0, -half]) - (0.0, 0.0, radius)
     velocity = np.array([0.2, 0.0, -3.0])
-    body = wb.Body(mass=mass, material=wb.Material("stuff", others=(share, mu)), velocity=tuple(velocity))
+    body = wb.Body(mass=mass, material=wb.dynamics.Material("stuff", others=(share, mu)), velocity=tuple(velocity))
     place = pin.SE3(turned, np.array([AWAY, 0.0, -2.0 + 2.0 * SKIN]) - tip)
     engine = RigidBodies(scene.add(wb.Capsule(radius, 2.0 * half), name="rod", at=place, body=body))
     # about an axis across the rod: a cylinder, and a ball cut in half at its ends
@@ -208,7 +208,7 @@ def test_the_case_of_kane_and_levinson_gains_nothing(hand: wb.Figure) -> None:
 
 def test_a_rod_on_its_tip_ends_though_its_friction_is_painleves(hand: wb.Figure) -> None:
     """A thin rod slides on its tip with mu above 4/3, where a rigid rod has no acceleration at all."""
-    rough = wb.Material("rough", others=(0.0, 2.0))
+    rough = wb.dynamics.Material("rough", others=(0.0, 2.0))
     scene = wb.Scene(hand).add(wb.HalfSpace(offset=-2.0), name="floor")
     turned = pin.utils.rotate("y", -0.6)
     half = 0.5
@@ -243,7 +243,7 @@ def test_a_rattleback_ends(hand: wb.Figure) -> None:
 def test_a_ball_rolls_down_a_slope_by_five_sevenths(hand: wb.Figure) -> None:
     angle = 0.2
     normal = np.array([np.sin(angle), 0.0, np.cos(angle)])
-    rough = wb.Material("rough", others=(0.0, 0.5))
+    rough = wb.dynamics.Material("rough", others=(0.0, 0.5))
     scene = wb.Scene(hand).add(wb.HalfSpace(tuple(normal), -2.0), name="slope")
     start = normal * (-2.0 + 0.1 + SKIN)
     scene.add(wb.Sphere(0.1), name="ball", at=start, body=wb.Body(material=rough))

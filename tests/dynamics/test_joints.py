@@ -37,7 +37,7 @@ def swung(angle: float, half: float) -> pin.SE3:
 def test_a_pendulum_has_the_period_of_the_elliptic_integral(hand: wb.Figure, angle: float, kind: str) -> None:
     size, half = (0.06, 0.04, 0.8), 0.4
     top = (0.0, 0.0, half)
-    joint = wb.BallJoint(top) if kind == "ball" else wb.Hinge(top, axis=(0.0, 2.0, 0.0))
+    joint = wb.dynamics.BallJoint(top) if kind == "ball" else wb.dynamics.Hinge(top, axis=(0.0, 2.0, 0.0))
     scene = wb.Scene(hand).add(wb.Box(size), name="rod", at=swung(angle, half), body=wb.Body(joints=[joint]))
     engine = RigidBodies(scene)
     about = (size[0] ** 2 + size[2] ** 2) / 12.0 + half**2
@@ -62,7 +62,7 @@ def test_a_double_pendulum_keeps_its_energy_and_its_joints(hand: wb.Figure) -> N
     for number, to in ((1, None), (2, "rod 1")):
         place = AWAY + np.array([0.5 * number - 0.25, 0.0, 0.0])
         turned = pin.SE3(pin.utils.rotate("y", -0.5 * np.pi), place)
-        joint = wb.BallJoint((0.0, 0.0, 0.25), to=to)
+        joint = wb.dynamics.BallJoint((0.0, 0.0, 0.25), to=to)
         scene.add(wb.Box((0.05, 0.05, 0.5)), name=f"rod {number}", at=turned, body=wb.Body(joints=joint))
     engine = RigidBodies(scene)
     engine.push("rod 2", np.array([0.0, 0.3, 0.0]), AWAY + (1.0, 0.0, 0.0))  # out of the plane too
@@ -82,9 +82,9 @@ def test_a_double_pendulum_keeps_its_energy_and_its_joints(hand: wb.Figure) -> N
 
 @pytest.mark.parametrize("share", [0.0, 0.6])
 def test_a_ball_that_strikes_a_door_turns_it_as_momentum_about_the_hinge_says(hand: wb.Figure, share: float) -> None:
-    stuff = wb.Material("stuff", others=(share, 0.0))
+    stuff = wb.dynamics.Material("stuff", others=(share, 0.0))
     size, radius, speed, out = (0.04, 0.9, 2.0), 0.1, 3.0, 0.3
-    door = wb.Body(mass=20.0, material=stuff, joints=[wb.Hinge((0.0, -0.45, 0.0), axis=(0.0, 0.0, 1.0))])
+    door = wb.Body(mass=20.0, material=stuff, joints=[wb.dynamics.Hinge((0.0, -0.45, 0.0), axis=(0.0, 0.0, 1.0))])
     ball = wb.Body(mass=2.0, material=stuff, velocity=(speed, 0.0, 0.0))
     scene = wb.Scene(hand).add(wb.Box(size), name="door", at=AWAY, body=door)
     scene.add(wb.Sphere(radius), name="ball", at=AWAY + (-0.3, out, 0.0), body=ball)
@@ -104,7 +104,7 @@ def test_a_ball_that_strikes_a_door_turns_it_as_momentum_about_the_hinge_says(ha
 
 def test_a_door_against_a_wall_stays_on_its_hinge(hand: wb.Figure) -> None:
     door = wb.Body(mass=20.0, angular_velocity=(0.0, 0.0, 3.0), velocity=(-1.35, 0.0, 0.0),
-                   joints=[wb.Hinge((0.0, -0.45, 0.0))])  # fmt: skip
+                   joints=[wb.dynamics.Hinge((0.0, -0.45, 0.0))])  # fmt: skip
     scene = wb.Scene(hand).add(wb.Box((0.04, 0.9, 2.0)), name="door", at=AWAY, body=door)
     scene.add(wb.Box((0.2, 0.2, 2.0)), name="stop", at=AWAY + (-0.5, 0.3, 0.0))
     engine = RigidBodies(scene)
@@ -123,9 +123,9 @@ def test_a_door_against_a_wall_stays_on_its_hinge(hand: wb.Figure) -> None:
 
 @pytest.mark.parametrize("friction", [0.0, 0.3])
 def test_a_door_bounces_off_a_wall_that_it_touches_beside_its_hinge(hand: wb.Figure, friction: float) -> None:
-    stuff = wb.Material("stuff", others=(0.3, friction))
+    stuff = wb.dynamics.Material("stuff", others=(0.3, friction))
     door = wb.Body(mass=12.0, material=stuff, angular_velocity=(0.0, 0.0, -5.0), velocity=(2.25, 0.0, 0.0),
-                   joints=[wb.Hinge((0.0, -0.45, 0.0))])  # fmt: skip
+                   joints=[wb.dynamics.Hinge((0.0, -0.45, 0.0))])  # fmt: skip
     scene = wb.Scene(hand).add(wb.Box((0.04, 0.9, 2.0)), name="door", at=AWAY, body=door)
     scene.add(wb.Box((0.1, 0.5, 2.1)), name="wall", at=AWAY - (0.0, 0.73, 0.0))
     engine = RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
@@ -138,7 +138,7 @@ def test_a_chain_on_a_thing_that_is_moved_follows_it(hand: wb.Figure) -> None:
     scene = wb.Scene(hand).add(wb.Box((0.1, 0.1, 0.1)), name="beam", at=AWAY)
     above = "beam"
     for number in range(5):
-        body = wb.Body(joints=[wb.BallJoint((0.0, 0.0, 0.06), to=above)])
+        body = wb.Body(joints=[wb.dynamics.BallJoint((0.0, 0.0, 0.06), to=above)])
         place = AWAY - (0.0, 0.0, 0.06 + 0.12 * number)
         scene.add(wb.Capsule(0.01, 0.09), name=(above := f"link {number}"), at=place, body=body)
     engine = RigidBodies(scene)
@@ -154,7 +154,7 @@ def test_a_chain_on_a_thing_that_is_moved_follows_it(hand: wb.Figure) -> None:
 
 
 def test_an_impulse_on_a_door_moves_it_by_its_inertia_about_the_hinge(hand: wb.Figure) -> None:
-    door = wb.Body(mass=20.0, joints=[wb.Hinge((0.0, -0.45, 0.0))])
+    door = wb.Body(mass=20.0, joints=[wb.dynamics.Hinge((0.0, -0.45, 0.0))])
     engine = RigidBodies(wb.Scene(hand).add(wb.Box((0.04, 0.9, 2.0)), name="door", at=AWAY, body=door))
     about = 20.0 * (0.04**2 + 0.9**2) / 12.0 + 20.0 * 0.45**2
     point = AWAY + (0.0, 0.4, 0.2)
@@ -167,13 +167,15 @@ def test_an_impulse_on_a_door_moves_it_by_its_inertia_about_the_hinge(hand: wb.F
 
 def test_wrong_joints_are_one_sentence(hand: wb.Figure) -> None:
     def scene(to: str) -> wb.Scene:
-        return wb.Scene(hand).add(wb.Sphere(0.1), name="bag", at=AWAY, body=wb.Body(joints=[wb.BallJoint(to=to)]))
+        return wb.Scene(hand).add(
+            wb.Sphere(0.1), name="bag", at=AWAY, body=wb.Body(joints=[wb.dynamics.BallJoint(to=to)])
+        )
 
     with pytest.raises(UnknownNameError, match="the joint of 'bag'"):
         RigidBodies(scene("beam"))
     with pytest.raises(InputError, match="'bag' has a joint to itself"):
         RigidBodies(scene("bag"))
     with pytest.raises(InputError, match=r"Hinge axis is .*give a direction"):
-        wb.Hinge(axis=(0.0, 0.0, 0.0))
+        wb.dynamics.Hinge(axis=(0.0, 0.0, 0.0))
     with pytest.raises(InputError, match="Body joints"):
         wb.Body(joints=["hinge"])  # type: ignore[list-item]

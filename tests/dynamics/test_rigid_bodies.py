@@ -25,7 +25,7 @@ def floor(hand: wb.Figure, normal: tuple[float, float, float] = (0.0, 0.0, 1.0))
 
 def test_a_ball_bounces_as_the_closed_form_says(hand: wb.Figure) -> None:
     share, height = 0.5, 1.0
-    rubber = wb.Material("rubber", others=(share, 0.3))
+    rubber = wb.dynamics.Material("rubber", others=(share, 0.3))
     scene = floor(hand).add(wb.Sphere(0.05), name="ball", at=(3, 0, height - 1.95), body=wb.Body(1e3, material=rubber))
     engine = RigidBodies(scene)
     first = np.sqrt(2.0 * (height - SKIN) / G)

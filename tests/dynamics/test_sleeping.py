@@ -111,7 +111,7 @@ def test_what_is_put_into_a_sleeper_wakes_it() -> None:
 
 def test_a_sleeper_hangs_on_what_holds_it() -> None:
     scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 0.1, 0.1)), name="beam", at=(3.0, 0.0, 2.0))
-    held = wb.BallJoint(at=(0.0, 0.0, 0.8), to="beam")
+    held = wb.dynamics.BallJoint(at=(0.0, 0.0, 0.8), to="beam")
     scene.add(wb.Capsule(0.15, 0.5), name="bag", at=(3.0, 0.0, 1.2), body=wb.Body(mass=15.0, joints=[held]))
     engine = asleep(scene, frames=60)
     for k in range(40):

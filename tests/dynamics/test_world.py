@@ -251,7 +251,7 @@ def test_things_that_a_joint_holds_together_and_half_spaces_are_no_overlap(plana
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3)))
     scene.add(wb.HalfSpace((0.0, 0.0, 1.0), -2.0), name="floor").add(wb.HalfSpace((0.0, -1.0, 0.0), -3.0), name="wall")
     scene.add(wb.Box((0.2, 0.2, 0.2)), name="post", at=(2.0, 0.0, 0.0))
-    hinge = wb.Hinge(at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), to="post")
+    hinge = wb.dynamics.Hinge(at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), to="post")
     scene.add(wb.Box((0.5, 0.1, 0.5)), name="door", at=(2.1, 0.0, 0.0), body=wb.Body(mass=5.0, joints=[hinge]))
     made = wb.World(scene, np.zeros(3)).step()
     assert made.deepest == 0.0

@@ -26,7 +26,7 @@ def test_loading_punch_press_stock(height: float, limit: float, index: float) ->
 
     The manual has 51 lb for 23 kg and 10 in for 25 cm, and rounds each multiplier to two digits, up to 4 % together.
     """
-    lift = wb.Lift(23 * INCH, height * INCH, 48 * INCH, coupling="fair", load=44 * POUND)
+    lift = wb.ergonomics.Lift(23 * INCH, height * INCH, 48 * INCH, coupling="fair", load=44 * POUND)
     assert pounds(lift.limit) == pytest.approx(limit, rel=0.045)
     assert lift.index == pytest.approx(index, abs=0.2)
     assert lift.multipliers["HM"] == pytest.approx(0.44, abs=0.013)
@@ -38,21 +38,21 @@ def test_package_inspection() -> None:
 
     The printed multipliers give the rest: H 10 in, V 22 in, no turn, three lifts a minute for less than an hour, fair.
     """
-    lift = wb.Lift(0.25, 22 * INCH, 37 * INCH, 0.0, 3.0, 1.0, "fair")
+    lift = wb.ergonomics.Lift(0.25, 22 * INCH, 37 * INCH, 0.0, 3.0, 1.0, "fair")
     printed = {"HM": 1.0, "VM": 0.94, "DM": 0.87, "AM": 1.0, "FM": 0.88, "CM": 0.95}
     assert lift.multipliers == pytest.approx(printed, abs=0.007)
     assert pounds(lift.limit) == pytest.approx(34.9, rel=0.015)
 
 
 def test_the_ideal_lift_is_the_load_constant() -> None:
-    lift = wb.Lift(0.25, 0.75, 0.25, load=11.5)
+    lift = wb.ergonomics.Lift(0.25, 0.75, 0.25, load=11.5)
     assert lift.limit == pytest.approx(23.0)
     assert lift.index == pytest.approx(0.5)
 
 
 def test_each_multiplier_by_hand() -> None:
     """By the formulas in centimetres and degrees, and table 5 at 3 lifts a minute for two hours."""
-    lift = wb.Lift(0.5, 0.35, 0.6, radians(45.0), 3.0, 2.0, "poor")
+    lift = wb.ergonomics.Lift(0.5, 0.35, 0.6, radians(45.0), 3.0, 2.0, "poor")
     wanted = {"HM": 0.5, "VM": 0.88, "DM": 0.895, "AM": 0.856, "FM": 0.79, "CM": 0.9}
     assert lift.multipliers == pytest.approx(wanted)
     assert lift.limit == pytest.approx(23.0 * np.prod(list(wanted.values())))
@@ -61,15 +61,15 @@ def test_each_multiplier_by_hand() -> None:
 @pytest.mark.parametrize(
     "lift",
     [
-        wb.Lift(0.64, 0.75, 0.25, load=1.0),
-        wb.Lift(0.25, 1.76, 0.25, load=1.0),
-        wb.Lift(0.25, 0.75, 1.76, load=1.0),
-        wb.Lift(0.25, 0.75, 0.25, radians(136.0), load=1.0),
-        wb.Lift(0.25, 0.75, 0.25, frequency=16.0, load=1.0),
-        wb.Lift(0.25, 0.7, 0.25, frequency=13.0, load=1.0),
+        wb.ergonomics.Lift(0.64, 0.75, 0.25, load=1.0),
+        wb.ergonomics.Lift(0.25, 1.76, 0.25, load=1.0),
+        wb.ergonomics.Lift(0.25, 0.75, 1.76, load=1.0),
+        wb.ergonomics.Lift(0.25, 0.75, 0.25, radians(136.0), load=1.0),
+        wb.ergonomics.Lift(0.25, 0.75, 0.25, frequency=16.0, load=1.0),
+        wb.ergonomics.Lift(0.25, 0.7, 0.25, frequency=13.0, load=1.0),
     ],
 )
-def test_beyond_the_limits_nothing_may_be_lifted(lift: wb.Lift) -> None:
+def test_beyond_the_limits_nothing_may_be_lifted(lift: wb.ergonomics.Lift) -> None:
     assert lift.limit == 0.0
     assert lift.index == inf
 
@@ -89,7 +89,7 @@ def test_a_lift_is_measured_between_two_postures() -> None:
     bent = {"shoulder_flexion": 0.4, "elbow_flexion": 1.2}
     both = {f"{side}_{joint}": value for side in ("left", "right") for joint, value in bent.items()}
     raised = person.with_joints(upright, both)
-    first, second = wb.lift_between(person, upright, raised, load=5.0)
+    first, second = wb.ergonomics.lift_between(person, upright, raised, load=5.0)
     palms = [
         np.mean([person.placement(q, f"{side}_palm").translation for side in ("left", "right")], axis=0)
         for q in (upright, raised)
@@ -103,8 +103,10 @@ def test_a_lift_is_measured_between_two_postures() -> None:
 
 
 def test_a_lift_prints_what_it_says() -> None:
-    lift = wb.Lift(horizontal=0.25, vertical=0.75, travel=0.25, load=11.5)
+    lift = wb.ergonomics.Lift(horizontal=0.25, vertical=0.75, travel=0.25, load=11.5)
     assert str(lift) == "at most 23.0 kg by the NIOSH equation, lifting index 0.50 with 11.5 kg"
-    assert str(wb.Lift(horizontal=0.25, vertical=0.75, travel=0.25)) == "at most 23.0 kg by the NIOSH equation"
-    far = wb.Lift(horizontal=0.64, vertical=0.75, travel=0.25, load=5.0)
+    assert (
+        str(wb.ergonomics.Lift(horizontal=0.25, vertical=0.75, travel=0.25)) == "at most 23.0 kg by the NIOSH equation"
+    )
+    far = wb.ergonomics.Lift(horizontal=0.64, vertical=0.75, travel=0.25, load=5.0)
     assert str(far) == "at most 0.0 kg by the NIOSH equation (HM = 0), lifting index inf with 5 kg"

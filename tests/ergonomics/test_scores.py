@@ -12,9 +12,9 @@ import pytest
 
 import wholebody as wb
 from wholebody.cli.main import main
-from wholebody.ergonomics import owas as owas_module
-from wholebody.ergonomics import reba as reba_module
-from wholebody.ergonomics import rula as rula_module
+from wholebody.ergonomics import owas_score as owas_module
+from wholebody.ergonomics import reba_score as reba_module
+from wholebody.ergonomics import rula_score as rula_module
 
 
 @pytest.fixture(scope="module")
@@ -69,7 +69,7 @@ def test_worse_parts_never_lower_a_score() -> None:
     ],
 )
 def test_rula_by_its_printed_tables(parts: tuple[int, ...], a: int, b: int, score: int) -> None:
-    found = wb.RulaParts(*parts)
+    found = wb.ergonomics.RulaParts(*parts)
     assert (found.arm, found.body, found.score) == (a, b, score)
 
 
@@ -120,26 +120,26 @@ def test_reba_tables_are_those_of_the_printed_worksheet() -> None:
 
 def test_reba_by_the_example_of_a_public_package() -> None:
     """rs9000/ergonomics prints two poses: neck 2, trunk 2, legs 2, upper arm 1, lower arm 2, wrist 3 and 2."""
-    left, right = wb.RebaParts(2, 2, 2, 1, 2, 3), wb.RebaParts(2, 2, 2, 1, 2, 2)
+    left, right = wb.ergonomics.RebaParts(2, 2, 2, 1, 2, 3), wb.ergonomics.RebaParts(2, 2, 2, 1, 2, 2)
     assert (left.body, left.arm, left.score) == (4, 3, 4)
     assert (right.body, right.arm, right.score) == (4, 2, 4)
-    assert wb.RebaParts(3, 5, 4, 6, 2, 3, 3, 3, 3).score == 15
-    assert wb.RebaParts(1, 1, 1, 1, 1, 1).score == 1
+    assert wb.ergonomics.RebaParts(3, 5, 4, 6, 2, 3, 3, 3, 3).score == 15
+    assert wb.ergonomics.RebaParts(1, 1, 1, 1, 1, 1).score == 1
 
 
 def test_owas_by_an_example_of_a_lecture() -> None:
     """A. Freivalds (Pennsylvania State University): 2151 is a bent back, arms below, knees bent, less than 10 kg."""
-    assert wb.Owas(2, 1, 5, 1).category == 3
-    assert wb.Owas(1, 1, 2, 1).category == 1
-    assert wb.Owas(1, 2, 2, 1).category == 1  # the example of rs9000/ergonomics
-    assert wb.Owas(4, 3, 4, 3).category == 4
+    assert wb.ergonomics.Owas(2, 1, 5, 1).category == 3
+    assert wb.ergonomics.Owas(1, 1, 2, 1).category == 1
+    assert wb.ergonomics.Owas(1, 2, 2, 1).category == 1  # the example of rs9000/ergonomics
+    assert wb.ergonomics.Owas(4, 3, 4, 3).category == 4
     codes = itertools.product((1, 2, 3, 4), (1, 2, 3), range(1, 8), (1, 2, 3))
-    assert {wb.Owas(*code).category for code in codes} == {1, 2, 3, 4}
+    assert {wb.ergonomics.Owas(*code).category for code in codes} == {1, 2, 3, 4}
 
 
 def test_angles_are_those_of_the_joints_that_are_turned(person: wb.Figure) -> None:
     for side, other in (("left", "right"), ("right", "left")):
-        angles = wb.body_angles(person, bent(person, **{
+        angles = wb.ergonomics.body_angles(person, bent(person, **{
             f"{side}_shoulder_flexion": 50, f"{side}_elbow_flexion": 80, f"{side}_elbow_pronation": 40,
             f"{side}_wrist_flexion": 25, f"{side}_knee_flexion": 35,
         }))  # fmt: skip
@@ -148,7 +148,7 @@ def test_angles_are_those_of_the_joints_that_are_turned(person: wb.Figure) -> No
         found = np.degrees([*arm, mine.knee_flexion])
         np.testing.assert_allclose(found, [50, 80, 25, 40, 35], atol=1.0)
         assert abs(still.shoulder_flexion) < 1e-6
-    bowed = wb.body_angles(person, bent(person, neck1_flexion=15, spine2_rotation=20))
+    bowed = wb.ergonomics.body_angles(person, bent(person, neck1_flexion=15, spine2_rotation=20))
     assert np.degrees(bowed.neck_flexion) == pytest.approx(15.0, abs=1e-6)
     assert np.degrees(bowed.trunk_twist) == pytest.approx(20.0, abs=1e-6)
 
@@ -159,20 +159,20 @@ def test_angles_do_not_depend_on_where_a_person_stands_and_looks(person: wb.Figu
     moved[:3] += (1.0, -2.0, 0.3)
     half = radians(60.0)
     moved[3:7] = 0.0, 0.0, np.sin(half), np.cos(half)
-    one, other = wb.body_angles(person, q), wb.body_angles(person, moved)
+    one, other = wb.ergonomics.body_angles(person, q), wb.ergonomics.body_angles(person, moved)
     for name in ("trunk_flexion", "trunk_lateral", "trunk_twist", "neck_twist", "left_share"):
         assert getattr(one, name) == pytest.approx(getattr(other, name), abs=1e-9)
     assert one.left.shoulder_flexion == pytest.approx(other.left.shoulder_flexion, abs=1e-9)
 
 
 def test_upright_is_acceptable_and_stooping_is_not(person: wb.Figure) -> None:
-    upright = wb.ergonomics_of(person, person.posture("standing"))
+    upright = wb.ergonomics.ergonomics_of(person, person.posture("standing"))
     assert upright.rula.score <= 2
     assert upright.reba.score == 1
     assert upright.owas.code == "1121"
     stoop = bent(person, left_hip_flexion=70, right_hip_flexion=70, spine1_flexion=15, spine2_rotation=20)
     stoop[3:7] = 0.0, np.sin(radians(35)), 0.0, np.cos(radians(35))
-    stooping = wb.ergonomics_of(person, stoop, wb.Work(load=25.0, repeated=True))
+    stooping = wb.ergonomics.ergonomics_of(person, stoop, wb.ergonomics.Work(load=25.0, repeated=True))
     assert stooping.rula.score == 7
     assert stooping.reba.score == 7  # table A 4 and load 2, table B 1: table C 6, and repeated
     assert stooping.owas.back == 2 or stooping.owas.back == 4
@@ -181,16 +181,16 @@ def test_upright_is_acceptable_and_stooping_is_not(person: wb.Figure) -> None:
 
 
 def test_the_worse_side_is_reported(person: wb.Figure) -> None:
-    raised = wb.rula(person, bent(person, left_shoulder_flexion=100, left_wrist_flexion=40))
+    raised = wb.ergonomics.rula(person, bent(person, left_shoulder_flexion=100, left_wrist_flexion=40))
     assert raised.left.score > raised.right.score
     assert (raised.worse, raised.score) == ("left", raised.left.score)
-    raised = wb.reba(person, bent(person, right_shoulder_flexion=100, right_wrist_flexion=40))
+    raised = wb.ergonomics.reba(person, bent(person, right_shoulder_flexion=100, right_wrist_flexion=40))
     assert raised.worse == "right"
 
 
 @pytest.mark.parametrize(("posture", "legs"), [("standing", 2), ("sitting", 1), ("kneeling", 6), ("squatting", 4)])
 def test_owas_tells_how_a_body_is_carried(person: wb.Figure, posture: str, legs: int) -> None:
-    assert wb.owas(person, person.posture(posture)).legs == legs
+    assert wb.ergonomics.owas(person, person.posture(posture)).legs == legs
 
 
 def gap(scene: wb.Scene, q: np.ndarray, thing: str, segment: str) -> float:
@@ -205,15 +205,15 @@ def test_who_has_a_thing_below_the_pelvis_sits(person: wb.Figure) -> None:
     q = bent(person, left_hip_flexion=35, right_hip_flexion=20, left_knee_flexion=25, right_knee_flexion=5)
     scene = wb.Scene(person).add(wb.Sphere(0.01), name="saddle", at=(0.0, 0.0, q[2] - 0.4))
     scene.move("saddle", at=(0.0, 0.0, q[2] - 0.4 + gap(scene, q, "saddle", "pelvis")))
-    assert wb.owas(person, q).legs == 3  # the posture alone does not tell it
-    found = wb.ergonomics_of(scene, q)
-    assert found.owas.legs == wb.owas(scene, q).legs == 1
-    assert wb.reba(scene, q).left.legs == wb.rula(scene, q).left.legs == 1
+    assert wb.ergonomics.owas(person, q).legs == 3  # the posture alone does not tell it
+    found = wb.ergonomics.ergonomics_of(scene, q)
+    assert found.owas.legs == wb.ergonomics.owas(scene, q).legs == 1
+    assert wb.ergonomics.reba(scene, q).left.legs == wb.ergonomics.rula(scene, q).left.legs == 1
     assert found.seat == "sits, as saddle is below pelvis or thighs"
     assert found.rows()[-1] == ("seat", "", "", found.seat)
-    assert wb.owas(scene, q, wb.Work(seated=False)).legs == 3
+    assert wb.ergonomics.owas(scene, q, wb.ergonomics.Work(seated=False)).legs == 3
     scene.move("saddle", at=(0.0, 0.0, q[2] - 0.4))  # well below: it bears nothing
-    assert wb.ergonomics_of(scene, q).seat == "does not sit, by the posture"
+    assert wb.ergonomics.ergonomics_of(scene, q).seat == "does not sit, by the posture"
 
 
 def test_a_seated_trunk_with_a_back_scores_one_in_rula(person: wb.Figure) -> None:
@@ -222,17 +222,17 @@ def test_a_seated_trunk_with_a_back_scores_one_in_rula(person: wb.Figure) -> Non
     half = radians(-12.5)  # leans back by 25 degrees; the thighs rise with it
     q[3:7] = 0.0, np.sin(half), 0.0, np.cos(half)
     q = person.with_joints(q, {"left_hip_flexion": radians(60), "right_hip_flexion": radians(60)})
-    assert wb.rula(person, q, wb.Work(seated=True)).left.trunk == 3
-    assert wb.rula(person, q, wb.Work(seated=True, back_supported=True)).left.trunk == 1
-    assert wb.rula(person, q, wb.Work(seated=False, back_supported=True)).left.trunk == 3
+    assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=True)).left.trunk == 3
+    assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=True, back_supported=True)).left.trunk == 1
+    assert wb.ergonomics.rula(person, q, wb.ergonomics.Work(seated=False, back_supported=True)).left.trunk == 3
     curled = person.with_joints(q, {"left_hip_flexion": radians(115), "right_hip_flexion": radians(115)})
-    assert wb.rula(person, curled, wb.Work(seated=True, back_supported=True)).left.trunk == 3
+    assert wb.ergonomics.rula(person, curled, wb.ergonomics.Work(seated=True, back_supported=True)).left.trunk == 3
     scene = wb.Scene(person).add(wb.Box((0.1, 1.0, 0.1)), name="backrest", at=(-2.0, 0.0, q[2] + 0.3))
     scene.move("backrest", at=(-2.0 + gap(scene, q, "backrest", "thorax"), 0.0, q[2] + 0.3))
     for _ in range(5):  # the nearest point of a slanted trunk is not straight ahead
         place = scene.objects["backrest"].placement.translation
         scene.move("backrest", at=(place[0] + gap(scene, q, "backrest", "thorax"), 0.0, place[2]))
-    found = wb.ergonomics_of(scene, q, wb.Work(seated=True))
+    found = wb.ergonomics.ergonomics_of(scene, q, wb.ergonomics.Work(seated=True))
     assert found.seat == "sits, as Work says; the back is at backrest"
     assert found.rula.left.trunk == 1
 
@@ -242,23 +242,23 @@ def test_who_leans_at_a_thing_or_lies_on_it_does_not_sit(person: wb.Figure) -> N
     scene = wb.Scene(person).add(wb.Box((0.1, 1.0, 0.1)), name="rail", at=(1.0, 0.0, 0.7))
     scene.move("rail", at=(1.0 - gap(scene, q, "rail", "left_thigh"), 0.0, 0.7))
     assert gap(scene, q, "rail", "left_thigh") < 1e-3
-    assert wb.owas(scene, q).legs == 2
+    assert wb.ergonomics.owas(scene, q).legs == 2
     lying = q.copy()
     lying[3:7] = 0.0, -np.sqrt(0.5), 0.0, np.sqrt(0.5)  # on the back
     scene = wb.Scene(person).add(wb.Box((3.0, 3.0, 0.1)), name="bed")
     scene.move("bed", at=(0.0, 0.0, gap(scene, lying, "bed", "pelvis")))
     assert gap(scene, lying, "bed", "pelvis") < 1e-3
-    assert not wb.ergonomics_of(scene, lying).seat.startswith("sits")
+    assert not wb.ergonomics.ergonomics_of(scene, lying).seat.startswith("sits")
 
 
 def test_one_leg_is_told_from_two(person: wb.Figure) -> None:
     lifted = bent(person, left_hip_flexion=60, left_knee_flexion=60)
-    assert wb.owas(person, lifted).legs == 3
-    assert wb.reba(person, lifted).right.legs == 2
+    assert wb.ergonomics.owas(person, lifted).legs == 3
+    assert wb.ergonomics.reba(person, lifted).right.legs == 2
 
 
 def test_scores_print_as_a_table(person: wb.Figure) -> None:
-    found = wb.ergonomics_of(person, person.posture("standing"))
+    found = wb.ergonomics.ergonomics_of(person, person.posture("standing"))
     head, rula, *rest = str(found).splitlines()
     assert head.split() == ["score", "left", "right", "worse"]
     assert rula.split()[:3] == ["RULA", str(found.rula.left.score), str(found.rula.right.score)]
@@ -266,7 +266,7 @@ def test_scores_print_as_a_table(person: wb.Figure) -> None:
 
 
 def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figure) -> None:
-    found = wb.ergonomics_of(person, bent(person, left_shoulder_flexion=120, left_shoulder_abduction=30))
+    found = wb.ergonomics.ergonomics_of(person, bent(person, left_shoulder_flexion=120, left_shoulder_abduction=30))
     colors = found.colors(person)
     assert set(colors) == set(person.segments)
     assert colors["left_upper_arm"][0] > colors["right_upper_arm"][0]
@@ -275,7 +275,7 @@ def test_colours_are_of_every_segment_and_red_where_it_is_worst(person: wb.Figur
 def test_a_figure_that_is_no_person_is_refused() -> None:
     arm = wb.load(Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf")
     with pytest.raises(wb.InputError, match="load a person"):
-        wb.rula(arm, arm.neutral)
+        wb.ergonomics.rula(arm, arm.neutral)
 
 
 def test_the_command_prints_a_table_and_json(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -19,7 +19,7 @@ def person() -> wb.Figure:
 
 def test_a_load_in_the_palm_is_its_lever_at_the_elbow(person: wb.Figure) -> None:
     q = person.with_joints(person.posture("standing"), {"left_elbow_flexion": radians(90.0)})
-    empty, loaded = (wb.static_torques(person, q, load=load) for load in (0.0, 10.0))
+    empty, loaded = (wb.ergonomics.static_torques(person, q, load=load) for load in (0.0, 10.0))
     lever = (person.placement(q, "left_palm").translation - person.placement(q, "left_elbow").translation)[:2]
     added = loaded.torque["left_elbow_flexion"] - empty.torque["left_elbow_flexion"]
     assert added == pytest.approx(5.0 * GRAVITY * np.linalg.norm(lever), rel=0.05)
@@ -28,17 +28,20 @@ def test_a_load_in_the_palm_is_its_lever_at_the_elbow(person: wb.Figure) -> None
 
 def test_a_hanging_arm_needs_nothing_and_a_raised_one_its_weight(person: wb.Figure) -> None:
     q = person.with_joints(person.posture("standing"), {"right_shoulder_flexion": radians(90.0)})
-    found = wb.static_torques(person, q)
+    found = wb.ergonomics.static_torques(person, q)
     assert abs(found.torque["right_shoulder_flexion"]) > 5.0 > abs(found.torque["left_shoulder_flexion"])
 
 
 def test_a_seat_takes_the_legs_out(person: wb.Figure) -> None:
-    found = wb.static_torques(person, person.posture("sitting"), seated=True)
+    found = wb.ergonomics.static_torques(person, person.posture("sitting"), seated=True)
     assert not [name for name in found.torque if "knee" in name or "hip" in name]
     assert found.worst[0] in found.share
 
 
 def test_a_weaker_person_needs_a_greater_share(person: wb.Figure) -> None:
     q = person.with_joints(person.posture("standing"), {"left_shoulder_flexion": radians(90.0)})
-    man, woman = (wb.static_torques(person, q, load=5.0, strength=wb.Strength(5, sex)) for sex in ("male", "female"))
+    man, woman = (
+        wb.ergonomics.static_torques(person, q, load=5.0, strength=wb.motion.Strength(5, sex))
+        for sex in ("male", "female")
+    )
     assert woman.worst[1] > man.worst[1]

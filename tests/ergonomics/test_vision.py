@@ -38,7 +38,7 @@ def ahead(person: wb.Figure, side: float, height: float, distance: float = 1.0) 
     ],
 )
 def test_cones(person: wb.Figure, side: float, height: float, seen: bool, comfortable: bool) -> None:
-    found = wb.sight(wb.Scene(person), person.posture("standing"), ahead(person, side, height))
+    found = wb.ergonomics.sight(wb.Scene(person), person.posture("standing"), ahead(person, side, height))
     assert (found.seen, found.comfortable) == (seen, comfortable)
     assert found.distance == pytest.approx(1.0)
 
@@ -46,11 +46,11 @@ def test_cones(person: wb.Figure, side: float, height: float, seen: bool, comfor
 def test_a_thing_in_between_hides(person: wb.Figure) -> None:
     q, scene, point = person.posture("standing"), wb.Scene(person), ahead(person, 0, -15)
     scene.add(wb.Box((0.02, 0.3, 0.3)), name="board", at=ahead(person, 0, -15, 0.5))
-    assert wb.sight(scene, q, point).hidden_by == "board"
+    assert wb.ergonomics.sight(scene, q, point).hidden_by == "board"
     scene.move("board", at=ahead(person, 60, -15, 0.5))
-    assert wb.sight(scene, q, point).seen
+    assert wb.ergonomics.sight(scene, q, point).seen
     scene.move("board", at=ahead(person, 0, -15, 1.5))
-    assert wb.sight(scene, q, point).seen
+    assert wb.ergonomics.sight(scene, q, point).seen
 
 
 @pytest.mark.parametrize("wall_first", [True, False])
@@ -61,18 +61,18 @@ def test_the_first_thing_on_the_line_is_named(person: wb.Figure, wall_first: boo
     x, y, z = ahead(person, 0, -15, wall)
     scene.add(wb.Box((0.02, 6.0, 1.0)), name="wall", at=(x, y + 2.8, z))
     scene.add(wb.Sphere(0.1), name="ball", at=ahead(person, 0, -15, ball))
-    assert wb.sight(scene, q, point).hidden_by == ("wall" if wall_first else "ball")
+    assert wb.ergonomics.sight(scene, q, point).hidden_by == ("wall" if wall_first else "ball")
 
 
 def test_a_thing_does_not_hide_its_own_surface(person: wb.Figure) -> None:
     scene, point = wb.Scene(person), ahead(person, 0, -15)
     scene.add(wb.Sphere(0.05), name="ball", at=ahead(person, 0, -15, 1.05))
-    assert wb.sight(scene, person.posture("standing"), point).seen
+    assert wb.ergonomics.sight(scene, person.posture("standing"), point).seen
 
 
 def test_a_thing_does_not_hide_its_own_middle(person: wb.Figure) -> None:
     scene, point = wb.Scene(person), ahead(person, 0, -15)
     scene.add(wb.Box((0.3, 0.3, 0.3)), name="clock", at=point)
-    assert wb.sight(scene, person.posture("standing"), point).seen
+    assert wb.ergonomics.sight(scene, person.posture("standing"), point).seen
     scene.add(wb.Box((0.02, 0.3, 0.3)), name="board", at=ahead(person, 0, -15, 0.5))
-    assert wb.sight(scene, person.posture("standing"), point).hidden_by == "board"
+    assert wb.ergonomics.sight(scene, person.posture("standing"), point).hidden_by == "board"

@@ -11,10 +11,10 @@ from typing import Any
 
 import pytest
 
-from wholebody.bench.problem_sets.registry import problem_set
-from wholebody.bench.published.answers import read_answers
-from wholebody.bench.published.export import export
-from wholebody.bench.published.judging import Verdict, judge
+from wholebody.bench.suite.problem_sets.registry import problem_set
+from wholebody.bench.suite.published.answers import read_answers
+from wholebody.bench.suite.published.export import export
+from wholebody.bench.suite.published.judging import Verdict, judge
 
 SETS = ("free_reach", "robot_arm", "balance", "closed_loop", "drag")
 

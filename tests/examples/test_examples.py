@@ -406,7 +406,7 @@ def test_a_clip_with_a_pack_is_free_in_every_frame(
     assert freed.report.solved
     assert freed.report.frames_changed > 10
     scene = wb.Scene(freed.clip.figure)
-    for piece in wb.equipment("pack", freed.clip.figure):
+    for piece in wb.motion.equipment("pack", freed.clip.figure):
         piece.attach(scene)
     assert assess_motion(scene, freed.clip.q, freed.clip.dt).depth.max() <= 1e-4
     assert "arms swing" in capsys.readouterr().out

@@ -8,17 +8,17 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
-from wholebody.bench.problem_sets.registry import SETS
+from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.figures.state import State
 from wholebody.methods.contradictions import contradictions
 from wholebody.tasks.range_of_motion import Coordinate, CoupledRow
 
 METHODS = {
     "qp": lambda: wb.QP(restarts=0),
-    "ccd": wb.CCD,
+    "ccd": wb.methods.CCD,
     "newton": lambda: wb.Newton(restarts=0),
-    "placo": wb.Placo,
-    "dls": wb.DampedLeastSquares,
+    "placo": wb.methods.Placo,
+    "dls": wb.methods.DampedLeastSquares,
 }
 
 

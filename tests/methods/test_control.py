@@ -14,7 +14,13 @@ import wholebody as wb
 from tests.needs import each
 from wholebody.methods.control import Control
 
-METHODS = {"qp": wb.QP, "ccd": wb.CCD, "newton": wb.Newton, "placo": wb.Placo, "dls": wb.DampedLeastSquares}
+METHODS = {
+    "qp": wb.QP,
+    "ccd": wb.methods.CCD,
+    "newton": wb.Newton,
+    "placo": wb.methods.Placo,
+    "dls": wb.methods.DampedLeastSquares,
+}
 
 
 @pytest.fixture(autouse=True)

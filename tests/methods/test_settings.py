@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from wholebody import InputError
 
-METHODS = (wb.QP, wb.CCD, wb.Newton, wb.Placo, wb.DampedLeastSquares)
+METHODS = (wb.QP, wb.methods.CCD, wb.Newton, wb.methods.Placo, wb.methods.DampedLeastSquares)
 NO_NUMBER = (None, "x", "1", math.nan, math.inf, -math.inf, True, 1j, [], [1], {}, object(), 10**400, 10**5000, -1)
 WHOLE = ("iterations", "budget", "restarts", "seed")
 REAL = ("tolerance", "damping")
@@ -44,7 +44,7 @@ def test_names_are_texts(wrong: Any) -> None:
     with pytest.raises(InputError, match=r"inequalities is .*'slack' or 'barrier'"):
         wb.Newton(inequalities=wrong)
     with pytest.raises(InputError, match=r"holds is .*'hard' or 'soft'"):
-        wb.Placo(holds=wrong)
+        wb.methods.Placo(holds=wrong)
 
 
 def test_assemblies_are_told_where_they_are_taken() -> None:

@@ -54,7 +54,7 @@ def test_an_arm_that_swings_through_a_ball_goes_around_it(planar_arm: Callable[.
     frames = 60
     clip, scene = arm_and_ball(planar_arm, frames)
     assert min(map(gap, clip.q)) < -0.05
-    found = wb.avoid(clip, scene, method=wb.Trajectory(margin=0.4))
+    found = wb.avoid(clip, scene, method=wb.motion.Trajectory(margin=0.4))
     assert found.report.solved, found.report.message
     assert min(map(gap, found.clip.q)) > -2e-5
     fine = found.clip.resampled(DT / 10)
@@ -74,7 +74,7 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
     wave = np.sin(np.pi * np.arange(frames) / (frames - 1))
     q = np.stack([-1.0 + 0.56 * wave, np.full(frames, 0.7)], axis=1)  # into the ball from the side, and back
     time = 0.1
-    clip, method = wb.Clip(figure, q, DT), wb.Trajectory(margin=10.0, time=time)
+    clip, method = wb.Clip(figure, q, DT), wb.motion.Trajectory(margin=10.0, time=time)
     assert min(map(gap, q)) < -0.02
 
     def objective(flat: np.ndarray) -> float:
@@ -292,7 +292,7 @@ def test_a_free_clip_is_not_told_as_one_that_collides(planar_arm: Callable[..., 
     [
         (wb.Hold("left_hand", relative_to="right_hand"), {"left_elbow_flexion": 0.8}, "Hold('left_hand')"),
         (wb.Freeze("left_arm"), {"left_elbow_flexion": 0.8}, "Freeze('left_arm')"),
-        (wb.StanceFeet(), {"left_knee_flexion": 0.4}, "Hold('left_heel')"),
+        (wb.motion.StanceFeet(), {"left_knee_flexion": 0.4}, "Hold('left_heel')"),
     ],
 )
 def test_a_free_clip_that_misses_what_is_held_is_not_solved(
@@ -319,7 +319,7 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
 def test_all_solvers_give_the_same_clip(name: str, planar_arm: Callable[..., Figure]) -> None:
     pytest.importorskip(name)
     clip, scene = arm_and_ball(planar_arm, 30)
-    one, other = (wb.Trajectory(solver=each).avoid(clip, scene, (), None).q for each in (None, name))
+    one, other = (wb.motion.Trajectory(solver=each).avoid(clip, scene, (), None).q for each in (None, name))
     np.testing.assert_allclose(one, other, atol=2e-3)
 
 
@@ -382,7 +382,7 @@ def test_a_person_on_tiptoe_is_freed_without_a_default_balance(human: Figure, me
     share = np.sin(np.linspace(0.0, np.pi, 15))
     q = [human.with_joints(human.posture("standing"), {**tiptoe, "right_shoulder_abduction": -0.3 * s}) for s in share]
     feet = [wb.Hold("left_foot"), wb.Hold("right_foot")]
-    way = wb.Bisection(frozen=()) if method == "bisection" else method  # a frozen root is balanced by nothing
+    way = wb.motion.Bisection(frozen=()) if method == "bisection" else method  # a frozen root is balanced by nothing
     found = wb.avoid(wb.Clip(human, q, DT), method=way, constraints=feet, hold_feet=False)
     assert found.report.before.colliding
     assert found.report.after.free, found.report.message

@@ -35,10 +35,10 @@ def clip(human: wb.Figure) -> wb.Clip:
 
 
 def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path: Path) -> None:
-    told: list[wb.BatchProgress] = []
+    told: list[wb.motion.BatchProgress] = []
 
-    def run(*equipment: str) -> tuple[wb.AvoidedCase, ...]:
-        return wb.avoid_many([clip], tmp_path, equipment=equipment, methods=["fade"], progress=told.append)
+    def run(*equipment: str) -> tuple[wb.motion.AvoidedCase, ...]:
+        return wb.motion.avoid_many([clip], tmp_path, equipment=equipment, methods=["fade"], progress=told.append)
 
     (first,) = run("nothing")
     alone = wb.avoid(clip, method="fade")
@@ -59,10 +59,10 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
 
 
 def test_another_clip_of_the_name_or_other_settings_are_done_anew(clip: wb.Clip, tmp_path: Path) -> None:
-    (first,) = wb.avoid_many([clip], tmp_path, methods=["fade"])
-    (other,) = wb.avoid_many([clip[1:]], tmp_path, methods=["fade"])
+    (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["fade"])
+    (other,) = wb.motion.avoid_many([clip[1:]], tmp_path, methods=["fade"])
     assert other.frames == first.frames - 1
-    kept = wb.avoid_many([clip[1:]], tmp_path, methods=[wb.Fade(), wb.Fade(clearance=0.01)])
+    kept = wb.motion.avoid_many([clip[1:]], tmp_path, methods=[wb.motion.Fade(), wb.motion.Fade(clearance=0.01)])
     assert [row.method for row in kept] == ["fade", "fade 2"]
     assert kept[0] == other
     assert kept[1].angle > other.angle
@@ -73,10 +73,12 @@ def test_what_is_wrong_with_one_file_is_told_and_the_others_are_made(
 ) -> None:
     (tmp_path / "broken.csv").write_text("time\n")
     good = clip.write(tmp_path / "good.npz")
-    rows = wb.avoid_many([tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["fade"], jobs=2)
+    rows = wb.motion.avoid_many(
+        [tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["fade"], jobs=2
+    )
     assert [row.outcome for row in rows] == ["refused", "free"]
     assert "broken.csv" in rows[0].message
-    made = wb.read_many([good, tmp_path / "broken.csv"], tmp_path / "out", human)
+    made = wb.motion.read_many([good, tmp_path / "broken.csv"], tmp_path / "out", human)
     assert isinstance(made["good"], Path)
     assert "broken.csv" in str(made["broken"])
 
@@ -92,7 +94,7 @@ def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Pa
         ({"jobs": 0}, "jobs is 0"),
     ):
         with pytest.raises(wb.WholebodyError, match=sentence):
-            wb.avoid_many(**{"clips": [clip], "folder": out, **arguments})  # type: ignore[arg-type]
+            wb.motion.avoid_many(**{"clips": [clip], "folder": out, **arguments})  # type: ignore[arg-type]
         assert not out.exists()
 
 
@@ -136,10 +138,10 @@ def test_a_dask_cluster_gives_the_same(clip: wb.Clip, tmp_path: Path) -> None:
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
     ) as cluster:
-        (row,) = wb.avoid_many(
+        (row,) = wb.motion.avoid_many(
             [clip], tmp_path / "a", methods=["fade"], jobs=2, cluster=cluster.scheduler_address
         )  # fmt: skip
-    (here,) = wb.avoid_many([clip], tmp_path / "b", methods=["fade"])
+    (here,) = wb.motion.avoid_many([clip], tmp_path / "b", methods=["fade"])
     made = [wb.read_clip(folder / row.file, clip.figure).q for folder in (tmp_path / "a", tmp_path / "b")]
     assert np.array_equal(*made)
     assert (row.outcome, row.asked) == (here.outcome, here.asked)

@@ -35,10 +35,10 @@ def torque(clip: wb.Clip) -> np.ndarray:
 def test_a_wheel_is_slowed_until_its_motor_is_strong_enough(tmp_path: Path) -> None:
     clip = wheel(tmp_path, 2.0)
     assert np.abs(torque(clip)).max() > 2.9
-    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=2.0))
+    found = wb.avoid(clip, dynamics=True, method=wb.motion.Trajectory(stretch=2.0))
     assert found.report.solved, found.report.message
     assert "slowed" in found.report.message
-    slower = wb.torques(found.clip).torque[2:-2, 0]
+    slower = wb.motion.torques(found.clip).torque[2:-2, 0]
     assert np.abs(slower).max() < 2.0 * 1.03  # what resampling changes
     assert 1.15 < found.report.stretch <= 2.0
     kept = wb.avoid(clip, dynamics=True)  # without slowing it is as strong as before
@@ -48,7 +48,7 @@ def test_a_wheel_is_slowed_until_its_motor_is_strong_enough(tmp_path: Path) -> N
 
 def test_a_strong_motor_keeps_its_timing(tmp_path: Path) -> None:
     clip = wheel(tmp_path, 4.0)
-    found = wb.avoid(clip, dynamics=True, method=wb.Trajectory(stretch=2.0))
+    found = wb.avoid(clip, dynamics=True, method=wb.motion.Trajectory(stretch=2.0))
     assert found.report.stretch == 1.0
     np.testing.assert_array_equal(found.clip.q, clip.q)
 
@@ -60,13 +60,15 @@ def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
     with pytest.raises(wb.InputError, match="dynamics"):
         wb.avoid(clip, dynamics="strong")  # type: ignore[arg-type]
     with pytest.raises(wb.InputError, match="dynamics"):
-        wb.Trajectory(dynamics=True)  # type: ignore[arg-type]
+        wb.motion.Trajectory(dynamics=True)  # type: ignore[arg-type]
 
 
 @pytest.fixture(scope="module")
 def recorded(shared_data: Path) -> wb.Clip:
     """The first frames of a man who crouches for a jump."""
-    return wb.retarget(wb.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 50), wb.load("human"))[:45]
+    return wb.retarget(wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 50), wb.load("human"))[
+        :45
+    ]
 
 
 def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> None:
@@ -77,7 +79,7 @@ def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> N
     loads = found.report.loads
     assert isinstance(loads, LoadChange)
     assert loads.kept
-    public = wb.torques(recorded), wb.torques(found.clip)  # as anybody measures them
+    public = wb.motion.torques(recorded), wb.motion.torques(found.clip)  # as anybody measures them
     for told, measured in zip((loads.before, loads.after), public, strict=True):
         np.testing.assert_array_equal(told.torque, measured.torque)
         np.testing.assert_array_equal(told.outside, measured.outside)
@@ -90,7 +92,7 @@ def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> N
 
 def test_a_recording_is_slowed_and_stays_within_strength(recorded: wb.Clip) -> None:
     """It crouches for a jump: the feet leave the ground between two frames of the slowed clip."""
-    found = wb.avoid(recorded, dynamics=True, method=wb.Trajectory(stretch=1.5))
+    found = wb.avoid(recorded, dynamics=True, method=wb.motion.Trajectory(stretch=1.5))
     report = found.report
     assert report.before.colliding
     assert report.after.free

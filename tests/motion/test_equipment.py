@@ -7,8 +7,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.equipment import Equipment, bounds, group_of
 from wholebody.motion.ready_equipment import READY, equipment
+from wholebody.motion.worn_equipment import Equipment, bounds, group_of
 
 
 @pytest.fixture(scope="module", params=["capsules", "spheres"])

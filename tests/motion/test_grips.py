@@ -47,7 +47,7 @@ def between_hands(clip: wb.Clip) -> np.ndarray:
 
 def test_hands_that_are_held_too_near_part_to_the_clearance(human: Figure) -> None:
     clip = hands_together(human, -0.225, frames=7)
-    found = wb.avoid(clip, method=wb.Trajectory(clearance=0.003), constraints=[GRIP])
+    found = wb.avoid(clip, method=wb.motion.Trajectory(clearance=0.003), constraints=[GRIP])
     assert found.report.solved, found.report.message
     assert found.report.beside > between_hands(clip).max() + 0.003
 

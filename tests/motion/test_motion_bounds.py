@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.motion.cases import synthetic
+from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import AvoidProgress, MethodResult
@@ -32,20 +32,20 @@ def waves(figure: Figure, size: float) -> wb.Clip:
     return wb.Clip(figure, np.stack([size * np.sin(10.0 * t), np.zeros(FRAMES)], axis=1), DT, "waves")
 
 
-def everywhere(bounds: wb.MotionBounds, count: int = FRAMES) -> wb.MotionBounds:
+def everywhere(bounds: wb.motion.MotionBounds, count: int = FRAMES) -> wb.motion.MotionBounds:
     return resolved(bounds, np.ones(count, dtype=bool), np.zeros(count, dtype=bool))
 
 
 def test_jerk_speed_and_deviation_of_sines_are_their_ratios(planar_arm: Callable[..., Figure]) -> None:
     figure = planar_arm((0.5, 0.5))
     before, after = waves(figure, 0.5), waves(figure, 0.9)
-    found = excess(before, after, everywhere(wb.MotionBounds(jerk=1.7, speed=1.9, deviation=0.3)))
+    found = excess(before, after, everywhere(wb.motion.MotionBounds(jerk=1.7, speed=1.9, deviation=0.3)))
     assert found.jerk == pytest.approx(1.8, rel=1e-9)
     assert found.speed == pytest.approx(1.8, rel=1e-9)
     assert found.deviation == pytest.approx(np.abs(before.q - after.q).max())
     assert [said.split()[0] for said in found.said] == ["jerk", "the"]
-    assert not excess(before, before, everywhere(wb.MotionBounds())).said
-    assert not excess(before, after, everywhere(wb.MotionBounds(None, None, None))).said
+    assert not excess(before, before, everywhere(wb.motion.MotionBounds())).said
+    assert not excess(before, after, everywhere(wb.motion.MotionBounds(None, None, None))).said
 
 
 def test_one_jump_in_a_long_calm_clip_is_seen_where_it_is(planar_arm: Callable[..., Figure]) -> None:
@@ -53,7 +53,7 @@ def test_one_jump_in_a_long_calm_clip_is_seen_where_it_is(planar_arm: Callable[.
     before = wb.Clip(figure, np.zeros((FRAMES, 2)), DT)
     q = before.q.copy()
     q[40:, 1] = 0.3
-    found = excess(before, before.with_q(q), everywhere(wb.MotionBounds()))
+    found = excess(before, before.with_q(q), everywhere(wb.motion.MotionBounds()))
     assert len(found.said) == 2  # 9 rad/s, and its jerk; no deviation
     assert {40, 41} <= set(np.flatnonzero(found.beyond).tolist())
     assert not found.beyond[:28].any()
@@ -64,7 +64,7 @@ def test_one_jump_in_a_long_calm_clip_is_seen_where_it_is(planar_arm: Callable[.
 def test_what_a_method_leaves_rough_is_made_smooth(human: Figure, clip: str, method: str) -> None:
     """Interpolated frames have kinks at their ends: without the bounds the jerk is seven times the original's."""
     original = synthetic(clip, human)
-    rough = wb.avoid(original, method=method, constraints=[wb.MotionBounds(None, None, None)])
+    rough = wb.avoid(original, method=method, constraints=[wb.motion.MotionBounds(None, None, None)])
     assert rough.report.solved
     assert jerk_ratio(original, rough.clip) > 5.0
     smooth = wb.avoid(original, method=method)
@@ -144,9 +144,9 @@ def test_an_end_that_collides_is_freed_all_the_same(planar_arm: Callable[..., Fi
 def test_settings_out_of_range_are_refused(planar_arm: Callable[..., Figure]) -> None:
     for wrong in ({"jerk": 0.5}, {"speed": float("nan")}, {"deviation": -1.0}, {"keep_ends": 2}):
         with pytest.raises(wb.InputError, match=next(iter(wrong))):
-            wb.MotionBounds(**wrong)  # type: ignore[arg-type]
+            wb.motion.MotionBounds(**wrong)  # type: ignore[arg-type]
     clip = waves(planar_arm((0.5, 0.5)), 0.4)
     with pytest.raises(wb.InputError, match="two"):
-        wb.avoid(clip, constraints=[wb.MotionBounds(), wb.MotionBounds()])
+        wb.avoid(clip, constraints=[wb.motion.MotionBounds(), wb.motion.MotionBounds()])
     with pytest.raises(wb.InputError, match="keep_ends"):
         wb.avoid(clip, keep_ends="yes")  # type: ignore[arg-type]

@@ -35,7 +35,7 @@ def test_a_free_motion_beside_a_stand_that_ends_is_followed_without_lag(
     scene.add(wb.Box((0.4, 0.1, 0.4)), name="block", at=(0.8, -0.12, 0.0))
     angle = np.concatenate([np.linspace(0.3, -0.12, 12), np.linspace(-0.12, 1.2, 8)[1:]])
     clip = wb.Clip(figure, np.stack([angle, np.zeros(len(angle))], axis=1), DT)
-    found = wb.avoid(clip, scene, method=wb.PerFrame(backward=backward))
+    found = wb.avoid(clip, scene, method=wb.motion.PerFrame(backward=backward))
     assert found.report.before.colliding >= 2
     assert found.report.solved, found.report.message
     assert np.abs(found.clip.q - clip.q)[-3:].max() < 2e-3

@@ -95,7 +95,7 @@ def furthest(clip: wb.Clip, other: wb.Clip) -> float:
 
 @pytest.mark.parametrize("name", CLIPS)
 def test_real_recordings_keep_the_directions_of_their_limbs(name: str, human: Figure, shared_data: Path) -> None:
-    motion = wb.read_skeleton(shared_data / "mocap" / f"{name}.bvh").part(0, 20)
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / f"{name}.bvh").part(0, 20)
     clip = wb.retarget(motion, human)
     assert len(clip) == 20
     assert clip.dt == motion.dt
@@ -138,7 +138,7 @@ def test_feet_that_stand_stay_where_they_are_at_the_height_of_the_floor(human: F
 
 def test_the_answer_does_not_depend_on_the_frame_it_starts_from(human: Figure, shared_data: Path) -> None:
     """Played backwards, the same postures come out; and so they do, away from the cut, from the middle on."""
-    motion = wb.read_skeleton(shared_data / "mocap" / "cmu_02_07.bvh").part(200, 260)
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_07.bvh").part(200, 260)
     clip = wb.retarget(motion, human)
     back = wb.retarget(motion.reversed(), human)
     assert furthest(clip, back.with_q(back.q[::-1])) < 1e-3

@@ -48,8 +48,8 @@ def legs_that_cross(human: wb.Figure) -> wb.Clip:
     return wb.Clip(human, q, 1 / 30)
 
 
-@pytest.mark.parametrize("constraints", [[wb.StanceFeet(["right_foot"])], []])
-def test_standing_feet_stay_where_they_were(human: wb.Figure, constraints: list[wb.StanceFeet]) -> None:
+@pytest.mark.parametrize("constraints", [[wb.motion.StanceFeet(["right_foot"])], []])
+def test_standing_feet_stay_where_they_were(human: wb.Figure, constraints: list[wb.motion.StanceFeet]) -> None:
     """They do by default too; the leg that passes through the other one is moved."""
     clip = legs_that_cross(human)
     avoided = wb.avoid(clip, constraints=constraints)
@@ -78,4 +78,4 @@ def test_points_of_one_foot_hold_its_orientation_and_one_alone_does_not(human: w
 
 def test_a_figure_without_feet_says_so() -> None:
     with pytest.raises(wb.InputError, match="name the feet"):
-        wb.StanceFeet().names(wb.load("hand"))
+        wb.motion.StanceFeet().names(wb.load("hand"))

@@ -9,9 +9,9 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.motion.clip_torques import smoothed, torques
 from wholebody.motion.ground_forces import ground_forces
 from wholebody.motion.strength import FEMALE, MALE, Strength
-from wholebody.motion.torques import smoothed, torques
 
 GRAVITY = 9.81
 

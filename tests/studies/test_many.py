@@ -71,7 +71,7 @@ def test_a_process_that_ends_costs_its_own_problem_alone(arm: wb.Figure) -> None
         assert good.solved
         assert (fatal.outcome, fatal.q) == ("ended", None)
         assert "SIGKILL" in fatal.message
-    told = repr(wb.Records([fatal]))
+    told = repr(wb.studies.Records([fatal]))
     assert "first ended: fatal, the process ended with SIGKILL" in told
     assert "goal missed most: none" in told
 
@@ -97,7 +97,7 @@ def test_a_folder_keeps_what_is_done(arm: wb.Figure, tmp_path: Path) -> None:
     problems = [problem(arm, place) for place in PLACES]
     done: list[int] = []
 
-    def stop(told: wb.SolveProgress) -> bool:
+    def stop(told: wb.studies.SolveProgress) -> bool:
         done.append(told.done)
         return told.done == 2
 
@@ -140,7 +140,7 @@ def test_something_else_than_a_problem_is_refused(arm: wb.Figure) -> None:
 
 def test_what_is_not_solved_from_its_own_start_is_tried_from_the_answers_of_neighbours(arm: wb.Figure) -> None:
     places = [(0.4 - 0.06 * k, 0.1 * k - 0.2, 0.5) for k in range(8)]
-    problems, method = [problem(arm, place) for place in places], wb.DampedLeastSquares(iterations=8)
+    problems, method = [problem(arm, place) for place in places], wb.methods.DampedLeastSquares(iterations=8)
     alone = [wb.solve(one, method).solved for one in problems]
     assert alone == [True] * 3 + [False] * 5
     for jobs in (1, 2):
@@ -156,7 +156,7 @@ def test_what_is_not_solved_from_its_own_start_is_tried_from_the_answers_of_neig
 def test_the_nearest_answer_is_tried_first_and_kept(arm: wb.Figure, tmp_path: Path) -> None:
     turns = np.linspace(-0.6, 2.4, 9)
     given = [problem(arm, (0.45 * np.cos(turn), 0.45 * np.sin(turn), 0.5)) for turn in turns]
-    method = wb.DampedLeastSquares(iterations=7)
+    method = wb.methods.DampedLeastSquares(iterations=7)
     first = wb.solve_many(given, method, folder=tmp_path)
     assert [one.neighbour for one in first] == ["", "", "", "", "3", "3", "8", "8", ""]
     assert first.solved == 1.0

@@ -39,15 +39,15 @@ def planar(folder: Path) -> wb.Problem:
 
 
 @pytest.fixture(scope="module")
-def found(planar: wb.Problem) -> wb.ReachMap:
+def found(planar: wb.Problem) -> wb.studies.ReachMap:
     return area(planar)
 
 
-def area(problem: wb.Problem, **options: Any) -> wb.ReachMap:
+def area(problem: wb.Problem, **options: Any) -> wb.studies.ReachMap:
     return wb.reach_map(problem, "tip", (-0.8, -0.8, 0.0), (0.8, 0.8, 0.0), 0.1, **options)
 
 
-def test_a_planar_arm_reaches_its_ring(planar: wb.Problem, found: wb.ReachMap) -> None:
+def test_a_planar_arm_reaches_its_ring(planar: wb.Problem, found: wb.studies.ReachMap) -> None:
     distance = np.hypot(*np.meshgrid(found.x, found.y, indexing="ij"))[..., None]
     ring = (distance > 0.1 + 1e-3) & (distance < 0.7 - 1e-3)  # lengths 0.4 and 0.3
     outside = (distance > 0.7 + 1e-3) | (distance < 0.1 - 1e-3)
@@ -60,7 +60,7 @@ def test_a_planar_arm_reaches_its_ring(planar: wb.Problem, found: wb.ReachMap) -
     assert found.volume == pytest.approx(0.01 * found.reached.sum())
 
 
-def test_what_is_left_is_the_distance_from_the_ring(found: wb.ReachMap) -> None:
+def test_what_is_left_is_the_distance_from_the_ring(found: wb.studies.ReachMap) -> None:
     distance = np.hypot(*np.meshgrid(found.x, found.y, indexing="ij"))[..., None]
     true = distance - 0.7
     assert (found.left[true > 1e-3] <= true[true > 1e-3] + 1e-9).all()
@@ -68,7 +68,7 @@ def test_what_is_left_is_the_distance_from_the_ring(found: wb.ReachMap) -> None:
     np.testing.assert_allclose(found.left[beyond], true[beyond], atol=1e-6)
 
 
-def test_the_map_is_the_same_whatever_jobs_is(planar: wb.Problem, found: wb.ReachMap) -> None:
+def test_the_map_is_the_same_whatever_jobs_is(planar: wb.Problem, found: wb.studies.ReachMap) -> None:
     one, two = found, area(planar, jobs=2)
     np.testing.assert_array_equal(one.verdict, two.verdict)
     np.testing.assert_array_equal(one.q, two.q)
@@ -97,7 +97,7 @@ def test_an_end_by_the_caller_leaves_places_untried(planar: wb.Problem) -> None:
     assert set(found.counts()) <= {"not tried", "beyond"}
 
 
-def test_files(found: wb.ReachMap, tmp_path: Path) -> None:
+def test_files(found: wb.studies.ReachMap, tmp_path: Path) -> None:
     loaded = np.load(found.save(tmp_path / "a.npz"))
     np.testing.assert_array_equal(loaded["verdict"], found.verdict)
     lines = found.to_vtk(tmp_path / "a.vtk").read_text().splitlines()

@@ -19,7 +19,7 @@ EVERYTHING = Path(__file__).parents[1] / "data" / "tasks" / "everything.toml"
 
 
 @pytest.fixture(scope="module")
-def everything() -> wb.Task:
+def everything() -> wb.taskfile.Task:
     return wb.read_task(EVERYTHING)
 
 
@@ -32,7 +32,7 @@ def test_every_type_of_the_schema_is_in_the_example() -> None:
         assert f'shape = "{name}"' in text
 
 
-def test_scene_and_start(everything: wb.Task) -> None:
+def test_scene_and_start(everything: wb.taskfile.Task) -> None:
     problem = everything.problem
     figure = problem.scene.figure
     assert everything.title == "everything"
@@ -55,7 +55,7 @@ def test_scene_and_start(everything: wb.Task) -> None:
     assert everything.view == ((1.0, 2.0, 3.0), (0.0, 0.0, 1.0), ("box",))
 
 
-def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
+def test_terms_are_those_that_python_makes(everything: wb.taskfile.Task) -> None:
     problem = everything.problem
     turn = pin.Quaternion(np.array(TURNED)).matrix()
     same = wb.Problem(
@@ -108,7 +108,7 @@ def test_terms_are_those_that_python_makes(everything: wb.Task) -> None:
         assert mine.weight * mine.value(state) == pytest.approx(theirs.weight * theirs.value(state))
 
 
-def test_method_has_its_settings(everything: wb.Task) -> None:
+def test_method_has_its_settings(everything: wb.taskfile.Task) -> None:
     method = everything.method
     assert isinstance(method, wb.QP)
     assert (method.solver, method.tolerance, method.iterations) == ("daqp", 1e-7, 50)

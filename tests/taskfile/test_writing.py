@@ -75,9 +75,12 @@ def test_what_a_person_keeps_by_default_goes_round(tmp_path: Path, asked: dict[s
 
 
 def test_joints_of_things_go_round(tmp_path: Path) -> None:
-    hinge = wb.Hinge((0.0, -0.4, 0.0), axis=(0.0, 0.3, 0.4))
+    hinge = wb.dynamics.Hinge((0.0, -0.4, 0.0), axis=(0.0, 0.3, 0.4))
     door = wb.Body(mass=12.0, joints=[hinge], angular_velocity=(0.0, 0.0, 1.5))
-    rope = wb.Body(density=300.0, joints=[wb.BallJoint((0.0, 0.0, 0.5), to="beam"), wb.BallJoint((0.0, 0.0, -0.5))])
+    rope = wb.Body(
+        density=300.0,
+        joints=[wb.dynamics.BallJoint((0.0, 0.0, 0.5), to="beam"), wb.dynamics.BallJoint((0.0, 0.0, -0.5))],
+    )
     scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 1.0, 0.1)), name="beam", at=(2.0, 0.0, 2.0))
     scene.add(wb.Box((0.04, 0.8, 2.0)), name="door", at=(3.0, 0.0, 1.0), body=door)
     scene.add(wb.Capsule(0.01, 0.9), name="rope", at=(2.0, 0.0, 1.4), body=rope)
@@ -91,7 +94,7 @@ def test_a_scene_alone_and_a_result(tmp_path: Path) -> None:
     task = wb.read_task(wb.write_task(scene, tmp_path / "scene.toml"))
     assert (task.problem.goals, task.problem.constraints) == ((), task.problem.defaults)
     solution = wb.solve(task.problem)
-    result = wb.read_result(wb.write_result(task, solution, tmp_path / "result.json"))
+    result = wb.taskfile.read_result(wb.taskfile.write_result(task, solution, tmp_path / "result.json"))
     np.testing.assert_array_equal(result.q, solution.q)
     assert (result.status, result.message, result.method) == (solution.status, solution.message, solution.method)
 

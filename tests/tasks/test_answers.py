@@ -130,7 +130,7 @@ def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method)
     chosen = {
         "qp": wb.QP(restarts=1, budget=40),
         "newton": wb.Newton(restarts=0, iterations=12),
-        "dls": wb.DampedLeastSquares(),
+        "dls": wb.methods.DampedLeastSquares(),
     }
     if chosen[method].accepts(problem) is not None:
         pytest.skip("the method takes no such term")
@@ -143,7 +143,7 @@ def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method)
     assert re.search(rf"{place[kind]}: its {part} has \S+ at a posture of iteration \d+", solution.message)
 
 
-@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), wb.DampedLeastSquares()], ids=lambda one: one.name)
+@pytest.mark.parametrize("method", [wb.QP(), wb.Newton(), wb.methods.DampedLeastSquares()], ids=lambda one: one.name)
 @pytest.mark.parametrize(
     "term", [Reach("error", np.full(3, np.nan)), Bend("gradient", np.full(55, np.nan))], ids=["goal", "measure"]
 )
@@ -225,8 +225,8 @@ def test_what_is_told_of_a_term_goes_into_another_process():
 def test_fractions_are_numbers(scene):
     figure = scene.figure
     clip = wb.Clip(figure, np.array([figure.neutral] * 8), 0.02)
-    third = wb.torques(clip, friction=Fraction(1, 3))
-    assert np.array_equal(third.torque, wb.torques(clip, friction=1 / 3).torque)
+    third = wb.motion.torques(clip, friction=Fraction(1, 3))
+    assert np.array_equal(third.torque, wb.motion.torques(clip, friction=1 / 3).torque)
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (Fraction(2, 5), Fraction(-1, 5), 1))])
     assert wb.QP(tolerance=Fraction(1, 10**5), time_limit=Fraction(3)).solve(problem).status == "solved"
 

@@ -12,8 +12,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from tests.audits import human_tasks
 from wholebody.base.arrays import Array
-from wholebody.bench import human_tasks
 from wholebody.figures.state import State
 
 FIRST = ("flexion", "abduction", "rotation")

@@ -124,7 +124,7 @@ def test_planes_hold_where_a_contact_is_made_and_bend_as_a_sphere_does() -> None
 
 
 def test_more_time_buys_a_lower_minimum() -> None:
-    from wholebody.bench.problem_sets.registry import problem_set
+    from wholebody.bench.suite.problem_sets.registry import problem_set
 
     problem = problem_set("passage").make(5, 0).problem
     first = wb.solve(problem)

@@ -62,7 +62,7 @@ def test_only_a_person_has_them(name: str) -> None:
     assert kinds(wb.Problem(wb.Scene(wb.load(name)))) == set()
 
 
-@pytest.mark.parametrize("method", [wb.CCD(), wb.DampedLeastSquares()], ids=["ccd", "dls"])
+@pytest.mark.parametrize("method", [wb.methods.CCD(), wb.methods.DampedLeastSquares()], ids=["ccd", "dls"])
 def test_methods_that_cannot_take_one_leave_it_to_the_judge(scene: wb.Scene, method: Any) -> None:
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.2))], constraints=[LEFT, RIGHT])
     assert method.accepts(problem) is None

@@ -15,7 +15,7 @@ INSIDE = "document.querySelector('iframe').contentWindow"
 
 
 @pytest.fixture(scope="module")
-def found() -> wb.ClipCheck:
+def found() -> wb.motion.ClipCheck:
     """Return the check of a person whose arm goes into a thigh and comes back."""
     figure = wb.load("human")
     standing = figure.posture("standing")
@@ -23,7 +23,7 @@ def found() -> wb.ClipCheck:
     return wb.check(wb.Clip(figure, [standing, standing, inside, standing, standing], 0.5, "into a thigh"))  # type: ignore[arg-type]
 
 
-def test_a_click_brings_the_figure_to_the_frame(browser: Any, found: wb.ClipCheck, tmp_path: Path) -> None:
+def test_a_click_brings_the_figure_to_the_frame(browser: Any, found: wb.motion.ClipCheck, tmp_path: Path) -> None:
     page = tmp_path / "page.html"
     page.write_text(timeline(found), encoding="utf-8")
     browser.open(page.as_uri())
@@ -46,20 +46,20 @@ def test_a_click_brings_the_figure_to_the_frame(browser: Any, found: wb.ClipChec
     assert browser.evaluate("document.getElementById('frame').textContent") in ("1", "2")
 
 
-def test_a_free_clip_and_one_frame(found: wb.ClipCheck) -> None:
+def test_a_free_clip_and_one_frame(found: wb.motion.ClipCheck) -> None:
     text = timeline(wb.check(found.clip[:2]))
     assert "No overlap deeper than 0.1 mm" in text
     assert "<canvas" not in text
     assert "into a thigh" in timeline(wb.check(found.clip[:1]))
 
 
-def test_long_clips_are_shown_in_part(found: wb.ClipCheck, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_clips_are_shown_in_part(found: wb.motion.ClipCheck, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = timeline(found)
     monkeypatch.setattr("wholebody.view.timeline.MOST_POSTURES", 2)
     assert len(timeline(found)) < len(whole)
 
 
-def test_a_scene_of_another_figure_is_refused(found: wb.ClipCheck) -> None:
+def test_a_scene_of_another_figure_is_refused(found: wb.motion.ClipCheck) -> None:
     with pytest.raises(wb.InputError, match="another figure"):
         timeline(found, wb.Scene(wb.load("hand")))
     assert np.isfinite(found.depth).all()

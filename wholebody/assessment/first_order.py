@@ -134,7 +134,8 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
         objective = sum((term.weight * term.gradient(state) for term in asked.measures), np.zeros(nv))
         curvature = sum((term.weight * term.curvature(state) for term in asked.measures), np.zeros(nv))
         signed.rows += [jacobian for _, jacobian, _ in goals]
-        for term in (*asked.goals, *asked.constraints):
+        terms: list[Goal | Constraint] = [*asked.goals, *asked.constraints]
+        for term in terms:
             if (planes := term.supporting_planes(state)) is not None:
                 near = (planes.value >= -ACTIVE - planes.slack) & (planes.value <= ACTIVE)
                 one_sided.add(-planes.jacobian[near], [("constraint", ("",))] * int(near.sum()))

@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 TEMPLATES = Path(__file__).parent / "templates"
 
 
-def render(name: str, **values: Any) -> str:
-    """Fill in a template, named without its last suffix; empty lines beside each other become one."""
+def render(name: str, templates: Path = TEMPLATES, /, **values: Any) -> str:
+    """Fill in a template of a folder, named without its last suffix; empty lines beside each other become one."""
     lines: list[str] = []
-    for line in _environment().get_template(f"{name}.jinja").render(values).strip().split("\n"):
+    for line in _environment(templates).get_template(f"{name}.jinja").render(values).strip().split("\n"):
         if line.strip() or (lines and lines[-1]):
             lines.append(line.rstrip())
     return "\n".join(lines)
@@ -42,11 +42,11 @@ def html(text: str) -> str:
 
 
 @cache
-def _environment() -> Environment:
+def _environment(templates: Path) -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoescape
 
     made = Environment(
-        loader=FileSystemLoader(TEMPLATES),
+        loader=FileSystemLoader(templates),
         autoescape=select_autoescape(["html.jinja"]),
         undefined=StrictUndefined,
         trim_blocks=True,

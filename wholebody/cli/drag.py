@@ -11,7 +11,7 @@ from wholebody.cli.arguments import Commands
 from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
-    from wholebody.bench.drag import DragRow
+    from wholebody.bench.measure.drag import DragRow
     from wholebody.problem import Problem
     from wholebody.taskfile import Task
     from wholebody.tracking.dragging import Dragged, DragJudgement
@@ -70,8 +70,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
-    from wholebody.bench.drag import drag_chart, drag_frames, drag_report, drag_summary
     from wholebody.bench.machine import machine
+    from wholebody.bench.measure.drag import drag_chart, drag_frames, drag_report, drag_summary
     from wholebody.bench.tables import write_rows, write_text
     from wholebody.cli.picture import make_folder
     from wholebody.methods.solve import method_named

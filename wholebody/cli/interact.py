@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
-    from wholebody.bench.interaction import InteractionRow, WorstFrames
+    from wholebody.bench.measure.interaction import InteractionRow, WorstFrames
     from wholebody.tracking import InteractionScene, Judgement, Recording
 
 HELP = "follow a tracker frame by frame through a gallery without penetration"
@@ -48,8 +48,8 @@ def add_to(commands: Commands) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.interaction import report
     from wholebody.bench.machine import machine
+    from wholebody.bench.measure.interaction import report
     from wholebody.bench.tables import write_text
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS
@@ -95,7 +95,7 @@ def _run_one(
 ) -> WorstFrames:  # fmt: skip
     import gc
 
-    from wholebody.bench.interaction import frame_chart, frame_rows, summary, worst_frames
+    from wholebody.bench.measure.interaction import frame_chart, frame_rows, summary, worst_frames
     from wholebody.bench.tables import write_rows
     from wholebody.cli.tables import progress_bar
     from wholebody.tracking import follow, judge
@@ -161,7 +161,7 @@ def _notes(recording: Recording, judged: Judgement) -> None:
 def _print(rows: list[InteractionRow]) -> None:
     from rich.console import Console
 
-    from wholebody.bench.interaction import PAPER
+    from wholebody.bench.measure.interaction import PAPER
     from wholebody.cli.tables import table
 
     times = table(
@@ -196,7 +196,7 @@ def _print(rows: list[InteractionRow]) -> None:
 def _update(docs: Path, text: str, worst: list[WorstFrames], out: Path) -> None:
     import shutil
 
-    from wholebody.bench.interaction import failures
+    from wholebody.bench.measure.interaction import failures
     from wholebody.bench.tables import replace_section
 
     folder = docs / "assets" / "interaction"

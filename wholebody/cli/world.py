@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
-    from wholebody.bench.world_runs import WorldRow
+    from wholebody.bench.measure.world_runs import WorldRow
     from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
@@ -53,8 +53,8 @@ def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
     from wholebody.bench.machine import machine
+    from wholebody.bench.measure.world_runs import report
     from wholebody.bench.tables import write_text
-    from wholebody.bench.world_runs import report
     from wholebody.dynamics.scenes import WORLD_SCENES
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
@@ -86,8 +86,8 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
 
 
 def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
+    from wholebody.bench.measure.world_runs import chart, frame_rows, summary
     from wholebody.bench.tables import write_rows
-    from wholebody.bench.world_runs import chart, frame_rows, summary
     from wholebody.cli.tables import progress_bar
     from wholebody.dynamics.overlaps import overlaps
     from wholebody.dynamics.world import World
@@ -119,7 +119,7 @@ def _animation(
     """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
     import time
 
-    from wholebody.bench.world_runs import moments
+    from wholebody.bench.measure.world_runs import moments
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
     from wholebody.view.viewed_scene import ViewedWorld

@@ -110,7 +110,7 @@ class World(NotCopyable):
             UnknownNameError: another overlap, or a joint names a thing that is not there.
         """
         self.scene, self.dt = instance(scene, Scene, "World: scene", _scene_instead(scene)), time_step(dt, "dt")
-        instance(spring, (Spring, type(None)), "World: spring", "give wb.Spring(mass=0.4), or leave it out")
+        instance(spring, (Spring, type(None)), "World: spring", "give wb.dynamics.Spring(mass=0.4), or leave it out")
         self._bodies = tuple(name for name, thing in scene.objects.items() if thing.body is not None)
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         self._loop = FrameLoop(scene, first, overlap=overlap, dt=self.dt, seed=seed, touching=self._bodies)

@@ -1,1 +1,56 @@
 """Ergonomics of postures: RULA, REBA, OWAS, the NIOSH lifting equation, torques against strength, the field of view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from wholebody.base.lazy import exported
+
+if TYPE_CHECKING:
+    from wholebody.ergonomics.angles import BodyAngles, body_angles
+    from wholebody.ergonomics.assessment import Ergonomics, ergonomics_of
+    from wholebody.ergonomics.lifting import Lift, lift_between
+    from wholebody.ergonomics.owas_score import Owas, owas
+    from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
+    from wholebody.ergonomics.reba_score import Reba, RebaParts, reba
+    from wholebody.ergonomics.rula_score import Rula, RulaParts, rula
+    from wholebody.ergonomics.vision import FieldOfView, Sight, sight
+    from wholebody.ergonomics.work import Work
+
+__all__ = [
+    "BodyAngles",
+    "Ergonomics",
+    "FieldOfView",
+    "Lift",
+    "Owas",
+    "Reba",
+    "RebaParts",
+    "Rula",
+    "RulaParts",
+    "Sight",
+    "StaticTorques",
+    "Work",
+    "body_angles",
+    "ergonomics_of",
+    "lift_between",
+    "owas",
+    "reba",
+    "rula",
+    "sight",
+    "static_torques",
+]
+
+__getattr__, __dir__ = exported(
+    __name__,
+    {
+        "wholebody.ergonomics.angles": "BodyAngles body_angles",
+        "wholebody.ergonomics.assessment": "Ergonomics ergonomics_of",
+        "wholebody.ergonomics.lifting": "Lift lift_between",
+        "wholebody.ergonomics.owas_score": "Owas owas",
+        "wholebody.ergonomics.reba_score": "Reba RebaParts reba",
+        "wholebody.ergonomics.rula_score": "Rula RulaParts rula",
+        "wholebody.ergonomics.posture_torques": "StaticTorques static_torques",
+        "wholebody.ergonomics.vision": "FieldOfView Sight sight",
+        "wholebody.ergonomics.work": "Work",
+    },
+)

@@ -8,11 +8,11 @@ from typing import Any
 
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, check_person
-from wholebody.ergonomics.owas import Owas, owas_code
-from wholebody.ergonomics.reba import Reba, reba_parts
-from wholebody.ergonomics.rula import Rula, rula_parts
+from wholebody.ergonomics.owas_score import Owas, owas_code
+from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
+from wholebody.ergonomics.reba_score import Reba, reba_parts
+from wholebody.ergonomics.rula_score import Rula, rula_parts
 from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.static_torques import StaticTorques, static_torques
 from wholebody.ergonomics.work import Work
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength

@@ -73,7 +73,7 @@ class Work:
         Raises:
             InputError: no angles of a body.
         """
-        checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.body_angles(figure, q)")
+        checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.ergonomics.body_angles(figure, q)")
         if self.seated is not None:
             return self.seated
         lies = all(
@@ -90,7 +90,7 @@ def check_work(work: object, what: str) -> Work:
     Raises:
         InputError: something else.
     """
-    return Work() if work is None else checks.instance(work, Work, what, "give wb.Work(load=5.0)")
+    return Work() if work is None else checks.instance(work, Work, what, "give wb.ergonomics.Work(load=5.0)")
 
 
 def both_feet(angles: BodyAngles) -> bool:

@@ -3,6 +3,7 @@
 from wholebody.figures.denavit_hartenberg import DenavitHartenberg, denavit_hartenberg
 from wholebody.figures.description import Chain, JointCone, Limits
 from wholebody.figures.figure import Figure
+from wholebody.figures.human.fingers import finger_angles
 from wholebody.figures.loading import load
 from wholebody.figures.packaged_urdf import urdf_path
 from wholebody.figures.reach_cones import ReachCone
@@ -15,6 +16,7 @@ __all__ = [
     "Limits",
     "ReachCone",
     "denavit_hartenberg",
+    "finger_angles",
     "load",
     "urdf_path",
 ]

@@ -1,6 +1,29 @@
 """The methods that find postures: one module or folder a method."""
 
+from __future__ import annotations
+
 from importlib.util import find_spec
+from typing import TYPE_CHECKING
+
+from wholebody.base.lazy import exported
+
+if TYPE_CHECKING:
+    from wholebody.methods.ccd.method import CCD
+    from wholebody.methods.damped_least_squares import DampedLeastSquares
+    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
+    from wholebody.methods.newton.assembly_solution import AssemblySolution
+    from wholebody.methods.placo.method import Placo
+
+__all__ = [
+    "CCD",
+    "EXTRAS",
+    "METHODS",
+    "AssemblyConstraint",
+    "AssemblySolution",
+    "DampedLeastSquares",
+    "Placo",
+    "installed_methods",
+]
 
 METHODS = ("qp", "ccd", "newton", "placo", "dls")
 """Names of all methods, the same in Python, in task files and on the command line."""
@@ -12,3 +35,15 @@ EXTRAS = {"placo": "placo"}
 def installed_methods() -> tuple[str, ...]:
     """Names of the methods that can be used here: all except those whose package is not installed."""
     return tuple(name for name in METHODS if name not in EXTRAS or find_spec(EXTRAS[name]) is not None)
+
+
+__getattr__, _ = exported(
+    __name__,
+    {
+        "wholebody.methods.ccd.method": "CCD",
+        "wholebody.methods.damped_least_squares": "DampedLeastSquares",
+        "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+        "wholebody.methods.newton.assembly_solution": "AssemblySolution",
+        "wholebody.methods.placo.method": "Placo",
+    },
+)

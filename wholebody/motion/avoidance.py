@@ -19,6 +19,7 @@ from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
+from wholebody.motion.clip_torques import torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
@@ -27,7 +28,6 @@ from wholebody.motion.smoothing import smoothed
 from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.torques import torques
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, filled
 
@@ -70,8 +70,8 @@ class AvoidanceReport:
         loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
         beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
             held at there, metres; 0 where nothing does.
-        jerk: largest root mean square jerk over half a second, in parts of the original's; see `wb.MotionBounds`.
-        speed: largest speed of a joint, in parts of the original's nearby; see `wb.MotionBounds`.
+        jerk: largest root mean square jerk over half a second, in parts of the original's; see `MotionBounds`.
+        speed: largest speed of a joint, in parts of the original's nearby; see `wb.motion.MotionBounds`.
         deviation: largest change of a posture that was free, radians or metres.
         smoothed: windows of frames that were too rough and were made smooth after the method.
         rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
@@ -158,7 +158,9 @@ def as_avoider(given: object) -> Avoider:
     if isinstance(given, str):
         return avoider_named(given)
     if isinstance(given, type) or not callable(getattr(given, "avoid", None)):
-        raise InputError(f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.Trajectory()")
+        raise InputError(
+            f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.motion.Trajectory()"
+        )
     if lacking := [part for part in ("name", "clearance", "dynamics") if not hasattr(given, part)]:
         raise InputError(f"avoid: method is {a(type(given))} without {lacking[0]}; see wholebody.motion.avoider")
     return given  # type: ignore[return-value]
@@ -177,17 +179,17 @@ def avoid(
 ) -> Avoided:
     """Free a clip of collisions of the figure with itself, with what it carries, and with what stands around.
 
-    Jerk, speed and the deviation of postures that were free are bounded, by `wb.MotionBounds()` unless `constraints`
+    Jerk, speed and the deviation of postures that were free are bounded, by `MotionBounds()` unless `constraints`
     has one of its own. What a method leaves beyond these bounds is made smooth by the program of "trajectory".
 
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "fade", "bisection", or configured, such as `wb.Trajectory(clearance=0.005)`.
+        method: "trajectory", "frames", "fade", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
-        hold_feet: keep the feet of a figure that has some where they stand, as `wb.StanceFeet()` does, unless
-            `constraints` has a `wb.StanceFeet` of its own; False lets them slide.
+        hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless
+            `constraints` has a `wb.motion.StanceFeet` of its own; False lets them slide.
         dynamics: keep the torques of joints within the strength of a person (a man of median strength if True; effort
             limits of a robot), and the zero moment point within the support. What the clip exceeds already is exceeded
             by no more: no joint needs more than its strength or than its largest torque before, and in no frame is the
@@ -262,7 +264,7 @@ def _bounds(
     """
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
-        raise InputError("avoid: constraints has two wb.MotionBounds; give one")
+        raise InputError("avoid: constraints has two wb.motion.MotionBounds; give one")
     asked = stated[0] if stated else MotionBounds()
     asked = replace(asked, keep_ends=True) if keep_ends else asked
     limits, state = terms.scene.figure.limits, terms.scene.state(clip.q[0])

@@ -1,4 +1,4 @@
-"""`wb.avoid_many`: clips freed of collisions, each with each equipment by each method, many at a time."""
+"""`wb.motion.avoid_many`: clips freed of collisions, each with each equipment by each method, many at a time."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ def avoid_many(
         clips: clips, or files of motion, which are read or retargeted for `figure` as `read_clip` does.
         folder: is made if it does not exist.
         figure: of the files; a clip has its own.
-        equipment: what is worn in turn: "nothing", names of `wb.equipment` such as "pack", joined by "+" where they are
-            worn together, paths of meshes, which are put on the back, `wb.Equipment`, or tuples of these.
+        equipment: what is worn in turn: "nothing", names of `wb.motion.equipment` such as "pack", joined by "+" where
+            they are worn together, paths of meshes for the back, `wb.motion.Equipment`, or tuples of these.
         methods: names or settings, see `avoid`.
         constraints: what holds in every frame of each case, see `avoid`.
         hold_feet: keep the feet where they stand, see `avoid`.
@@ -108,7 +108,7 @@ def avoid_many(
     """
     what = "avoid_many"
     sources = _sources(checks.listed(clips, f"{what}: clips", "['walk.bvh']"), figure, what)
-    given = checks.listed(constraints, f"{what}: constraints", "[wb.StanceFeet()]")
+    given = checks.listed(constraints, f"{what}: constraints", "[wb.motion.StanceFeet()]")
     pieces = checks.listed(equipment, f"{what}: equipment", "['nothing', 'pack']")
     twice = first_twice(label(one) for one in pieces)
     if twice is not None:

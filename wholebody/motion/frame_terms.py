@@ -253,7 +253,7 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
         else:
             raise InputError(
                 f"avoid: constraints[{number}] is {a(type(term))}, not a constraint; see wholebody.tasks, or give "
-                "wb.StanceFeet()"
+                "wb.motion.StanceFeet()"
             )
     plain = tuple(term for term in given if not isinstance(term, (StanceFeet, MotionBounds)))
     stands = tuple(map(tuple, feet))

@@ -9,8 +9,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.motion.clip import Clip
+from wholebody.motion.clip_torques import Torques, torques
 from wholebody.motion.strength import Strength
-from wholebody.motion.torques import Torques, torques
 
 TORQUE = 0.02
 """Share of its bound by which a torque may be beyond it: what filters and the frames in which feet stand change."""
@@ -25,7 +25,7 @@ class LoadChange:
 
     Attributes:
         before: torques of the clip as it was.
-        after: torques of the answer; both are those of `wb.torques`.
+        after: torques of the answer; both are those of `wb.motion.torques`.
         times: (m,) place of each frame of the answer in the frames before.
     """
 
@@ -87,7 +87,7 @@ class LoadChange:
 def load_change(
     before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str]
 ) -> LoadChange:
-    """Compare the loads of a clip before and after a change, both as `wb.torques` measures them.
+    """Compare the loads of a clip before and after a change, both as `wb.motion.torques` measures them.
 
     Args:
         before: torques of the clip as it was.

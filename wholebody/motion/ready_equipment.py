@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Mesh, Sphere
-from wholebody.motion.equipment import Equipment
+from wholebody.motion.worn_equipment import Equipment
 from wholebody.scene.scene import Scene
 
 CARRIERS = ("lower_thorax", "thorax")
@@ -99,7 +99,7 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     if not set(CARRIERS) <= set(figure.segments):
         raise InputError(
             f"equipment {name!r} fits a person, and {figure.name!r} lacks {', '.join(CARRIERS)}; "
-            "put it on with wb.Equipment(name, shape, to=..., at=...)"
+            "put it on with wb.motion.Equipment(name, shape, to=..., at=...)"
         )
     return READY[name](figure)
 

@@ -54,7 +54,7 @@ def retarget(
     """The motion of a skeleton as a clip of a figure.
 
     Args:
-        motion: the skeleton, from `wb.read_skeleton`.
+        motion: the skeleton, from `wb.motion.read_skeleton`.
         figure: the figure.
         names: which joint of the skeleton and which frame of the figure are which part of a body: a TOML file or a
             mapping; see docs/motion.md. CMU, Mixamo, LAFAN1, SMPL and DeepMimic are known.

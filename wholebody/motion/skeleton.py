@@ -209,4 +209,4 @@ def checked_motion(value: object, what: str) -> SkeletonMotion:
     Raises:
         InputError: it is something else.
     """
-    return instance(value, SkeletonMotion, what, "read one with wb.read_skeleton('walk.bvh')")
+    return instance(value, SkeletonMotion, what, "read one with wb.motion.read_skeleton('walk.bvh')")

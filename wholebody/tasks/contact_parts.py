@@ -7,7 +7,7 @@ constraint: the list of a problem in which it stands decides whether it is met i
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
@@ -36,6 +36,7 @@ class Part(Protocol):
         """Values (m,) and their derivative (m, nv)."""
 
 
+@runtime_checkable
 class Bounded(Part, Protocol):
     """A part whose rows have kinks."""
 
@@ -323,9 +324,8 @@ def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
     found = [no_planes(state.model.nv)]
     row = 0
     for number, part in enumerate(parts):
-        if hasattr(part, "planes"):
-            bounded: Bounded = part
-            planes = bounded.planes(state)
+        if isinstance(part, Bounded):
+            planes = part.planes(state)
             found.append(planes._replace(key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
         row += len(part.in_radians)
     return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))

@@ -90,7 +90,7 @@ def _share(distance: float, far: float) -> tuple[float, float]:
 
 def perpendicular(direction: Array) -> Array:
     """A unit vector (3,) perpendicular to one."""
-    return across(direction)[0]
+    return np.asarray(across(direction)[0])
 
 
 def rounded(thing: Surface) -> Surface:

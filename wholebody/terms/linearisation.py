@@ -22,10 +22,11 @@ from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks.base import MOST_PLANES, Bound, Constraint, Goal, Measure
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
-from wholebody.terms.plan import OtherTerm, TermPlan, checked_count, checked_rows, make_plan
+from wholebody.terms.plan import OtherTerm, TermPlan, checked_rows, make_plan
+from wholebody.terms.planes import TermPlanes, term_planes
 
 MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
 
@@ -74,34 +75,14 @@ class Linearisation(NamedTuple):
     planes: TermPlanes | None = None
 
 
-class TermPlanes(NamedTuple):
-    """Supporting planes of all terms; see `Goal.supporting_planes`.
-
-    Attributes:
-        value: (p,) not positive where the terms are met.
-        jacobian: (p, nv).
-        row: (p,) the first row of the term that a plane is of, goals' before constraints'.
-        key: (p,) names a plane from one posture to the next.
-        bend: (b, nv) rows b with the second derivatives of the terms' rows as sums of b' b.
-        bend_row: (b,) the row that a bend is of, goals' before constraints'.
-    """
-
-    value: Array
-    jacobian: Array
-    row: Indices
-    key: Indices
-    bend: Array
-    bend_row: Indices
-
-
 _NO_CONTACTS = Contacts(
     np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
     np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
 )  # fmt: skip
 
 
-_NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
-_NO_WRENCHES, _NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
+NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
+NO_WRENCHES, NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
 
 
 class PackedLinearisation(NamedTuple):
@@ -240,10 +221,12 @@ class Lineariser:
                 squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
                 squared = squared + term.weight * term.curvature(self.state)
         goals, contact = self._plan.goal_rows, self._contact[:count].copy()
+        terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
+        found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
             self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
-            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, self._planes() if planes else None,
+            measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, found,
         )  # fmt: skip
 
     def packed(self, q: Array, within: float) -> PackedLinearisation:
@@ -357,20 +340,6 @@ class Lineariser:
             wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
         )
 
-    def _planes(self) -> TermPlanes | None:
-        """Supporting planes of the terms that have some, where the state is."""
-        if not self._plan.others:
-            return None
-        found: list[TermPlanes] = []
-        row = 0
-        for term, count in zip((*self.goals, *self.constraints), self.rows(), strict=True):
-            planes = term.supporting_planes(self.state)
-            if planes is not None:
-                rows, key = np.full(len(planes.value), row, dtype=np.intp), planes.key + row * MOST_PLANES
-                found.append(TermPlanes(planes.value, planes.jacobian, rows, key, planes.bend, planes.bend_row + row))
-            row += count
-        return TermPlanes(*(np.concatenate(part) for part in zip(*found, strict=True))) if found else None
-
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
             # a joint out of its limits comes back no faster than the bound lets it
@@ -385,50 +354,17 @@ class Lineariser:
             measure[1, :-1] += term.weight * term.curvature(state)
 
 
-class ConstraintValues:
-    """Values of some constraints, and of nothing else, at any state of one model."""
-
-    def __init__(self, constraints: Sequence[Constraint], state: State) -> None:
-        """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
-        self._kernel = compiled_kernel()
-        self._plan = plan = make_plan(_NO_LIMITS, (), constraints, (), (), None, state)
-        self._model, rows, nv = state.model, plan.value_rows, state.model.nv
-        self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
-        self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
-        self._no_squares = np.zeros((0, nv))
-
-    def take(self, constraints: Sequence[Constraint]) -> bool:
-        """Put others in their place; False, and nothing is done, where these are not of the same classes and frames."""
-        plan = self._plan.with_terms((), self._model, constraints)
-        self._plan = self._plan if plan is None else plan
-        return plan is not None
-
-    def at(self, state: State) -> Array:
-        """The values (c,) where a state is; overwritten by the next call."""
-        plan, value = self._plan, self._value
-        self._kernel.linearise(
-            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            _NO_WRENCHES, _NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
-            self._no_squares,
-        )  # fmt: skip
-        for term, evaluate, row, rows in plan.others:
-            part = np.atleast_1d(evaluate(state))
-            checked_count(term, len(part), rows)
-            value[row : row + rows] = part
-        return value
-
-
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.terms import kernel as term_kernel
 
     state = State(pin.buildSampleModelManipulator())
-    plan = make_plan(_NO_LIMITS, (), (), (), (), None, state)
+    plan = make_plan(NO_LIMITS, (), (), (), (), None, state)
     nv = state.model.nv
     term_kernel.linearise(
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-        _NO_WRENCHES, _NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
+        NO_WRENCHES, NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
         np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
     )  # fmt: skip
     term_kernel.wrench_rows(

@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.attack.judging import Pairs, judge
 from wholebody.bench.attack.solves import verdict
-from wholebody.bench.stability.bodies import Builder, planar_arm, sliding_tool
+from wholebody.bench.suite.stability.bodies import Builder, planar_arm, sliding_tool
 
 REACHED = (0.6, 0.0, 0.0)
 

@@ -45,7 +45,7 @@ def test_a_hand_has_twenty_joints_and_the_rest_of_the_body_stays(figure):
 def test_the_hand_keeps_its_mass_and_its_length(sex):
     rigid, figure = wb.load("human", sex=sex), wb.load("human", sex=sex, hands="fingers")
     assert pin.computeTotalMass(figure.model) == pytest.approx(pin.computeTotalMass(rigid.model), abs=1e-8)
-    q = figure.with_joints(figure.neutral, wb.finger_angles("flat"))
+    q = figure.with_joints(figure.neutral, wb.figures.finger_angles("flat"))
     for side in ("left", "right"):
         middle = f"{side}_middle_tip"
         assert (
@@ -60,14 +60,14 @@ def test_shapes_of_the_hand_are_free_of_self_contact(sex, detail):
     figure = wb.load("human", sex=sex, detail=detail, hands="fingers")
     data = figure.model.createData()
     for shape in ("relaxed", "flat", "fist", "hook", "pinch", "pointing"):
-        q = figure.with_joints(figure.posture("a_pose"), wb.finger_angles(shape))
+        q = figure.with_joints(figure.posture("a_pose"), wb.figures.finger_angles(shape))
         assert figure.within_limits(q, 0.0), shape
         assert min(gaps(figure.model, figure.geometry, q, data))[0] > 1e-3, shape
 
 
 def test_a_fist_closes_and_a_pinch_nearly_does(figure):
-    q = figure.with_joints(figure.posture("a_pose"), wb.finger_angles("pinch", "left"))
-    q = figure.with_joints(q, wb.finger_angles("fist", "right"))
+    q = figure.with_joints(figure.posture("a_pose"), wb.figures.finger_angles("pinch", "left"))
+    q = figure.with_joints(q, wb.figures.finger_angles("fist", "right"))
 
     def apart(first, second):
         return np.linalg.norm(figure.placement(q, first).translation - figure.placement(q, second).translation)
@@ -133,7 +133,7 @@ BEFORE, BESIDE = (80.0, (0.45, -0.25, 1.2)), (10.0, (0.35, -0.35, 1.0))
 )
 def test_a_power_grip_does_not_depend_on_how_the_hand_begins(figure, radius, shape, elbow, at):
     scene = wb.Scene(figure).add(wb.Capsule(radius, 0.3), name="bar", at=at)
-    bent = {"right_elbow_flexion": np.radians(elbow), **wb.finger_angles(shape, "right")}
+    bent = {"right_elbow_flexion": np.radians(elbow), **wb.figures.finger_angles(shape, "right")}
     start = figure.with_joints(figure.posture("standing"), bent)
     grasp = wb.Grasp("right", "bar", "power")
     assert wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET)).status == "solved"
@@ -172,7 +172,7 @@ def test_mujoco_has_the_same_places(figure, tmp_path):
     assert main(["figure", "human", "--hands", "fingers", "--out", str(path)]) == 0
     model = mujoco.MjModel.from_xml_path(str(path))
     assert model.nv == 89
-    data, q = mujoco.MjData(model), figure.with_joints(pin.neutral(figure.model), wb.finger_angles("fist"))
+    data, q = mujoco.MjData(model), figure.with_joints(pin.neutral(figure.model), wb.figures.finger_angles("fist"))
     for joint, value in figure.joint_values(q).items():
         data.joint(joint).qpos = value
     mujoco.mj_forward(model, data)
@@ -201,15 +201,15 @@ def test_wrong_hands_are_refused_in_one_sentence(options, sentence):
     with pytest.raises(wb.WholebodyError, match=sentence):
         wb.load("human", **options)
     with pytest.raises(wb.WholebodyError, match="open"):
-        wb.finger_angles("open")
+        wb.figures.finger_angles("open")
     with pytest.raises(wb.InputError, match=r"give .left. or .right."):
-        wb.finger_angles("flat", "up")
+        wb.figures.finger_angles("flat", "up")
 
 
 def test_a_flat_hand_closes_around_a_thin_bar(figure):
     """A relaxed hand ends with the thumb between this bar and the palm."""
     scene = wb.Scene(figure).add(wb.Capsule(0.0125, 0.3), name="bar", at=(0.40, -0.2, 1.1))
-    flat = {"right_elbow_flexion": np.radians(80.0), **wb.finger_angles("flat", "right")}
+    flat = {"right_elbow_flexion": np.radians(80.0), **wb.figures.finger_angles("flat", "right")}
     start = figure.with_joints(figure.posture("standing"), flat)
     grasp = wb.Grasp("right", "bar", "power")
     solution = wb.solve(wb.Problem(scene, start=start, goals=[grasp], constraints=FEET), method="qp")

@@ -37,7 +37,7 @@ def test_reachable_targets_are_reached(
         place = _target(human, "right_index_tip", q)
         goal = wb.Frame("right_index_tip", place) if kind == "frame" else wb.Point("right_index_tip", place.translation)
         problem = wb.Problem(scene, goals=[goal], constraints=[wb.ReachCones()] if coned else [], range_of_motion=False)
-        solution = wb.CCD().solve(problem)
+        solution = wb.methods.CCD().solve(problem)
         assert human.within_limits(solution.q)
         assert deepest(scene, solution.q) <= 1.1e-4
         if coned:
@@ -59,7 +59,7 @@ def test_two_hands_and_the_spine_at_once(human: wb.Figure, random_joints: Callab
     goals = [wb.Point(frame, _target(human, frame, q).translation) for frame in ("right_index_tip", "left_index_tip")]
     goals.append(wb.Orientation("thorax", _target(human, "thorax", q).rotation))
     problem = wb.Problem(wb.Scene(human), "arms_forward", goals=goals)
-    assert wb.CCD().solve(problem).solved
+    assert wb.methods.CCD().solve(problem).solved
 
 
 def test_a_target_behind_a_plate_is_reached_without_touching_it(
@@ -76,7 +76,9 @@ def test_a_target_inside_a_thing_is_unreachable_and_nothing_is_violated(
     human: wb.Figure, deepest: Callable[..., float]
 ) -> None:
     scene = wb.Scene(human).add(wb.Box((0.4, 2.0, 0.8)), name="block", at=(0.7, 0.0, 1.0))
-    solution = wb.CCD(restarts=3).solve(wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.7, -0.2, 1.0))]))
+    solution = wb.methods.CCD(restarts=3).solve(
+        wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.7, -0.2, 1.0))])
+    )
     assert solution.status in ("unreachable", "stalled")
     assert deepest(scene, solution.q) <= 1.1e-4
     assert solution.assessment.goal_error > 0.1
@@ -91,14 +93,14 @@ def test_a_start_inside_a_thing_is_left(
     scene = wb.Scene(human).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=beside)
     assert deepest(scene, human.neutral) > 0.05
     problem = wb.Problem(scene, goals=[wb.Point("left_index_tip", (0.3, 0.25, 1.0))])
-    solution = wb.CCD().solve(problem)
+    solution = wb.methods.CCD().solve(problem)
     assert solution.status == "solved", solution.message
     assert deepest(scene, solution.q) <= 1.1e-4
 
 
 def test_the_same_seed_gives_the_same_posture(human: wb.Figure) -> None:
     problem = wb.Problem(wb.Scene(human), goals=[wb.Point("right_index_tip", (-0.1, -0.25, 1.2))])
-    first, again = wb.CCD(seed=4).solve(problem), wb.CCD(seed=4).solve(problem)
+    first, again = wb.methods.CCD(seed=4).solve(problem), wb.methods.CCD(seed=4).solve(problem)
     assert (first.q == again.q).all()
 
 
@@ -109,7 +111,7 @@ def test_frozen_joints_and_held_feet_stay(human: wb.Figure) -> None:
         goals=[wb.Point("right_index_tip", (0.4, -0.3, 1.2))],
         constraints=[wb.Hold("left_foot"), wb.Hold("right_foot"), wb.Freeze(*fixed), wb.StepLimit(1.0)],
     )
-    solution = wb.CCD().solve(problem)
+    solution = wb.methods.CCD().solve(problem)
     assert solution.solved
     dofs = human.dofs([*fixed, "left_leg", "right_leg", "root"])
     assert not np.asarray(pin.difference(human.model, problem.start, solution.q))[dofs].any()
@@ -127,7 +129,7 @@ def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
         measures=[wb.Effort(), wb.Discomfort()],
     )
     with pytest.raises(UnsupportedTermError) as caught:
-        wb.CCD().solve(problem)
+        wb.methods.CCD().solve(problem)
     assert isinstance(caught.value, wb.InputError)
     for part in ("goals[1], CenterOfMass", "pelvis", "Balance", "right_hand", "left_foot", "Effort", "Discomfort"):
         assert part in str(caught.value)
@@ -137,7 +139,7 @@ def test_what_cannot_be_taken_is_named(human: wb.Figure) -> None:
 @pytest.mark.parametrize("settings", [{"tolerance": 0.0}, {"tolerance": np.nan}, {"iterations": 0}, {"restarts": -1}])
 def test_settings_out_of_range(settings: dict[str, Any]) -> None:
     with pytest.raises(wb.InputError):
-        wb.CCD(**settings)
+        wb.methods.CCD(**settings)
 
 
 def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.Figure]) -> None:
@@ -149,10 +151,10 @@ def test_an_arm_is_pushed_out_of_what_came_onto_it(planar_arm: Callable[..., wb.
     across = np.array([-np.sin(0.1), np.cos(0.1), 0.0])
     scene.move("ball", at=tuple(middle + (0.08 + 0.02 - 0.015) * across))
     assert wb.assess(problem, q).penetration == pytest.approx(0.015, abs=1e-6)
-    out = wb.CCD().pushed_out(problem, q)
+    out = wb.methods.CCD().pushed_out(problem, q)
     assert wb.assess(problem, out).penetration < 1e-4
     assert 1e-4 < np.abs(out - q).max() < 0.2
     assert scene.sweep(q, out, 5e-4) is None
     scene.add(wb.Sphere(0.1), name="more")
     with pytest.raises(wb.InputError):
-        wb.CCD().pushed_out(problem, q)
+        wb.methods.CCD().pushed_out(problem, q)

@@ -76,7 +76,7 @@ def test_two_links_reach_where_the_triangle_says(radius: float, angle: float, pl
     figure = planar_arm((0.4, 0.3))
     target = (radius * np.cos(angle), radius * np.sin(angle), 0.0)
     problem = wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", target)])
-    solution = wb.CCD(tolerance=1e-5).solve(problem)
+    solution = wb.methods.CCD(tolerance=1e-5).solve(problem)
     assert solution.solved
     bend = np.arccos((radius**2 - 0.4**2 - 0.3**2) / (2.0 * 0.4 * 0.3))
     assert abs(solution.q[1]) == pytest.approx(bend, abs=2e-3)
@@ -88,7 +88,7 @@ def test_an_orientation_in_the_plane_makes_three_links_unique(planar_arm: Callab
     wrist = np.array([0.35, 0.3])
     tip = wrist + 0.2 * np.array([np.cos(heading), np.sin(heading)])
     target = pin.SE3(pin.exp3(np.array([0.0, 0.0, heading])), np.array([*tip, 0.0]))
-    solution = wb.CCD(tolerance=1e-5).solve(wb.Problem(wb.Scene(figure), goals=[wb.Frame("tip", target)]))
+    solution = wb.methods.CCD(tolerance=1e-5).solve(wb.Problem(wb.Scene(figure), goals=[wb.Frame("tip", target)]))
     assert solution.solved
     assert solution.q.sum() == pytest.approx(heading, abs=1e-4)
     bend = np.arccos((wrist @ wrist - 0.4**2 - 0.3**2) / (2.0 * 0.4 * 0.3))
@@ -100,12 +100,12 @@ def test_a_straight_arm_leaves_the_line_to_its_target(reach: float, planar_arm: 
     """The classical trap: joint, tip and target on one line, where no single joint gains anything."""
     figure = planar_arm((0.4, 0.3, 0.2))
     problem = wb.Problem(wb.Scene(figure), np.zeros(3), goals=[wb.Point("tip", (reach, 0.0, 0.0))])
-    assert wb.CCD().solve(problem).solved
+    assert wb.methods.CCD().solve(problem).solved
 
 
 def test_a_target_out_of_reach_is_said_to_be_so(planar_arm: Callable[..., Any]) -> None:
     figure = planar_arm((0.4, 0.3))
-    solution = wb.CCD().solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", (0.6, 0.6, 0.0))]))
+    solution = wb.methods.CCD().solve(wb.Problem(wb.Scene(figure), goals=[wb.Point("tip", (0.6, 0.6, 0.0))]))
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(np.hypot(0.6, 0.6) - 0.7, abs=1e-4)
 

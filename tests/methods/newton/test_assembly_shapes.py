@@ -184,7 +184,7 @@ def test_surfaces_have_the_derivatives_of_differences() -> None:
                 assert slope[column] == pytest.approx(difference, abs=1e-6)
 
 
-class Rope(wb.AssemblyConstraint):
+class Rope(wb.methods.AssemblyConstraint):
     """The origins of two bodies are at most a length apart, in squares."""
 
     one_sided = True

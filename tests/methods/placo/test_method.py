@@ -70,7 +70,7 @@ def test_every_term_that_it_takes_means_what_ours_means(human: wb.Figure) -> Non
         ],
         measures=[wb.Effort(), wb.Displacement(0.1)],
     )  # fmt: skip
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.solved, solution.message
     honest(problem, solution)
     still = human.dofs(["right_hip_rotation"])
@@ -86,7 +86,7 @@ def test_center_of_mass_and_posture(human: wb.Figure) -> None:
         goals=[wb.CenterOfMass(over, axes="xy"), wb.Posture(turned, joints=["neck1_rotation"])],
         constraints=feet(),
     )  # fmt: skip
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.solved, solution.message
     honest(problem, solution)
 
@@ -98,7 +98,7 @@ def test_its_robot_has_our_kinematics_mass_and_distances(human: wb.Figure) -> No
     tip = human.frame_id("right_index_tip")
     frame = human.model.frames[tip]
     robot = Robot(human, {"tip": (frame.parentJoint, frame.placement)})
-    robot.add_pieces(problem, wb.Placo().pairs(problem))
+    robot.add_pieces(problem, wb.methods.Placo().pairs(problem))
     rng = np.random.default_rng(4)
     for _ in range(3):
         q = human.clamp(pin.integrate(human.model, human.neutral, 0.3 * rng.normal(size=human.model.nv)))
@@ -119,7 +119,7 @@ def test_a_continuous_joint_turns_more_than_once_round_half(root: Any) -> None:
     tip = figure.model.names[-1]
     goal = wb.Point(tip, frame_at(figure, figure.clamp(witness), tip).translation)
     problem = wb.Problem(wb.Scene(figure), goals=[goal])
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.solved, solution.message
     honest(problem, solution)
 
@@ -128,7 +128,7 @@ def test_out_of_reach_by_a_metre_ends_and_is_not_called_solved(planar_arm: Calla
     problem = wb.Problem(
         wb.Scene(planar_arm((0.4, 0.3))), np.array([0.2, 0.9]), goals=[wb.Point("tip", (0.0, 1.7, 0.0))]
     )
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.status == "unreachable", solution.message
     assert honest(problem, solution).goal_error == pytest.approx(1.0, abs=1e-4)
 
@@ -136,7 +136,7 @@ def test_out_of_reach_by_a_metre_ends_and_is_not_called_solved(planar_arm: Calla
 def test_a_goal_that_is_met_at_the_start_needs_no_program(human: wb.Figure) -> None:
     place = frame_at(human, human.neutral, "right_index_tip").translation
     problem = wb.Problem(wb.Scene(human), goals=[wb.Point("right_index_tip", place)])
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.solved
     assert solution.iterations == 0
     assert np.array_equal(solution.q, problem.start)
@@ -145,7 +145,7 @@ def test_a_goal_that_is_met_at_the_start_needs_no_program(human: wb.Figure) -> N
 def test_where_placo_finds_no_solution_its_words_are_told(human: wb.Figure) -> None:
     scene = wb.Scene(human).add(wb.Box((0.6, 0.6, 0.6)), name="block", at=(0.0, 0.0, 1.2))
     problem = wb.Problem(scene, goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.0))], constraints=feet())
-    solution = wb.Placo().solve(problem)
+    solution = wb.methods.Placo().solve(problem)
     assert solution.status == "infeasible"
     assert "placo gave up" in solution.message
     assert "nfeasible" in solution.message
@@ -156,7 +156,7 @@ def test_where_placo_finds_no_solution_its_words_are_told(human: wb.Figure) -> N
 def test_an_object_that_moved_is_avoided_where_it_is_now(planar_arm: Callable[..., wb.Figure]) -> None:
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.2))).add(wb.Sphere(0.05), name="ball", at=(3.0, 0.0, 0.0))
     problem = wb.Problem(scene, np.array([0.3, 0.4, 0.4]), goals=[wb.Point("tip", (0.1, 0.7, 0.0))])
-    method = wb.Placo()
+    method = wb.methods.Placo()
     first = method.solve(problem)
     assert first.solved, first.message
     elbow = frame_at(scene.figure, first.q, "link2").translation
@@ -180,18 +180,18 @@ def test_an_object_that_moved_is_avoided_where_it_is_now(planar_arm: Callable[..
 def test_what_it_has_no_class_for_is_refused_by_name(human: wb.Figure, terms: dict[str, Any], word: str) -> None:
     problem = wb.Problem(wb.Scene(human), **terms)
     with pytest.raises(InputError, match=word):
-        wb.Placo().solve(problem)
+        wb.methods.Placo().solve(problem)
     with pytest.raises(InputError, match=word):
-        wb.Placo().prepare(problem)
+        wb.methods.Placo().prepare(problem)
 
 
 def test_a_ball_joint_is_refused_by_name(free_bodies: Callable[..., wb.Figure]) -> None:
     figure = free_bodies(wb.Sphere(0.1), wb.Sphere(0.1))
     with pytest.raises(InputError, match="free1"):
-        wb.Placo().solve(wb.Problem(wb.Scene(figure)))
+        wb.methods.Placo().solve(wb.Problem(wb.Scene(figure)))
 
 
 @pytest.mark.parametrize("settings", [{"tolerance": 1.0}, {"iterations": 0}])
 def test_settings_out_of_range_are_refused(settings: dict[str, float]) -> None:
     with pytest.raises(InputError, match=next(iter(settings))):
-        wb.Placo(**settings)  # type: ignore[arg-type]
+        wb.methods.Placo(**settings)  # type: ignore[arg-type]

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.stability.bodies import Builder
+from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 
 

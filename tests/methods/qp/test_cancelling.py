@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.stability.posed import cancelling
+from wholebody.bench.suite.stability.posed import cancelling
 from wholebody.methods.qp.cancelling import posture_apart
 
 JOINT = (

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.problem_sets.registry import SETS
-from wholebody.bench.stability.posed import the_long_way_round
+from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.stability.posed import the_long_way_round
 
 
 def test_a_goal_beyond_a_limit_is_reached_from_the_other_side(honest):

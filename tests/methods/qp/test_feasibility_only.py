@@ -27,7 +27,7 @@ def test_feasibility_only_begins_like_damped_least_squares(planar_arm):
     goals = [wb.Point("tip", (0.3, 0.5, 0.0))]
     problem = wb.Problem(scene, start=np.array([0.1, 0.4, 0.3]), goals=goals, measures=[wb.Displacement()])
     mine = wb.QP(measures=False).solve(problem).trace
-    textbook = wb.DampedLeastSquares().solve(problem).trace[1:]  # whose first entry is the start
+    textbook = wb.methods.DampedLeastSquares().solve(problem).trace[1:]  # whose first entry is the start
     assert len(mine) >= 4
     for ours, theirs in zip(mine[:4], textbook, strict=False):
         assert ours.step == pytest.approx(theirs.step, abs=1e-4)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.reaches import reach
-from wholebody.bench.stability.posed import collinear_start
+from wholebody.bench.measure.reaches import reach
+from wholebody.bench.suite.stability.posed import collinear_start
 from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver

@@ -9,8 +9,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.problem_sets.robot_arm import SET as ROBOT_ARMS
-from wholebody.bench.stability.posed import cancelling
+from wholebody.bench.suite.problem_sets.robot_arm import SET as ROBOT_ARMS
+from wholebody.bench.suite.stability.posed import cancelling
 
 LENGTHS = (0.5, 0.4)
 
@@ -292,7 +292,7 @@ def test_what_is_no_problem_or_method_is_refused(planar_arm):
 def test_one_degree_of_freedom_is_enough(planar_arm):
     goal = (0.4 * np.cos(0.3), 0.4 * np.sin(0.3), 0.0)
     problem = wb.Problem(wb.Scene(planar_arm((0.4,))), goals=[wb.Point("tip", goal)])
-    for method in (wb.QP(), wb.QP(measures=False), wb.Newton(), wb.CCD()):
+    for method in (wb.QP(), wb.QP(measures=False), wb.Newton(), wb.methods.CCD()):
         assert method.solve(problem).q == pytest.approx([0.3], abs=1e-4)
 
 

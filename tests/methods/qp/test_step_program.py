@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.adapters.registry import make_tool
-from wholebody.bench.track import judge, track
+from wholebody.bench.measure.track import judge, track
+from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.figures.state import State
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.step_program import (

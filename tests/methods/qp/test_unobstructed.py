@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.stability.bodies import spatial_arm
+from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.methods.control import Control

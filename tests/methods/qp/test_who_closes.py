@@ -22,7 +22,7 @@ def over_a_table(spatial_arm) -> wb.Problem:
 
 @pytest.fixture(scope="module")
 def spatial_arm():
-    from wholebody.bench.stability.bodies import spatial_arm
+    from wholebody.bench.suite.stability.bodies import spatial_arm
 
     return spatial_arm
 
@@ -85,7 +85,7 @@ def test_active_sets_throughout(over_a_table):
 
 
 def test_other_methods_have_no_programs(over_a_table):
-    assert wb.CCD().solve(over_a_table).programs == {}
+    assert wb.methods.CCD().solve(over_a_table).programs == {}
 
 
 @pytest.mark.parametrize("method", [wb.QP(), wb.QP(hot_start=False), wb.QP(solver="active_set")])

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.motion.cases import synthetic
+from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress
@@ -153,7 +153,7 @@ def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figu
     """They stand in each other by 4 cm and are held 1 mm apart: with 5 mm of room every posture missed a hold."""
     close = {"left_hip_abduction": -0.06, "right_hip_abduction": -0.06}
     q, scene = person.with_joints(person.posture("standing"), close), dressed(person, "pouches")
-    terms = frame_terms(scene, np.array([q] * 9), 1 / 30, [wb.StanceFeet()])
+    terms = frame_terms(scene, np.array([q] * 9), 1 / 30, [wb.motion.StanceFeet()])
     with scene.borrow() as workspace:
         method = QP(restarts=0, iterations=50)
         found = Predictor(scene, terms.q, terms, ("root",), method, 0.005, 5e-5, workspace).predict(4, q)
@@ -169,7 +169,7 @@ def test_evaluation_points_that_went_far_follow_from_the_next_one_where_that_is_
     """A squat with pouches: from the points before them two went to 0.215 rad, with those after them it is 0.165."""
     whole, scene = synthetic("squat", person), dressed(person, "pouches")
     clip = Clip(person, whole.q[::2], 2.0 * whole.dt)
-    result = Bisection().avoid(clip, scene, (wb.StanceFeet(),), None)
+    result = Bisection().avoid(clip, scene, (wb.motion.StanceFeet(),), None)
     assert result.message == ""
     assert depths(scene, result.q).max() <= DEEP
     assert deviation(clip, clip.with_q(result.q)).angle < 0.19
@@ -223,7 +223,7 @@ def test_a_foot_that_stands_has_no_plane_of_its_path(swing: Clip, monkeypatch: p
         return path_planes(figure, q, frame, joints, state)
 
     monkeypatch.setattr("wholebody.motion.bisection.recursion.path_planes", noted)
-    result = Bisection().avoid(clip, scene, [wb.StanceFeet()], None)
+    result = Bisection().avoid(clip, scene, [wb.motion.StanceFeet()], None)
     assert result.message == ""
     assert asked == {("left_elbow", "right_elbow", "left_ankle")}
 

@@ -19,7 +19,7 @@ def test_a_hand_that_may_turn_keeps_its_room(turns: bool) -> None:
     scene.add(wb.Sphere(0.03), name="ball", at=tip.copy())
     clip = wb.Clip(person, np.repeat(q[None], 3, axis=0), 1 / 30)
     held = wb.Hold("right_palm", orientation=not turns)
-    found = wb.avoid(clip, scene, method=wb.Bisection(room=ROOM), constraints=[held])
+    found = wb.avoid(clip, scene, method=wb.motion.Bisection(room=ROOM), constraints=[held])
     with scene.borrow() as workspace:
         near = workspace.near(found.clip.q[1], 2.0 * ROOM)
         owners = [{workspace.owners[a], workspace.owners[b]} for a, b in near.pair]

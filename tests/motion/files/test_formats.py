@@ -322,7 +322,7 @@ def turned(*turns: tuple[str, float]) -> np.ndarray:
 
 def test_channels_of_any_order_are_read(tmp_path: Path) -> None:
     (tmp_path / "a.bvh").write_text(BVH)
-    motion = wb.read_skeleton(tmp_path / "a.bvh")
+    motion = wb.motion.read_skeleton(tmp_path / "a.bvh")
     assert motion.names == ("hips", "Bip01 L Thigh", "shank", "shank_end", "spine")
     assert motion.notes == ("y is up", "lengths are in centimetres")
     ours = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
@@ -340,9 +340,9 @@ def test_up_and_units_are_recognised_or_said(tmp_path: Path) -> None:
     (tmp_path / "inch.bvh").write_text(BVH.replace("100", "50").replace("-40", "-20").replace("10 0 0", "5 0 0"))
     standing = BVH.replace("OFFSET 0 100 0", "OFFSET 0 0 100").replace("OFFSET 0 -40 0", "OFFSET 0 0 -40")
     (tmp_path / "z.bvh").write_text(standing)
-    assert wb.read_skeleton(tmp_path / "z.bvh").notes[0] == "z is up"
-    assert wb.read_skeleton(tmp_path / "inch.bvh").notes[1] == "lengths are in inches"
-    said = wb.read_skeleton(tmp_path / "a.bvh", unit="metres", up="z")
+    assert wb.motion.read_skeleton(tmp_path / "z.bvh").notes[0] == "z is up"
+    assert wb.motion.read_skeleton(tmp_path / "inch.bvh").notes[1] == "lengths are in inches"
+    said = wb.motion.read_skeleton(tmp_path / "a.bvh", unit="metres", up="z")
     assert said.notes == ()
     assert said.positions[0, 0] == pytest.approx([1.0, 90.0, 2.0])
 
@@ -402,7 +402,7 @@ def amass(path: Path, **changed: Any) -> Path:
 
 def test_an_archive_of_amass_stands_upright_and_faces_forward(tmp_path: Path, human: Figure) -> None:
     """A root turned by a right angle about x takes the template's y (up) to z, and its z (forward) to -y."""
-    motion = wb.read_skeleton(amass(tmp_path / "a.npz", poses=np.tile([np.pi / 2] + [0.0] * 155, (7, 1))))
+    motion = wb.motion.read_skeleton(amass(tmp_path / "a.npz", poses=np.tile([np.pi / 2] + [0.0] * 155, (7, 1))))
     at = dict(zip(motion.names, motion.positions[0], strict=True))
     assert motion.dt == pytest.approx(1 / 60)
     assert at["head"][2] > at["pelvis"][2] + 0.4 > at["left_ankle"][2] + 0.8
@@ -457,7 +457,7 @@ def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> No
         rows = [" ".join(f"{value:.6f}" for value in (0, 1, 0, 0, 0, 0, *row)) for row in angles]
         text = "\n".join([*header, "MOTION", f"Frames: {len(rows)}", "Frame Time: 0.0333333", *rows, ""])
         (tmp_path / "a.bvh").write_text(text)
-        return len(wb.read_skeleton(tmp_path / "a.bvh").positions)
+        return len(wb.motion.read_skeleton(tmp_path / "a.bvh").positions)
 
     assert frames(np.vstack([rest, moving])) == 20
     assert frames(moving) == 20

@@ -198,7 +198,7 @@ def runs_of_a_window(
 
     monkeypatch.setattr(WindowProgram, "run", told)
     monkeypatch.setattr(window_run, "depths_between", lambda *given: {0: said.pop() if said else 0.0})
-    freed = wb.avoid(clip, scene, method=wb.Trajectory(margin=10.0, time=0.1))
+    freed = wb.avoid(clip, scene, method=wb.motion.Trajectory(margin=10.0, time=0.1))
     assert freed.report.solved, freed.report.message
     return runs
 

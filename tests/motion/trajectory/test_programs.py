@@ -54,9 +54,9 @@ def test_solvers_agree_with_a_dense_one(name: str, seed: int) -> None:
 
 def test_an_unknown_solver_is_refused() -> None:
     with pytest.raises(wb.UnknownNameError, match="osqp"):
-        wb.Trajectory(solver="osq")
+        wb.motion.Trajectory(solver="osq")
     with pytest.raises(wb.InputError, match="solver"):
-        wb.Trajectory(solver=3)  # type: ignore[arg-type]
+        wb.motion.Trajectory(solver=3)  # type: ignore[arg-type]
 
 
 def brought_back(

@@ -74,7 +74,7 @@ def test_a_clip_is_slowed_where_joints_are_too_fast(planar_arm: Callable[..., Fi
     clip = swung(planar_arm)
     fastest = float(np.abs(np.diff(clip.q, axis=0)).max()) / DT
     limit = 0.7 * fastest
-    found = wb.avoid(clip, method=wb.Trajectory(stretch=2.0), constraints=[wb.StepLimit(limit)])
+    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=2.0), constraints=[wb.StepLimit(limit)])
     report, times = found.report, found.report.times
     assert found.clip.dt == clip.dt
     assert report.solved, report.message
@@ -94,7 +94,7 @@ def test_a_clip_is_slowed_where_joints_are_too_fast(planar_arm: Callable[..., Fi
 
 def test_the_bound_on_slowing_holds_where_it_is_not_enough(planar_arm: Callable[..., Figure]) -> None:
     clip = swung(planar_arm)
-    found = wb.avoid(clip, method=wb.Trajectory(stretch=1.2), constraints=[wb.StepLimit(0.5)])
+    found = wb.avoid(clip, method=wb.motion.Trajectory(stretch=1.2), constraints=[wb.StepLimit(0.5)])
     assert found.report.stretch <= 1.2
     assert not found.report.solved
     assert "a speed that was given is exceeded by" in found.report.message
@@ -113,7 +113,7 @@ def test_what_is_freed_and_slowed_is_free_and_slow(planar_arm: Callable[..., Fig
     free = wb.avoid(clip, scene)
     assert free.report.before.colliding
     limit = 0.6 * float(np.abs(np.diff(free.clip.q, axis=0)).max()) / DT
-    found = wb.avoid(clip, scene, method=wb.Trajectory(stretch=3.0), constraints=[wb.StepLimit(limit)])
+    found = wb.avoid(clip, scene, method=wb.motion.Trajectory(stretch=3.0), constraints=[wb.StepLimit(limit)])
     assert found.report.solved, found.report.message
     assert found.report.stretch > 1.1
     assert np.abs(np.diff(found.clip.q, axis=0)).max() <= limit * DT + 1e-6
@@ -131,4 +131,4 @@ def test_a_small_step_can_be_twice_as_fast_as_was_asked(planar_arm: Callable[...
 @pytest.mark.parametrize("stretch", [0.5, float("nan"), "2", 1e9])
 def test_a_wrong_stretch_is_refused(stretch: object) -> None:
     with pytest.raises(wb.InputError, match="stretch"):
-        wb.Trajectory(stretch=stretch)  # type: ignore[arg-type]
+        wb.motion.Trajectory(stretch=stretch)  # type: ignore[arg-type]

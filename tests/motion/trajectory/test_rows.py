@@ -144,7 +144,9 @@ def test_loads_change_as_their_rows_say(human: Figure, node: Node) -> None:
     q = np.array([pin.integrate(human.model, deep, SMALL * random.normal(size=human.model.nv)) for _ in range(frames)])
     stands = {"left_foot": np.ones(frames, dtype=bool), "right_foot": np.ones(frames, dtype=bool)}
     clip = wb.Clip(human, q, 0.1)
-    loads = ClipLoads.original(clip, stands, wb.Strength(5.0, "female"), frame_terms(wb.Scene(human), q, 0.1, ()))
+    loads = ClipLoads.original(
+        clip, stands, wb.motion.Strength(5.0, "female"), frame_terms(wb.Scene(human), q, 0.1, ())
+    )
     look = NodeEvaluator(
         wb.Scene(human).workspace(), Chart(human.model, q[2:5]), [()] * 3, 0.0, WindowLoads(loads, 2, 3)
     )

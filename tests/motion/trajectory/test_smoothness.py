@@ -27,7 +27,7 @@ def past_a_ball(figure: Figure, brief: int, shake: float) -> tuple[wb.Clip, wb.S
     return wb.Clip(figure, q, DT), scene
 
 
-def found(clip: wb.Clip, scene: wb.Scene, method: wb.Trajectory) -> tuple[float, float]:
+def found(clip: wb.Clip, scene: wb.Scene, method: wb.motion.Trajectory) -> tuple[float, float]:
     """Deviation in radians, and jerk in parts of that before."""
     freed = wb.avoid(clip, scene, method=method)
     assert freed.report.solved, freed.report.message
@@ -36,27 +36,27 @@ def found(clip: wb.Clip, scene: wb.Scene, method: wb.Trajectory) -> tuple[float,
 
 def test_a_clip_that_shakes_anyhow_is_left_by_less(planar_arm: Callable[..., Figure]) -> None:
     case = past_a_ball(planar_arm((0.5, 0.5), radius=0.02), 4, 2e-3)
-    angle, jerk = found(*case, wb.Trajectory())
-    smooth, _ = found(*case, wb.Trajectory(time=0.1))
+    angle, jerk = found(*case, wb.motion.Trajectory())
+    smooth, _ = found(*case, wb.motion.Trajectory(time=0.1))
     assert angle < 0.9 * smooth
     assert jerk <= 1.2
 
 
 def test_an_answer_that_jerks_is_made_smoother(planar_arm: Callable[..., Figure]) -> None:
     case = past_a_ball(planar_arm((0.5, 0.5), radius=0.02), 4, 0.0)
-    _, jerk = found(*case, wb.Trajectory())
-    _, before = found(*case, wb.Trajectory(time=0.1))
+    _, jerk = found(*case, wb.motion.Trajectory())
+    _, before = found(*case, wb.motion.Trajectory(time=0.1))
     assert jerk <= 1.2 < before
 
 
 def test_what_would_jerk_stays_as_smooth_as_it_is(planar_arm: Callable[..., Figure]) -> None:
     case = past_a_ball(planar_arm((0.5, 0.5), radius=0.02), 8, 0.0)
-    angle, jerk = found(*case, wb.Trajectory())
-    nearer, rough = found(*case, wb.Trajectory(time=0.04))
+    angle, jerk = found(*case, wb.motion.Trajectory())
+    nearer, rough = found(*case, wb.motion.Trajectory(time=0.04))
     assert jerk <= 1.2 < rough
     assert nearer < angle
 
 
 def test_a_wrong_time_is_refused() -> None:
     with pytest.raises(wb.InputError, match="time"):
-        wb.Trajectory(time=-1.0)
+        wb.motion.Trajectory(time=-1.0)

@@ -30,12 +30,12 @@ def test_the_table_is_that_of_the_paper_both_ways(pair: tuple[str, str], values:
 
 
 def test_a_material_of_ones_own_says_how_it_touches() -> None:
-    rubber = wb.Material("rubber", {"wood": (0.8, 0.9)}, others=(0.5, 0.6))
+    rubber = wb.dynamics.Material("rubber", {"wood": (0.8, 0.9)}, others=(0.5, 0.6))
     assert tuple(surface(MATERIALS["wood"], rubber)) == (0.8, 0.9)
     assert tuple(surface(rubber, MATERIALS["metal"])) == (0.5, 0.6)
     assert tuple(surface(pickle.loads(pickle.dumps(rubber)), rubber)) == (0.5, 0.6)
     with pytest.raises(InputError, match="neither material 'ice' nor 'wood'"):
-        surface(wb.Material("ice"), MATERIALS["wood"])
+        surface(wb.dynamics.Material("ice"), MATERIALS["wood"])
 
 
 @pytest.mark.parametrize(

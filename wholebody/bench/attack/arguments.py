@@ -97,7 +97,7 @@ def _used(name: str, call: str) -> str:
         return f"wb.solve(wb.Problem(scene, measures=[{call}]), method=wb.QP(budget=5))"
     if name in SHAPES:
         return f"scene.add({call}, name='made', at=(3, 0, 0)).contacts(figure.neutral)"
-    if name in ("wb.QP", "wb.CCD", "wb.Newton", "wb.Placo", "wb.DampedLeastSquares"):
+    if name in ("wb.QP", "wb.methods.CCD", "wb.Newton", "wb.methods.Placo", "wb.methods.DampedLeastSquares"):
         return f"wb.solve(problem, method={call})"
     if name == "wb.Problem":
         return f"wb.solve({call}, method=wb.QP(budget=5))"

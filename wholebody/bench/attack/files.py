@@ -131,7 +131,7 @@ def sane(read: Any) -> Verdict:
     """Judge what was read: it has to be made of numbers that a body or a task can have."""
     if isinstance(read, wb.Figure):
         return _figure(read)
-    if isinstance(read, wb.Task):
+    if isinstance(read, wb.taskfile.Task):
         problem = read.problem
         verdict = _figure(problem.scene.figure)
         if verdict.outcome == "wrong":

@@ -12,7 +12,7 @@ from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.attack.solves import Terms, script_head
 from wholebody.bench.attack.things import clear, xyzquat
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene

@@ -17,7 +17,7 @@ from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Judged, Pairs, judge
 from wholebody.bench.attack.things import Thing, clear, inside, xyzquat
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import METHODS, installed_methods
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem

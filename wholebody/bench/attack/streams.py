@@ -15,7 +15,7 @@ from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs, judge
 from wholebody.bench.attack.solves import Terms, number_text, script_head
 from wholebody.bench.attack.things import Thing, clear, xyzquat
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.problem import Problem
 
 DIP = 5e-4  # m, of pieces of up to a metre: as far as a way between two postures may go deeper into a pair than before

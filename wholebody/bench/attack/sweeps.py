@@ -11,7 +11,7 @@ from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.judging import Pairs
 from wholebody.bench.attack.solves import Terms, script_head
 from wholebody.bench.attack.things import clear, inside
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene.scene import Scene
 

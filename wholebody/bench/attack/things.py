@@ -10,7 +10,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 
 KINDS = ("box", "sphere", "capsule", "ellipsoid", "hull", "plate", "halfspace", "mesh")
 SHARES = (0.25, 0.15, 0.15, 0.1, 0.12, 0.12, 0.1, 0.01)

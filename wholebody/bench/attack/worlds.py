@@ -14,7 +14,7 @@ from wholebody.bench.attack.bodies import body
 from wholebody.bench.attack.case import Verdict, Written
 from wholebody.bench.attack.solves import Terms, script_head
 from wholebody.bench.attack.things import Thing, shape, somewhere, xyzquat
-from wholebody.bench.problem_sets.things import Occupied
+from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.dynamics.world import World, WorldFrame
 
 DEEP = 2e-5  # m, of pieces of up to a metre: pairs that overlap by more are told, those by less may be

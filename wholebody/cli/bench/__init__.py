@@ -5,21 +5,20 @@ from __future__ import annotations
 from typing import Any
 
 from wholebody.cli.arguments import Commands
-from wholebody.cli.bench.bodies import daily, human, robots
-from wholebody.cli.bench.comparing import compare, held_out, reproduce
-from wholebody.cli.bench.counts import ablation, regress
+from wholebody.cli.bench.bodies import robots
+from wholebody.cli.bench.comparing import compare
+from wholebody.cli.bench.counts import ablation
 from wholebody.cli.bench.hard_cases import attack, stability
-from wholebody.cli.bench.methods import challenge, detail, newton, qp, reaches, scaling, solve, step
-from wholebody.cli.bench.moving import loads, motion, world
-from wholebody.cli.bench.published import export, judge, leaderboard
+from wholebody.cli.bench.methods import scaling, solve, step
+from wholebody.cli.bench.moving import motion, world
+from wholebody.cli.bench.published import export, judge
 
 HELP = "measure steps, solves and random reaches, beside other tools where installed"
 DESCRIPTION = """\
 Measure what the package does, and write the numbers as CSV, the charts as SVG and PNG, and tables to read. Times depend
 on the machine and on what else runs on it: compare ratios of one run. Set OMP_NUM_THREADS=1 for steady ones."""
 COMMANDS = (
-    compare, export, judge, leaderboard, reproduce, held_out, step, reaches, solve, newton, qp, stability, challenge,
-    detail, motion, loads, scaling, robots, attack, ablation, regress, world, human, daily,
+    compare, export, judge, stability, ablation, step, solve, scaling, motion, world, robots, attack,
 )  # fmt: skip
 
 

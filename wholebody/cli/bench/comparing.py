@@ -1,4 +1,4 @@
-"""`wholebody bench compare`, `reproduce`, `held-out`: every method on every problem set, speed against accuracy."""
+"""`wholebody bench compare`: every method on every problem set, speed against accuracy."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 from wholebody.base.errors import InputError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows, write_text
-from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, publish, quick, seed
+from wholebody.cli.bench.command import command, count, folders, listed, option, publish, quick, seed
 
 if TYPE_CHECKING:
-    from wholebody.bench.compare.settings import Settings
+    from wholebody.bench.suite.compare.settings import Settings
 
 
 @command(
@@ -23,7 +23,9 @@ if TYPE_CHECKING:
 Solve problems with known answers by every method at many budgets, and chart speed against accuracy. Writes a report
 (report.html) that says which method to choose when, charts as SVG and PNG, and every solve as CSV. A run that was
 ended goes on where it was when it is called again with the same settings and folder; a finished one writes its report
-anew. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster.""",
+anew. --held-out poses uniform witnesses, other people, other clutter and robots as they come, and puts the shares
+beside those of the sets. --again compares times in units of a reference kernel, and ends with 1 where what is solved
+differs. --jobs works on cases beside each other through joblib; --cluster does so on a dask cluster.""",
     quick("20 problems a set, within three minutes on two cores"),
     option(
         "--task", type=Path, metavar="TASK.toml", help="compare on the problem of a task file, in place of the sets"
@@ -39,20 +41,39 @@ anew. --jobs works on cases beside each other through joblib; --cluster does so 
     seed("of all problems"),
     count("--jobs", None, "cases beside each other (default: 1, or all of the cluster)"),
     option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+    option(
+        "--held-out",
+        action="store_true",
+        help="pose problems of distributions that no constant was tuned on",
+    ),
+    option(
+        "--again",
+        type=Path,
+        metavar="LOCK.json",
+        help="repeat the comparison that left this file",
+    ),
     folders("out/compare"),
 )
-def compare(arguments: argparse.Namespace) -> None:
-    """Compare methods."""
+def compare(arguments: argparse.Namespace) -> int:
+    """Compare methods; 1 where a comparison that is repeated solves other problems.
+
+    Raises:
+        InputError: options that exclude each other.
+    """
     if arguments.task is not None:
         return _compare_on_task(arguments)
+    if arguments.again is not None:
+        return _again(arguments)
+    if arguments.held_out:
+        return _held_out(arguments)
     from rich.console import Console
     from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from wholebody.base.batches import threads
-    from wholebody.bench.adapters.registry import missing
-    from wholebody.bench.compare import run as comparison
-    from wholebody.bench.compare.advice import advice
-    from wholebody.bench.compare.report import PAGE, publish
+    from wholebody.bench.suite.adapters.registry import missing
+    from wholebody.bench.suite.compare import run as comparison
+    from wholebody.bench.suite.compare.advice import advice
+    from wholebody.bench.suite.compare.report import PAGE, publish
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
@@ -79,7 +100,7 @@ def compare(arguments: argparse.Namespace) -> None:
     for sentence in advice(given.results, given.rows):
         console.print("- " + sentence.replace("**", "").replace("`", ""), highlight=False, markup=False)
     console.print(f"wrote {arguments.out / PAGE}", highlight=False, soft_wrap=True)
-    return None
+    return 0
 
 
 def _facts(beside: str) -> dict[str, str]:
@@ -87,9 +108,9 @@ def _facts(beside: str) -> dict[str, str]:
 
 
 def _settings(arguments: argparse.Namespace) -> Settings:
-    from wholebody.bench.adapters.registry import adapters
-    from wholebody.bench.compare.settings import QUICK, Settings
-    from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
+    from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.bench.suite.compare.settings import QUICK, Settings
+    from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
 
     sets = tuple(problem_set(name) for name in dict.fromkeys(arguments.sets or SETS))
     chosen = None if arguments.methods is None else tuple(dict.fromkeys(arguments.methods))
@@ -99,23 +120,31 @@ def _settings(arguments: argparse.Namespace) -> Settings:
     return Settings(sets, adapters(chosen, starts=not arguments.quick), seed=arguments.seed, **amounts)
 
 
-OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs")
+def _alone(arguments: argparse.Namespace, flag: str, others: tuple[str, ...]) -> None:
+    """Raise InputError where an option stands beside another that it excludes."""
+    for name in others:
+        if getattr(arguments, name):
+            raise InputError(f"--{name.replace('_', '-')} does not go with --{flag.replace('_', '-')}; leave one out")
+
+
+OF_A_LOCK = ("quick", "sets", "methods", "cases", "minutes", "seed", "cluster", "held_out", "update_docs")
+"""Options that a repeated comparison reads from its lock file, or does not have."""
+
+OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs", "again", "held_out")
 """Options that say how much of the sets is compared, or where; a task has one problem and takes none of them."""
 
 
-def _compare_on_task(arguments: argparse.Namespace) -> None:
+def _compare_on_task(arguments: argparse.Namespace) -> int:
     """Compare methods on one's own task."""
     from rich.console import Console
     from rich.markup import escape
 
-    from wholebody.bench.adapters.registry import adapters
-    from wholebody.bench.compare import own_task
+    from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.bench.suite.compare import own_task
     from wholebody.cli.tables import table
     from wholebody.taskfile import read_task
 
-    for name in OF_SETS:
-        if getattr(arguments, name):
-            raise InputError(f"--{name.replace('_', '-')} is of the problem sets; leave it out beside --task")
+    _alone(arguments, "task", OF_SETS)
     console, title = Console(), read_task(arguments.task).title
     chosen = adapters(arguments.methods, starts=True)
     with console.status("solving") as status:
@@ -134,30 +163,21 @@ def _compare_on_task(arguments: argparse.Namespace) -> None:
             console.print(f"{row.method}: {escape(row.said)}", highlight=False)
     for path in (out / "task.md", out / "task.csv", png):
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+    return 0
 
 
-@command(
-    "reproduce",
-    "a published comparison once more",
-    """\
-Run a published comparison again, from the lock file that it left: the same sets, seeds, methods and amounts. Says which
-figures differ by more than their intervals, and what of the machine and the versions is not the same. Times are
-compared in units of a reference kernel. Ends with 1 where what is solved differs.""",
-    option("lock", type=Path, metavar="LOCK.json", help="which `wholebody bench compare` left"),
-    option("--out", type=Path, default=Path("out/reproduce"), metavar="DIR", help="for the new run"),
-    count("--jobs", 1, "cases beside each other"),
-)
-def reproduce(arguments: argparse.Namespace) -> int:
-    """Run and compare."""
-    from wholebody.bench.adapters.registry import missing
-    from wholebody.bench.compare import run as comparison
-    from wholebody.bench.compare.lock import differences, in_words, locked, read_lock, shares
-    from wholebody.bench.compare.report import PAGE, publish
+def _again(arguments: argparse.Namespace) -> int:
+    """Run a published comparison again, and compare the two."""
+    _alone(arguments, "again", OF_A_LOCK)
+    from wholebody.bench.suite.adapters.registry import missing
+    from wholebody.bench.suite.compare import run as comparison
+    from wholebody.bench.suite.compare.lock import differences, in_words, locked, read_lock, shares
+    from wholebody.bench.suite.compare.report import PAGE, publish
 
-    published = read_lock(arguments.lock)
+    published = read_lock(arguments.again)
     settings = published.settings()
-    store = comparison.run(settings, arguments.out, arguments.jobs, None, lambda progress: print(progress.said))
-    facts = _facts(f"{arguments.jobs} on this machine")
+    store = comparison.run(settings, arguments.out, arguments.jobs or 1, None, lambda progress: print(progress.said))
+    facts = _facts(f"{arguments.jobs or 1} on this machine")
     found = locked(publish(settings, store, arguments.out, facts, missing()))
     for line in in_words(published, found):
         print(line)
@@ -165,23 +185,11 @@ def reproduce(arguments: argparse.Namespace) -> int:
     return 1 if shares(differences(published, found)) else 0
 
 
-@measuring(
-    "held-out",
-    "distributions that nothing was tuned on, beside the sets",
-    """\
-Solve problems of distributions that no constant was tuned on: uniform witnesses, other people, other clutter, robots as
-they come. The shares stand beside those of the sets that were tuned on, with intervals. A run that was ended goes on
-where it was when it is called again with the same settings and folder.""",
-    listed("--methods", "methods (default: qp and three peers)"),
-    count("--cases", None, "problems of each set (default: 40; with --quick 4)"),
-    seed("of all problems"),
-    option("--minutes", type=float, metavar="N", help="of solving in all (default: 20)"),
-    count("--jobs", 1, "cases beside each other"),
-)
-def held_out(arguments: argparse.Namespace) -> None:
+def _held_out(arguments: argparse.Namespace) -> int:
     """Measure, judge, publish."""
-    from wholebody.bench.adapters.registry import adapters, installed
-    from wholebody.bench.compare import held_out
+    _alone(arguments, "held_out", ("sets", "cluster"))
+    from wholebody.bench.suite.adapters.registry import adapters, installed
+    from wholebody.bench.suite.compare import held_out
 
     cases = arguments.cases or (4 if arguments.quick else held_out.CASES)
     minutes = held_out.MINUTES if arguments.minutes is None else arguments.minutes
@@ -190,7 +198,8 @@ def held_out(arguments: argparse.Namespace) -> None:
     if left_out:
         print(left_out)
     folder = arguments.out / "held-out"
-    rows = held_out.measured(asked, folder, arguments.jobs, lambda progress: print(progress.said, flush=True))
-    facts = _facts(f"{arguments.jobs}")
+    rows = held_out.measured(asked, folder, arguments.jobs or 1, lambda progress: print(progress.said, flush=True))
+    facts = _facts(f"{arguments.jobs or 1}")
     report = held_out.report(rows, asked, left_out, facts)
     publish("held-out", report, arguments, facts=facts, tables={"held-out/held_out": rows})
+    return 0

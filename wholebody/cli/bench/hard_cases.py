@@ -16,13 +16,13 @@ from wholebody.cli.bench.command import command, count, folders, listed, measuri
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
 
-    from wholebody.bench.adapters.base import Adapter
     from wholebody.bench.attack.case import Case
     from wholebody.bench.attack.report import Row
-    from wholebody.bench.stability.asking import Cell
-    from wholebody.bench.stability.case import HardCase
-    from wholebody.bench.stability.pictures import Drawn
-    from wholebody.bench.stability.verdict import Result
+    from wholebody.bench.suite.adapters.base import Adapter
+    from wholebody.bench.suite.stability.asking import Cell
+    from wholebody.bench.suite.stability.case import HardCase
+    from wholebody.bench.suite.stability.pictures import Drawn
+    from wholebody.bench.suite.stability.verdict import Result
 
 PAGE = "where-methods-fail.md"
 ASSETS = "assets/stability"
@@ -49,9 +49,9 @@ INTERRUPTED = 130  # exit code after Ctrl-C
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
-    from wholebody.bench.adapters.registry import adapters, installed
-    from wholebody.bench.stability import catalogue, page
-    from wholebody.bench.stability.verdict import read_result, result
+    from wholebody.bench.suite.adapters.registry import adapters, installed
+    from wholebody.bench.suite.stability import catalogue, page
+    from wholebody.bench.suite.stability.verdict import read_result, result
 
     _check_page(arguments)
     whole = arguments.update_docs is not None
@@ -97,7 +97,7 @@ def _check_page(arguments: argparse.Namespace) -> None:
 
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
-    from wholebody.bench.stability.asking import run
+    from wholebody.bench.suite.stability.asking import run
     from wholebody.cli.tables import progress_bar
 
     cells = []
@@ -111,8 +111,8 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
 
 def _drawn(found: Result, asked: Sequence[Adapter], docs: Path, jobs: int) -> Drawn:
     """Draw answers; those of an earlier run are asked for again, and drawn where the verdict is of the same kind."""
-    from wholebody.bench.stability.pictures import draw, shown
-    from wholebody.bench.stability.verdict import judged_verdict
+    from wholebody.bench.suite.stability.pictures import draw, shown
+    from wholebody.bench.suite.stability.verdict import judged_verdict
     from wholebody.cli.tables import progress_bar
 
     cells, known = dict(found.cells), {adapter.name: adapter for adapter in asked}
@@ -130,7 +130,7 @@ def _print(result: Result) -> None:
     """The matrix in signs, as narrow as it can be, and every wrong answer in words."""
     from rich.console import Console
 
-    from wholebody.bench.stability.verdict import SYMBOLS, WORDS
+    from wholebody.bench.suite.stability.verdict import SYMBOLS, WORDS
     from wholebody.cli.tables import table
 
     console = Console()

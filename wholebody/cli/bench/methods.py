@@ -1,20 +1,19 @@
-"""`wholebody bench step`, `reaches`, `solve`, `newton`, `qp`, `scaling`, `detail`, `challenge`: what methods cost."""
+"""`wholebody bench step`, `solve`, `scaling`: what methods cost."""
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
 from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from wholebody.base.errors import UnknownNameError
 from wholebody.bench.machine import machine
-from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish, seed
+from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish
 
-PAIRS_OF_RUNS = 15  # with a person's defaults and without: their ratio then has an interval of some 3 %
-QUICK = 45  # quadratic programs
+PARTS = "task", "reaches", "detail"
+"""Of `wholebody bench solve`, each into a table of its own."""
 
 
 @measuring(
@@ -29,13 +28,11 @@ QUICK = 45  # quadratic programs
 )
 def step(arguments: argparse.Namespace) -> None:
     """Measure steps."""
-    from wholebody.bench import step
-    from wholebody.bench.adapters.registry import chosen_tools, tool_class
-    from wholebody.bench.figure_track import figure_tracks
-    from wholebody.bench.person_cost import person_costs
-    from wholebody.bench.step_goals import goal_lines
-    from wholebody.bench.track import VARIANTS, track
-    from wholebody.cli.demo import packaged_tasks
+    from wholebody.bench.measure import step
+    from wholebody.bench.measure.figure_track import figure_tracks
+    from wholebody.bench.measure.step_goals import goal_lines
+    from wholebody.bench.measure.track import VARIANTS, track
+    from wholebody.bench.suite.adapters.registry import chosen_tools, tool_class
 
     tools = chosen_tools(arguments.tools)
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
@@ -55,17 +52,12 @@ def step(arguments: argparse.Namespace) -> None:
         if "wholebody" in taken:
             shares[course.name] = step.linearise_us(course)
     stated = {name: tool_class(name).differences for name in tools}
-    costs = []
-    if not figures:
-        humans = [track(name, steps) for name in VARIANTS]
-        costs = person_costs(humans, packaged_tasks()["shelf"], PAIRS_OF_RUNS if repeats > 1 else 2)
     goals = [] if figures else goal_lines(rows)
-    report = step.step_report(rows, facts, stated, shares, refusals if figures else None, costs, goals)
+    report = step.step_report(rows, facts, stated, shares, refusals if figures else None, goals)
     name = "step-figures" if figures else "step"
     tables: dict[str, Sequence[Any]] = {name: rows, f"{name}-times": times}
     charts = {f"{name}-times": Chart(partial(step.step_times, times), "Time of a step of every tool")}
     if not figures:
-        tables["step-person"] = costs
         caption = "Least distance of any pair after every step"
         charts["step-distances"] = Chart(partial(step.least_distances, times), caption)
     publish(name, report, arguments, facts=facts, tables=tables, charts=charts)
@@ -74,21 +66,48 @@ def step(arguments: argparse.Namespace) -> None:
 
 
 @measuring(
-    "reaches",
-    "random reaches whose answer is known to exist",
-    "Solve random reaches from standing; list everything that was not solved.",
-    count("--count", 200, "how many"),
-    option("--first", type=int, default=0, metavar="SEED", help="seed of the first one (default: 0)"),
-    listed("--methods", "such as qp, qp/osqp, newton (default: qp)", default=["qp"]),
-    count("--jobs", 1, "processes (default: 1, for steady times)"),
+    "solve",
+    "whole solves: a task and its memory, random reaches, levels of modelling",
+    """\
+Measure whole solves. `task`: the shelf, or a task of your own, with new and with used workspaces, and the memory of
+`wholebody pose`. `reaches`: random reaches from standing whose answer is known to exist; what was not solved is listed.
+`detail`: the same tasks with the person as spheres, capsules and hulls, with all joints and pairs and with those that a
+task needs, judged in the finest model.""",
+    listed("--parts", "what to measure (default: task reaches)", None, choices=PARTS, default=PARTS[:2]),
+    option("--task", type=Path, metavar="TASK.toml", help="of the part task (default: the shelf)"),
+    count("--count", None, "solves of the task (default: 30), reaches (200), cases of each level (8)"),
+    option("--first", type=int, default=0, metavar="SEED", help="seed of the first reach or case (default: 0)"),
+    listed("--methods", "such as qp, newton (default: qp, and qp/osqp for the task)"),
+    count("--jobs", 1, "processes of the reaches (default: 1, for steady times)"),
 )
-def reaches(arguments: argparse.Namespace) -> None:
-    """Measure random reaches."""
-    from wholebody.bench import reaches
-    from wholebody.bench.adapters.registry import adapters
+def solve(arguments: argparse.Namespace) -> None:
+    """Measure whole solves."""
+    for part in dict.fromkeys(arguments.parts):
+        {"task": _task, "reaches": _reaches, "detail": _detail}[part](arguments)
 
-    seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count))
-    methods = [adapter.name for adapter in adapters(arguments.methods)]
+
+def _task(arguments: argparse.Namespace) -> None:
+    """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
+    from wholebody.bench.measure import solve
+    from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.cli.demo import packaged_tasks
+
+    task, facts = arguments.task or packaged_tasks()["shelf"], machine()
+    rows = solve.measured(
+        task, adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count or 30, print
+    )
+    peak = solve.memory(task)
+    report = solve.solve_report(rows, peak, facts)
+    publish("solve", report, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
+
+
+def _reaches(arguments: argparse.Namespace) -> None:
+    """Random reaches whose answer is known to exist."""
+    from wholebody.bench.measure import reaches
+    from wholebody.bench.suite.adapters.registry import adapters
+
+    seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count or 200))
+    methods = [adapter.name for adapter in adapters(arguments.methods or ["qp"])]
     facts = machine() | {"processes": str(arguments.jobs)}
     rows = []
     for method in methods:
@@ -101,83 +120,22 @@ def reaches(arguments: argparse.Namespace) -> None:
     publish("reaches", report, arguments, facts=facts, tables={"reaches": rows}, charts=charts)
 
 
-@measuring(
-    "solve",
-    "whole solves of the shelf task, and memory",
-    "Solve a task with new and with used workspaces, and measure the memory of `wholebody pose`.",
-    option("--task", type=Path, metavar="TASK.toml", help="another task (default: the shelf)"),
-    count("--count", 30, "solves of each kind"),
-    listed("--methods", "such as qp, qp/osqp (default: these two)", default=["qp", "qp/osqp"]),
-)
-def solve(arguments: argparse.Namespace) -> None:
-    """Measure whole solves."""
-    from wholebody.bench import solve
-    from wholebody.bench.adapters.registry import adapters
-    from wholebody.cli.demo import packaged_tasks
+def _detail(arguments: argparse.Namespace) -> None:
+    """The same tasks with every detail of geometry, judged in the finest model."""
+    from wholebody.bench.measure import detail
 
-    task, facts = arguments.task or packaged_tasks()["shelf"], machine()
-    rows = solve.measured(task, adapters(arguments.methods), 3 if arguments.quick else arguments.count, print)
-    peak = solve.memory(task)
-    report = solve.solve_report(rows, peak, facts)
-    publish("solve", report, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
-
-
-@measuring(
-    "newton",
-    "sparse Newton by size, shape and factorisation",
-    "Chains, trees, rings and stars by every factorisation, whole solves, loops beside open chains, "
-    "the same problems by qp, and drags of the human. Set OMP_NUM_THREADS=1: small products are slower on more.",
-    count("--repeats", 15, "timed systems each"),
-)
-def newton(arguments: argparse.Namespace) -> None:
-    """Measure sparse Newton."""
-    from wholebody.bench import newton
-
-    repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
-    facts, many = machine(), 10 * repeats
-    paper = [newton.paper_row(many), newton.drag_of_assembly_row(many)]
-    solves = [*paper, newton.nearest_row(many), *newton.loop_rows(many)]
-    agreements = newton.agreement_rows(many)
-    drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
-    linear = list(newton.linear_rows(sizes, repeats))
-    found: dict[str, Any] = {"linear": linear, "solves": solves, "agreements": agreements, "drags": drags}
-    tables = {f"newton-{name}": rows for name, rows in found.items()}
-    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables)
-
-
-@measuring(
-    "qp",
-    "the quadratic programs of all problem sets by every solver alone",
-    "Record the programs that the QP method poses on the problem sets, keep them as files that "
-    "qpsolvers reads and as a test set of qpbenchmark, and give them to every QP solver alone.",
-    count("--count", 2000, "programs"),
-    seed("of the problem sets"),
-    listed("--solvers", "QP solvers (default: all that are installed)"),
-    listed("--sets", "problem sets (default: all)"),
-    option("--programs", type=Path, metavar="DIR", help="files of an earlier run, instead of recording"),
-)
-def qp(arguments: argparse.Namespace) -> None:
-    """Measure solvers of quadratic programs."""
-    from wholebody.bench.problem_sets.registry import SETS, problem_set
-    from wholebody.bench.qp_programs import files
-    from wholebody.bench.qp_programs.measuring import measure, qp_report, summaries
-    from wholebody.bench.qp_programs.recording import record
-    from wholebody.methods.qp.solvers.registry import make_solver, solver_names
-
-    sets = [problem_set(name).name for name in arguments.sets or SETS]
-    solvers = tuple(arguments.solvers or solver_names())
-    for name in solvers:
-        make_solver(name)
-    if arguments.programs is None:
-        programs = record(sets, QUICK if arguments.quick else arguments.count, arguments.seed, print)
-        files.save(programs, arguments.out / "qp-programs")
-    else:
-        programs = [one for one in files.load(arguments.programs) if one.set in sets]
-    facts = machine() | {"seed": str(arguments.seed)}
-    rows = measure(programs, solvers, print)
-    totals = summaries(rows, solvers)
-    report = qp_report(rows, totals, facts)
-    publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
+    facts = machine()
+    rows, refused = [], []
+    for row in detail.rows(2 if arguments.quick else arguments.count or 8, arguments.first):
+        if isinstance(row, str):
+            refused.append(row)
+            print(row, flush=True)
+        else:
+            rows.append(row)
+    caption = "Time of a solve against what each level gets wrong, judged in the finest model"
+    charts = {"detail": Chart(partial(detail.chart, rows), caption)}
+    report = detail.report(rows, refused, facts)
+    publish("detail", report, arguments, facts=facts, tables={"detail": rows}, charts=charts)
 
 
 @measuring(
@@ -190,7 +148,7 @@ def qp(arguments: argparse.Namespace) -> None:
 )
 def scaling(arguments: argparse.Namespace) -> None:
     """Measure, fit, draw."""
-    from wholebody.bench import scaling
+    from wholebody.bench.measure import scaling
 
     methods = tuple(arguments.methods or scaling.METHODS)
     for name in methods:
@@ -212,49 +170,3 @@ def scaling(arguments: argparse.Namespace) -> None:
     charts = {"scaling": Chart(partial(scaling.chart, rows), caption)}
     report = scaling.report(rows, [line for line in lines if "left out" in line], facts)
     publish("scaling", report, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
-
-
-@measuring(
-    "detail",
-    "spheres, capsules, hulls; all joints and pairs or those that matter: time against error",
-    "The same tasks with every detail of geometry, with all joints and pairs and with those that a "
-    "task needs; answers judged in the model of hulls with everything in it.",
-    count("--cases", 8, "cases of each task"),
-    seed("of the cases"),
-)
-def detail(arguments: argparse.Namespace) -> None:
-    """Measure, judge, draw."""
-    from wholebody.bench import detail
-
-    facts = machine()
-    rows, refused = [], []
-    for row in detail.rows(2 if arguments.quick else arguments.cases, arguments.seed):
-        if isinstance(row, str):
-            refused.append(row)
-            print(row, flush=True)
-        else:
-            rows.append(row)
-    caption = "Time of a solve against what each level gets wrong, judged in the finest model"
-    charts = {"detail": Chart(partial(detail.chart, rows), caption)}
-    report = detail.report(rows, refused, facts)
-    publish("detail", report, arguments, facts=facts, tables={"detail": rows}, charts=charts)
-
-
-@measuring(
-    "challenge",
-    "a standing person dragged down onto a chair, by newton and qp",
-    "Drag a standing person down onto a chair by the pelvis, and judge every posture and way between.",
-    count("--frames", 240, "of the way"),
-)
-def challenge(arguments: argparse.Namespace) -> None:
-    """Measure the challenge."""
-    from wholebody.bench import challenge
-    from wholebody.bench.drag import drag_chart
-    from wholebody.cli.demo import packaged_tasks
-
-    facts, task = machine(), packaged_tasks()[challenge.TASK]
-    rows, every = challenge.measure(task, 60 if arguments.quick else arguments.frames, print)
-    tables: dict[str, list[Any]] = {"challenge": rows, "challenge-frames": list(chain.from_iterable(every.values()))}
-    caption = "Time of a frame and what is left to the goal, frame by frame"
-    charts = {"challenge": Chart(partial(drag_chart, every), caption)}
-    publish("challenge", challenge.report(rows, facts), arguments, facts=facts, tables=tables, charts=charts)

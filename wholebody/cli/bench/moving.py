@@ -1,9 +1,8 @@
-"""`wholebody bench motion`, `loads`, `world`: clips freed of collisions, and things that move by themselves."""
+"""`wholebody bench motion`, `world`: clips freed of collisions, and things that move by themselves."""
 
 from __future__ import annotations
 
 import argparse
-import shutil
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -22,9 +21,9 @@ CAPTION = "Deviation, jerk and sliding against seconds for each second of motion
 CAPTION_OF_CHECKS = "CPU time of a check of each clip with each piece of equipment; black: as it is, coloured: freed"
 
 
-def _clips(arguments: argparse.Namespace, clips: int | None) -> dict[str, Path | None]:
+def clips(arguments: argparse.Namespace, clips: int | None) -> dict[str, Path | None]:
     """The chosen clips, at most so many: their recordings, None for one that needs none."""
-    from wholebody.bench.motion import cases
+    from wholebody.bench.measure.motion import cases
 
     recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
     known: dict[str, Path | None] = {**dict.fromkeys(cases.SYNTHETIC), **recordings}
@@ -41,78 +40,29 @@ def _clips(arguments: argparse.Namespace, clips: int | None) -> dict[str, Path |
     listed("--equipment", "what is worn (default: all)"),
     listed("--methods", "methods, check and nearest (default: all but nearest)"),
     count("--jobs", 1, "cases at a time"),
-    option(
-        "--figures", action="store_true", help="redraw figures 4.1 to 4.7 of Degenhardt's thesis instead; needs --clips"
-    ),
 )
 def motion(arguments: argparse.Namespace) -> None:
     """Measure, or go on; --quick takes two clips with two pieces of equipment."""
-    from wholebody.bench.motion import cases, measuring, report
+    from wholebody.bench.measure.motion import cases, measuring, report
     from wholebody.motion.avoidance import METHODS
 
-    if arguments.figures:
-        return _redraw(arguments)
     few = 2 if arguments.quick else None
-    clips = _clips(arguments, few)
+    chosen = clips(arguments, few)
     worn = cases.chosen(arguments.equipment, cases.EQUIPMENT, "--equipment")[:few]
     wanted = (measuring.CHECKED, *METHODS) if arguments.methods is None else arguments.methods
     ways = cases.chosen(wanted, (measuring.CHECKED, *METHODS, measuring.NEAREST), "--methods")
     facts = machine()
-    rows = measuring.run(clips, worn, ways, arguments.out, facts, arguments.jobs, _tell)
+    rows = measuring.run(chosen, worn, ways, arguments.out, facts, arguments.jobs, _tell)
     charts = {}
     if any(row.measured and row.method not in report.BESIDE for row in rows):
         charts["motion"] = Chart(partial(report.chart, rows), CAPTION)
     if any(row.measured for row in rows):
         charts["motion-check"] = Chart(partial(report.check_chart, rows), CAPTION_OF_CHECKS)
-    return publish("motion", report.report(rows, facts), arguments, charts=charts)
-
-
-def _redraw(arguments: argparse.Namespace) -> None:
-    from wholebody.bench.motion import cases, figures
-    from wholebody.bench.report import render
-    from wholebody.figures import load
-
-    recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
-    names = cases.chosen(arguments.only, [drawing.number for drawing in figures.DRAWINGS], "--only")
-    folder, figure, drawn = arguments.out / "figures", load("human"), []
-    for drawing in figures.DRAWINGS:
-        if drawing.number in names:
-            drawn.append(figures.redraw(drawing, recordings, figure, folder, arguments.jobs))
-            print(f"figure {drawing.number}: {drawn[-1].strip}, {drawn[-1].curves}", flush=True)
-    publish("motion-figures", render("motion_figures.md", figures=drawn), arguments)
-    if arguments.update_docs is not None:
-        place = arguments.update_docs / "assets" / "motion"
-        make_folder(place)
-        for path in (path for one in drawn for path in (one.strip, one.curves)):
-            shutil.copyfile(path, place / path.name)
+    publish("motion", report.report(rows, facts), arguments, charts=charts)
 
 
 def _tell(done: int, count: int, said: str) -> None:
     print(f"{done} of {count}: {said}", flush=True)
-
-
-@measuring(
-    "loads",
-    "torques and balance of clips before and after they are freed, with and without dynamics",
-    "Free clips of collisions without and with regard to strength and balance, and say what each does "
-    "to torques, to the zero moment point, and to collisions.",
-    *CLIPS,
-    listed("--equipment", "what is worn (default: nothing)"),
-    option("--longest", type=float, default=4.0, metavar="S", help="cut clips to so long (default: 4 s)"),
-)
-def loads(arguments: argparse.Namespace) -> None:
-    """Measure and report; --quick takes one clip, cut to half a second."""
-    from wholebody.bench.motion import cases, loads
-
-    longest = number(arguments.longest, "--longest", 0.2, 1e4, "s")
-    few, longest = (1, 0.5) if arguments.quick else (None, longest)
-    worn = cases.chosen(arguments.equipment or ["nothing"], cases.EQUIPMENT, "--equipment")[:few]
-    facts, rows = machine(), []
-    for row in loads.rows(_clips(arguments, few), worn, longest):
-        rows.append(row)
-        write_rows(arguments.out / "loads.csv", facts, rows)
-        print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
-    publish("loads", loads.report(rows, facts), arguments)
 
 
 QUICK = 3  # drops
@@ -135,9 +85,9 @@ PARTS = ("closed", "throws", "drops", "long")
 )
 def world(arguments: argparse.Namespace) -> int:
     """Measure; --quick takes three drops for half a second, one throw of each kind, three seconds of the long run."""
-    from wholebody.bench.motion.cases import chosen
+    from wholebody.bench.measure.motion.cases import chosen
+    from wholebody.bench.measure.world import closed_forms, drops, engines, long_run, measuring, throws
     from wholebody.bench.report import render
-    from wholebody.bench.world import closed_forms, drops, engines, long_run, measuring, throws
 
     known = {drop.name: drop for drop in drops.drops()}
     parts = chosen(arguments.parts, PARTS, "--parts")

@@ -1,4 +1,4 @@
-"""`wholebody bench export`, `judge`, `leaderboard`: problems as files, and what anybody's answers to them are worth."""
+"""`wholebody bench export` and `judge`: problems as files, and what anybody's answers to them are worth."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ def export(arguments: argparse.Namespace) -> None:
     from rich.console import Console
     from rich.progress import Progress
 
-    from wholebody.bench.problem_sets.registry import CASES, SETS, problem_set
-    from wholebody.bench.published.export import export
+    from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
+    from wholebody.bench.suite.published.export import export
 
     sets = [problem_set(name) for name in dict.fromkeys(arguments.sets or SETS)]
     per_set = arguments.per_set or CASES
@@ -53,21 +53,29 @@ def export(arguments: argparse.Namespace) -> None:
 Score a file of answers to problems that `wholebody bench export` wrote, whatever program wrote the answers: goals,
 overlap of all pairs, clearances, joint limits, what is held, and effort above the best known. The scenes are rebuilt
 from the files by Pinocchio and coal alone. Prints a table, and writes every figure as JSON. Answers that are malformed
-are refused with one sentence that names the entry.""",
-    option("answers", type=Path, metavar="ANSWERS.json", help="as answers.schema.json says"),
+are refused with one sentence that names the entry. Of a folder with a file of answers for each method it makes a
+leaderboard: a page with tables, charts and sentences that say who solves most, and who cannot be told apart.""",
+    option("answers", type=Path, metavar="ANSWERS", help="a file, as answers.schema.json says, or a folder of them"),
     PROBLEMS,
-    option("--out", type=Path, metavar="FILE", help="where the verdict is written (default: ANSWERS.verdict.json)"),
+    option(
+        "--out",
+        type=Path,
+        metavar="PATH",
+        help="where the verdict is written (default: ANSWERS.verdict.json; of a folder out/leaderboard)",
+    ),
 )
 def judge(arguments: argparse.Namespace) -> None:
     """Judge."""
+    if arguments.answers.is_dir():
+        return _leaderboard(arguments)
     from rich.console import Console
     from rich.table import Table
 
     from wholebody.base.files import checked_target
-    from wholebody.bench.published.answers import read_answers
-    from wholebody.bench.published.judging import as_json, judge
-    from wholebody.bench.published.reading import dumped
-    from wholebody.bench.published.words import COLUMNS, cells, left_out
+    from wholebody.bench.suite.published.answers import read_answers
+    from wholebody.bench.suite.published.judging import as_json, judge
+    from wholebody.bench.suite.published.reading import dumped
+    from wholebody.bench.suite.published.words import COLUMNS, cells, left_out
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
     checked_target(out, "--out", "a verdict", (".json",))
@@ -83,24 +91,15 @@ def judge(arguments: argparse.Namespace) -> None:
     console.print(table)
     for line in left_out(verdict):
         console.print(line, highlight=False, markup=False, soft_wrap=True)
-    console.print(f"wrote {out}", highlight=False, soft_wrap=True)
+    return console.print(f"wrote {out}", highlight=False, soft_wrap=True)
 
 
-@command(
-    "leaderboard",
-    "a page from a folder of answers",
-    """\
-Judge every file of answers in a folder, and write a page that compares them: tables, charts and sentences that say who
-solves most, and who cannot be told apart.""",
-    option("folder", type=Path, metavar="DIR", help="with a file of answers for each method"),
-    PROBLEMS,
-    option("--out", type=Path, default=Path("out/leaderboard"), metavar="DIR", help="for the page"),
-)
-def leaderboard(arguments: argparse.Namespace) -> None:
-    """Judge and compare."""
-    from wholebody.bench.published.leaderboard import PAGE, judge_folder, publish, summary
+def _leaderboard(arguments: argparse.Namespace) -> None:
+    """Judge every file of answers in a folder, and compare them."""
+    from wholebody.bench.suite.published.leaderboard import PAGE, judge_folder, publish, summary
 
-    found = publish(judge_folder(arguments.folder, arguments.problems), arguments.problems, arguments.out)
+    out = arguments.out or Path("out/leaderboard")
+    found = publish(judge_folder(arguments.answers, arguments.problems), arguments.problems, out)
     for name, leading in summary(found).items():
         print(f"{name}: {leading}")
-    print(f"wrote {arguments.out / PAGE}")
+    print(f"wrote {out / PAGE}")

@@ -89,7 +89,7 @@ class _Part(NamedTuple):
 def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
     """Return the angle of every joint of the fingers in a shape of the hand, radians.
 
-    Use it with a person whose hands have fingers: ``figure.with_joints(q, wb.finger_angles("fist", "right"))``.
+    Use it with a person whose hands have fingers: ``figure.with_joints(q, wb.figures.finger_angles("fist", "right"))``.
 
     Args:
         shape: "relaxed", "flat", "fist", "hook", "pinch" or "pointing".

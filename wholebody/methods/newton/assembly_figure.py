@@ -71,7 +71,7 @@ class AssemblyFigure:
             if isinstance(batch, TangentRows):
                 raise InputError(
                     f"figure {self.name!r}: {batch.labels[0]} is of a class of your own, which figures of an assembly "
-                    "do not take; write it as a wb.AssemblyConstraint"
+                    "do not take; write it as a wb.methods.AssemblyConstraint"
                 )
             batch.bodies = np.where(batch.bodies == count, world, batch.bodies + self.first)
             batch.labels = [f"{self.name!r}, {label}" for label in batch.labels]

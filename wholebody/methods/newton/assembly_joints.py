@@ -230,7 +230,9 @@ class AssemblyJoints(AssemblyBodies):
             UnknownNameError: it names an unknown body.
         """
         label = f"constraint {type(term).__name__}"
-        instance(term, AssemblyConstraint, "constrain: term", "give an object of a subclass of wb.AssemblyConstraint")
+        instance(
+            term, AssemblyConstraint, "constrain: term", "give an object of a subclass of wb.methods.AssemblyConstraint"
+        )
         bodies = [self._names[known(name, self._names, "body", label)] for name in names_of(term, label)]
         one_sided = flag(term.one_sided, f"{label}: one_sided")
         size = checked(term, np.array([self._places[index] for index in bodies]), label)

@@ -120,7 +120,7 @@ def solved(
             least = pairs.least
     path = active_system.path
     if not np.array_equal(path[-1], x):
-        path = [*path, x]
+        path = (*path, x)
     placements = {name: pin.XYZQUATToSE3(place) for name, place in zip(names, x.reshape(-1, 7), strict=True)}
     return x, AssemblySolution(
         placements=placements,

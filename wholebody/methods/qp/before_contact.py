@@ -14,8 +14,9 @@ import numpy as np
 
 from wholebody.methods.control import Control
 from wholebody.methods.qp.curved_reach import ENDLESS
+from wholebody.methods.qp.iterates import LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.sqp import SQP, LocalSolution
+from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import restarts
 from wholebody.problem import Problem

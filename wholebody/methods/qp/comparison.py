@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from wholebody.methods.qp.sqp import LocalSolution
+from wholebody.methods.qp.iterates import LocalSolution
 
 ALIKE = 1e-5  # share of a goal's error by which two descents may differ and count as equally near
 JUST = 0.05  # tolerances by which what must hold may be missed more and count as held as well

@@ -26,8 +26,8 @@ from wholebody.figures.state import State, Wrench
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
+from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.sqp import Iterate, LocalSolution
 from wholebody.methods.qp.subproblem import Rows, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem

@@ -10,7 +10,8 @@ from wholebody.base.checks import flag, settle
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress, check_time_limit
 from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
-from wholebody.methods.qp.multistart import Search, Settings
+from wholebody.methods.qp.multistart import Search
+from wholebody.methods.qp.screening import Settings
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import chain, islice
-from typing import NamedTuple
 
 import numpy as np
 
@@ -17,8 +16,10 @@ from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.comparison import better, held
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
+from wholebody.methods.qp.iterates import LocalSolution
+from wholebody.methods.qp.screening import SCREENED, Settings, least_measures
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.sqp import SQP, LocalSolution
+from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.starts import Minima, hooked_hands, named_postures, restarts, throughout
 from wholebody.problem import Problem
@@ -47,20 +48,7 @@ STATIONARY = 0.01  # share of the error that they may still gain: they end where
 PUSHING_OUT = 6  # most programs of each
 INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
 STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
-SCREENED = 4  # feasible postures that are looked for, for each that is descended from; more = lower measures, slower
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
-
-
-class Settings(NamedTuple):
-    """What a search is bounded by; see `QP`."""
-
-    tolerance: float
-    iterations: int
-    budget: int
-    restarts: int
-    seed: int
-    measures: bool
-    restarts_for_measure: int = 0
 
 
 class Search:
@@ -149,27 +137,21 @@ class Search:
                 return
 
     def _restart_for_measure(self) -> None:
-        """Where all is met, look for a lower minimum of the measures, from other starts that are screened first.
-
-        A posture that fits costs a few programs and its measure tells which minimum it is near; a descent costs many.
-        So of `SCREENED` times as many postures that fit, those with the least measures are descended from.
-        """
+        """Where all is met, look for a lower minimum of the measures, from other starts that are screened first."""
         count, tolerance = self.settings.restarts_for_measure, self.settings.tolerance
         if not (count and self.settings.measures and self.best.violation.worst <= tolerance):
             return
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng([self.settings.seed, count])
-        found: list[LocalSolution] = []
-        for q in chain([start], restarts(self.problem, self.lineariser.state, start, rng, SCREENED * count - 1)):
-            if self.control.over:
-                return
-            local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "for measure").once(q)
+        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, SCREENED * count - 1))
+        most = self._at_most(PROBE_PROGRAMS)
+
+        def probe(q: Array) -> LocalSolution:
+            return self._feasibility(self.lineariser, most, "for measure").once(q)
+
+        for local in least_measures(starts, probe, tolerance, self.control, count):
             self.spent += local.iterations
-            if local.violation.worst <= tolerance:
-                found.append(local)
-        for local in sorted(found, key=lambda each: each.measure)[:count]:
-            if not self.control.over:
-                self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
+            self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
         """A posture that fits, without regard to the measures; where there is one, they improve from there."""

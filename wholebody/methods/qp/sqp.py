@@ -10,7 +10,6 @@ constraints in long steps. Steps that could have jumped over something are swept
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,11 +21,12 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
+from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
 from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import ERROR_CLAMP, Rows, Subproblem, Violation
-from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
+from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
+from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
@@ -48,54 +48,6 @@ RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
-
-
-class LocalSolution(NamedTuple):
-    """Where a descent ended.
-
-    Attributes:
-        q: (nq,) posture.
-        violation: what is left there.
-        measure: weighted sum of the measures.
-        converged: whether it ended because nothing better is near, rather than out of iterations.
-        iterations: how many programs were solved.
-    """
-
-    q: Array
-    violation: Violation
-    measure: float
-    converged: bool
-    iterations: int
-
-
-class Iterate(NamedTuple):
-    """A posture that was looked at, and the longest entry of the step that led there, radians or metres."""
-
-    at: Linearisation
-    rows: Rows
-    violation: Violation
-    placed: QueryResult
-    longest: float = np.inf
-
-
-class Step(NamedTuple):
-    """What a program says about the way from a posture.
-
-    Attributes:
-        dq: (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain.
-        parts: the answer's parts; None far from the goals, and where measures do not count.
-        flat: whether the tangential part saves less of the measures than counts.
-        answer: (nv,) the program's answer.
-        predicted: what the step is to bring.
-        multipliers: of the program; None as for the parts.
-    """
-
-    dq: Array
-    parts: Parts | None
-    flat: bool
-    answer: Array
-    predicted: PredictedReduction
-    multipliers: Multipliers | None
 
 
 @dataclass

@@ -35,7 +35,8 @@ from wholebody.methods.qp.working_set import LIMITS, WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
-from wholebody.terms.linearisation import ConstraintValues, PackedLinearisation
+from wholebody.terms.constraint_values import ConstraintValues
+from wholebody.terms.linearisation import PackedLinearisation
 
 RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
 DAMPING = 2.0

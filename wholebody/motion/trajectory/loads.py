@@ -5,8 +5,8 @@ no joint more than its strength or than the largest torque that the original cli
 zero moment point in no frame farther outside of an edge of its support than it is there in the original. A clip that
 may be slowed keeps to the strength of a joint if the original slowed as far as may be does.
 
-Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.torques.smoothed`). Rows are
-those of the filtered original with the deviation on it, which is smooth itself.
+Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.clip_torques.smoothed`).
+Rows are those of the filtered original with the deviation on it, which is smooth itself.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
+from wholebody.motion.clip_torques import CUTOFF, smoothed
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
-from wholebody.motion.torques import CUTOFF, smoothed
 from wholebody.motion.trajectory.chart import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
 
 FRICTION = 0.8
-"""Coefficient of friction of the ground, as that of `wb.torques`."""
+"""Coefficient of friction of the ground, as that of `wb.motion.torques`."""
 
 LENGTH = 0.1
 """Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
@@ -43,7 +43,7 @@ NEAR = 0.05
 
 
 class Defects(NamedTuple):
-    """By how much loads that `wb.torques` measures are more than those of the rows; see `ClipLoads.corrected`.
+    """By how much loads that `wb.motion.torques` measures are more than those of the rows; see `ClipLoads.corrected`.
 
     Attributes:
         torque: (n, nv) N m.
@@ -178,7 +178,7 @@ class ClipLoads:
         return ClipLoads(clip, self.dynamics, [self.stands[frame] for frame in frames], bounds, q)
 
     def corrected(self, q: Array) -> ClipLoads:
-        """The same with rows whose loads at postures (n, nq) are those that `wb.torques` measures.
+        """The same with rows whose loads at postures (n, nq) are those that `wb.motion.torques` measures.
 
         Rows see a change of the recording as it is, at three frames, and the feet where they stood. The measurement
         filters the sum, and looks at which feet stand then. The difference of both is added to the rows; it is nearly

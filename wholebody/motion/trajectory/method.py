@@ -79,7 +79,7 @@ class Trajectory:
         checks.settle(self, "iterations", checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000))
         checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
-            checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.Strength(percentile=50)")
+            checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
         banded_solver(self.solver)
 
     @property
@@ -134,7 +134,7 @@ class Trajectory:
         self, run_with: Callable[[ClipLoads, float], ClipRun], terms: FrameTerms, workspace: Workspace,
         reference: Array, q: Array, loads: ClipLoads | None, watch: Watch,
     ) -> tuple[Array, int]:  # fmt: skip
-        """Postures whose loads keep to their bounds as `wb.torques` measures them, as far as a few corrections get.
+        """Postures whose loads keep to their bounds as `torques` measures them, as far as a few corrections get.
 
         Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
         what is beyond its bounds are computed again.

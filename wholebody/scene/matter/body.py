@@ -28,7 +28,7 @@ class Body:
         material: "wood", "human", "metal", or a `Material` of your own.
         velocity: (3,) of the centre of mass at the start, m/s.
         angular_velocity: (3,) at the start about the world's axes, rad/s.
-        joints: `wb.Hinge` and `wb.BallJoint` that hold it to other things or to the world.
+        joints: `wb.dynamics.Hinge` and `wb.dynamics.BallJoint` that hold it to other things or to the world.
 
     Raises:
         InputError: both a density and a mass, or a value that is not finite or out of range.

@@ -75,7 +75,11 @@ def joints(value: object) -> tuple[BallJoint, ...]:
     Raises:
         InputError: not a list of joints.
     """
-    given = [value] if isinstance(value, BallJoint) else checks.listed(value, "Body joints", "[wb.Hinge((0, 0.4, 0))]")
+    given = (
+        [value]
+        if isinstance(value, BallJoint)
+        else checks.listed(value, "Body joints", "[wb.dynamics.Hinge((0, 0.4, 0))]")
+    )
     for joint in given:
-        checks.instance(joint, BallJoint, "Body joints", "give wb.Hinge(...) or wb.BallJoint(...)")
+        checks.instance(joint, BallJoint, "Body joints", "give wb.dynamics.Hinge(...) or wb.dynamics.BallJoint(...)")
     return tuple(given)

@@ -97,7 +97,7 @@ def material(value: object, what: str) -> Material:
     if isinstance(value, Material):
         return value
     if not isinstance(value, str):
-        raise InputError(f"{what} is {checks.shown(value)}; give 'wood', 'human', 'metal' or a wb.Material")
+        raise InputError(f"{what} is {checks.shown(value)}; give 'wood', 'human', 'metal' or a wb.dynamics.Material")
     return MATERIALS[checks.known(value, MATERIALS, "material", what)]
 
 
@@ -112,6 +112,6 @@ def surface(first: Material, second: Material) -> Surface:
     if found is None:
         raise InputError(
             f"neither material {first.name!r} nor {second.name!r} says how they touch each other; give for example "
-            f"wb.Material({first.name!r}, {{{second.name!r}: (0.3, 0.3)}})"
+            f"wb.dynamics.Material({first.name!r}, {{{second.name!r}: (0.3, 0.3)}})"
         )
     return Surface(*found)

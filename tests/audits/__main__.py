@@ -1,0 +1,250 @@
+"""Audits of the package by its makers: `python -m tests.audits NAME`, from the root of a checkout.
+
+They need data or hours that a test does not have, and answer questions that users of the package do not ask. Each
+writes its tables and charts into a folder, as the commands of `wholebody bench` do.
+"""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from collections.abc import Sequence
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+from tests.audits.templates import TEMPLATES
+from wholebody.base.checks import number
+from wholebody.base.errors import WholebodyError
+from wholebody.base.files import make_folder
+from wholebody.bench.machine import machine
+from wholebody.bench.tables import write_rows, write_text
+from wholebody.cli.bench.command import Chart, command, count, listed, measuring, option, publish, publish_page, seed
+from wholebody.cli.bench.moving import CLIPS, clips
+
+QUICK = 45  # quadratic programs
+
+
+@measuring(
+    "newton",
+    "sparse Newton by size, shape and factorisation",
+    "Chains, trees, rings and stars by every factorisation, whole solves, loops beside open chains, "
+    "the same problems by qp, and drags of the human. Set OMP_NUM_THREADS=1: small products are slower on more.",
+    count("--repeats", 15, "timed systems each"),
+)
+def newton(arguments: argparse.Namespace) -> None:
+    """Measure sparse Newton."""
+    from tests.audits import newton
+
+    repeats, sizes, frames = (3, (10, 30), 20) if arguments.quick else (arguments.repeats, newton.SIZES, 1000)
+    facts, many = machine(), 10 * repeats
+    paper = [newton.paper_row(many), newton.drag_of_assembly_row(many)]
+    solves = [*paper, newton.nearest_row(many), *newton.loop_rows(many)]
+    agreements = newton.agreement_rows(many)
+    drags = [newton.drag_row(frames, contacts) for contacts in (False, True)]
+    linear = list(newton.linear_rows(sizes, repeats))
+    found: dict[str, Any] = {"linear": linear, "solves": solves, "agreements": agreements, "drags": drags}
+    tables = {f"newton-{name}": rows for name, rows in found.items()}
+    publish("newton", newton.report(**found, facts=facts), arguments, facts=facts, tables=tables)
+
+
+@measuring(
+    "qp",
+    "the quadratic programs of all problem sets by every solver alone",
+    "Record the programs that the QP method poses on the problem sets, keep them as files that "
+    "qpsolvers reads and as a test set of qpbenchmark, and give them to every QP solver alone.",
+    count("--count", 2000, "programs"),
+    seed("of the problem sets"),
+    listed("--solvers", "QP solvers (default: all that are installed)"),
+    listed("--sets", "problem sets (default: all)"),
+    option("--programs", type=Path, metavar="DIR", help="files of an earlier run, instead of recording"),
+)
+def qp(arguments: argparse.Namespace) -> None:
+    """Measure solvers of quadratic programs."""
+    from tests.audits.qp_programs import files
+    from tests.audits.qp_programs.measuring import measure, qp_report, summaries
+    from tests.audits.qp_programs.recording import record
+    from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
+    from wholebody.methods.qp.solvers.registry import make_solver, solver_names
+
+    sets = [problem_set(name).name for name in arguments.sets or SETS]
+    solvers = tuple(arguments.solvers or solver_names())
+    for name in solvers:
+        make_solver(name)
+    if arguments.programs is None:
+        programs = record(sets, QUICK if arguments.quick else arguments.count, arguments.seed, print)
+        files.save(programs, arguments.out / "qp-programs")
+    else:
+        programs = [one for one in files.load(arguments.programs) if one.set in sets]
+    facts = machine() | {"seed": str(arguments.seed)}
+    rows = measure(programs, solvers, print)
+    totals = summaries(rows, solvers)
+    report = qp_report(rows, totals, facts)
+    publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
+
+
+@measuring(
+    "challenge",
+    "a standing person dragged down onto a chair, by newton and qp",
+    "Drag a standing person down onto a chair by the pelvis, and judge every posture and way between.",
+    count("--frames", 240, "of the way"),
+)
+def challenge(arguments: argparse.Namespace) -> None:
+    """Measure the challenge."""
+    from tests.audits import challenge
+    from wholebody.bench.measure.drag import drag_chart
+    from wholebody.cli.demo import packaged_tasks
+
+    facts, task = machine(), packaged_tasks()[challenge.TASK]
+    rows, every = challenge.measure(task, 60 if arguments.quick else arguments.frames, print)
+    tables: dict[str, list[Any]] = {"challenge": rows, "challenge-frames": list(chain.from_iterable(every.values()))}
+    caption = "Time of a frame and what is left to the goal, frame by frame"
+    charts = {"challenge": Chart(partial(drag_chart, every), caption)}
+    publish("challenge", challenge.report(rows, facts), arguments, facts=facts, tables=tables, charts=charts)
+
+
+@measuring(
+    "human",
+    "compare the person with people: sizes, ranges, self-contacts, everyday tasks",
+    "Measure the dimensions, circumferences and ranges of motion of the person beside those of people, "
+    "bring parts of the body together, and solve thirteen everyday tasks. With --update-docs the page becomes "
+    "docs/human.md, with a picture of each contact and task.",
+)
+def human(arguments: argparse.Namespace) -> None:
+    """Measure; --quick measures one design case and three tasks, and draws nothing."""
+    from tests.audits.human import Measured, figures, measure, page
+    from wholebody.view.browser import find_chromium
+
+    facts = machine()
+    drawn = not arguments.quick and find_chromium() is not None
+    pictures = arguments.out / "human"
+    make_folder(pictures)
+    found = None
+    for told in measure(pictures if drawn else None, quick=arguments.quick):
+        if isinstance(told, Measured):
+            found = told
+        else:
+            print(told, flush=True)
+    assert found is not None
+    write_text(arguments.out / "human.json", figures(found, facts))
+    publish_page("human.md", page(found, facts, pictures=drawn), arguments)
+    if arguments.update_docs is not None and drawn:
+        folder = arguments.update_docs / "assets" / "human"
+        make_folder(folder)
+        names = [row.picture for row in found.contacts if row.drawn] + [row.picture for row in found.tasks]
+        for name in names:
+            shutil.copyfile(pictures / name, folder / name)
+
+
+@command(
+    "regress",
+    "counts of work, beside those that are locked",
+    """\
+Count what the methods do on a fixed selection of problems, reaches, drags and hard cases: iterations, kinematic passes,
+pairs asked of coal, contact rows, programs, memory of a step. Counts are the same on every machine but for rounding, so
+they show what a noisy clock does not. They are compared with locked ones; each that differs by more than its margin is
+told in one sentence, and the exit code is 1 where one is worse. Times are told and compare nothing.""",
+    option("--update", action="store_true", help="lock the counts as they are now"),
+    option("--locked", type=Path, metavar="FILE", help="locked counts (default: those of the package)"),
+)
+def regress(arguments: argparse.Namespace) -> int:
+    """Count and compare; 1 where a count is worse than the locked one."""
+    from tests.audits.regress import comparison
+    from tests.audits.regress.selection import runs
+
+    path: Path = arguments.locked or comparison.LOCKED
+    locked = comparison.read(path) if path.exists() or not arguments.update else {}
+    counted = []
+    for run in runs():
+        counted.append(run)
+        said = ", ".join(f"{name} {count}" for name, count in run.counts.items())
+        print(f"{run.name}: {said}; {1e3 * run.seconds:.0f} ms", flush=True)
+    print(f"\n{len(counted)} runs in {sum(run.seconds for run in counted):.1f} s of the processor")
+    differences = list(comparison.compared(locked, counted)) if locked else []
+    for difference in differences:
+        print(f"{'worse' if difference.worse else 'differs'}: {difference.sentence}")
+    if arguments.update:
+        comparison.write(counted, path)
+        print(f"wrote {path}")
+        return 0
+    if not differences:
+        print(f"all counts are within their margins of {path}")
+    return int(any(difference.worse for difference in differences))
+
+
+@measuring(
+    "loads",
+    "torques and balance of clips before and after they are freed, with and without dynamics",
+    "Free clips of collisions without and with regard to strength and balance, and say what each does "
+    "to torques, to the zero moment point, and to collisions.",
+    *CLIPS,
+    listed("--equipment", "what is worn (default: nothing)"),
+    option("--longest", type=float, default=4.0, metavar="S", help="cut clips to so long (default: 4 s)"),
+)
+def loads(arguments: argparse.Namespace) -> None:
+    """Measure and report; --quick takes one clip, cut to half a second."""
+    from tests.audits import loads
+    from wholebody.bench.measure.motion import cases
+
+    longest = number(arguments.longest, "--longest", 0.2, 1e4, "s")
+    few, longest = (1, 0.5) if arguments.quick else (None, longest)
+    worn = cases.chosen(arguments.equipment or ["nothing"], cases.EQUIPMENT, "--equipment")[:few]
+    facts, rows = machine(), []
+    for row in loads.rows(clips(arguments, few), worn, longest):
+        rows.append(row)
+        write_rows(arguments.out / "loads.csv", facts, rows)
+        print(f"{row.clip}, {row.equipment}, {row.way}", flush=True)
+    publish("loads", loads.report(rows, facts), arguments)
+
+
+@measuring(
+    "figures",
+    "figures 4.1 to 4.7 of Degenhardt's thesis, drawn anew",
+    "Free the clips of the figures of collisions, and draw each as a strip of pictures and as curves.",
+    option("--clips", type=Path, required=True, metavar="DIR", help="folder of recordings (BVH)"),
+    listed("--only", "numbers of figures (default: all)", "FIGURE"),
+    count("--jobs", 1, "cases at a time"),
+)
+def redrawn(arguments: argparse.Namespace) -> None:
+    """Draw."""
+    from tests.audits import motion_figures as figures
+    from wholebody.bench.measure.motion import cases
+    from wholebody.bench.report import render
+    from wholebody.figures import load
+
+    recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
+    names = cases.chosen(arguments.only, [drawing.number for drawing in figures.DRAWINGS], "--only")
+    folder, figure, drawn = arguments.out / "figures", load("human"), []
+    for drawing in figures.DRAWINGS:
+        if drawing.number in names:
+            drawn.append(figures.redraw(drawing, recordings, figure, folder, arguments.jobs))
+            print(f"figure {drawing.number}: {drawn[-1].strip}, {drawn[-1].curves}", flush=True)
+    publish("motion-figures", render("motion_figures.md", TEMPLATES, figures=drawn), arguments)
+    if arguments.update_docs is not None:
+        place = arguments.update_docs / "assets" / "motion"
+        make_folder(place)
+        for path in (path for one in drawn for path in (one.strip, one.curves)):
+            shutil.copyfile(path, place / path.name)
+
+
+COMMANDS = (newton, qp, challenge, human, regress, loads, redrawn)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Run an audit, and return the exit code."""
+    parser = argparse.ArgumentParser(prog="python -m tests.audits", description=__doc__)
+    kinds: Any = parser.add_subparsers(title="what to audit", metavar="WHAT", required=True)
+    for audit in COMMANDS:
+        audit.add_to(kinds)
+    arguments = parser.parse_args(words)
+    try:
+        return int(arguments.run(arguments))
+    except WholebodyError as error:
+        print(error, file=sys.stderr)
+        return 2
+
+
+if __name__ == "__main__":
+    sys.exit(main())

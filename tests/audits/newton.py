@@ -1,0 +1,346 @@
+"""What sparse Newton costs by size, shape and factorisation, in whole solves and in drags.
+
+All times are the processor's, medians.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from tests.audits.templates import TEMPLATES
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError
+from wholebody.bench.measure.newton_shapes import (
+    LINK,
+    SHAPES,
+    chain,
+    four_bar,
+    median_us,
+    pulled_chain,
+    ring,
+    three_bar,
+)
+from wholebody.bench.report import render
+from wholebody.methods.newton.assembly import Assembly
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
+from wholebody.methods.newton.figure_system import FigureSystem
+from wholebody.methods.newton.iteration import HARD_DAMPING
+from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
+from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.system import ActiveSystem
+from wholebody.methods.newton.tracking import NewtonTracker
+
+SIZES = (10, 30, 100, 300, 1000)
+SMALLEST_FITTED = 30  # bodies: smaller systems cost what any call costs
+ALGEBRAS = ("normal", "llt", "kkt", "schur", "dense")
+PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
+CIRCLE = 0.05  # rad: from move to move of a drag
+FINE = 1e-8  # m, rad: tolerance at which two methods are compared
+TABLE_TOP = 0.74  # m
+TOUCHING = 1e-4  # m: nearer than this counts as contact
+LARGEST_DENSE = 100  # bodies: more take seconds
+LARGEST_STAR = 300  # bodies for which a star's full normal equations are still formed
+
+
+@dataclass(frozen=True)
+class LinearRow:
+    """One factorisation on one structure.
+
+    Attributes:
+        algebra: name of the factorisation.
+        variables, equations, nonzeros: of the Jacobian.
+        fill: non-zeros of the factor.
+        analyse_us: to lay out and analyse, once a structure.
+        solve_us: to refill, factorise and solve.
+    """
+
+    shape: str
+    bodies: int
+    algebra: str
+    variables: int
+    equations: int
+    nonzeros: int
+    fill: int
+    analyse_us: float
+    solve_us: float
+
+
+def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[LinearRow]:
+    """Every factorisation on every shape and size."""
+    for shape, make in SHAPES.items():
+        for count in sizes:
+            made = make(count)
+            system = made.system()
+            pattern = system.pattern
+            rng = np.random.default_rng(0)
+            task = LinearSystem(
+                system.values(made.variables()),
+                system.weight,
+                np.full(pattern.height, HARD_DAMPING),
+                np.zeros(pattern.width),
+                rng.normal(size=pattern.height),
+            )
+            for name in ALGEBRAS:
+                if name == "dense" and count > LARGEST_DENSE:
+                    continue
+                if shape == "star" and count > LARGEST_STAR and name in ("normal", "llt"):
+                    continue
+                if name == "schur" and shape != "star":
+                    continue
+                few = 2 if count >= LARGEST_STAR and name in ("normal", "llt") and shape == "star" else repeats
+                analysed = median_us(partial(linear_algebra, pattern, name), 3)
+                solver = linear_algebra(pattern, name)
+                try:
+                    solved = median_us(partial(solver.solve, task), few)
+                except WholebodyError:
+                    solved = float("nan")
+                size = (pattern.width, pattern.height, len(pattern.rows))
+                yield LinearRow(shape, count, name, *size, solver.fill, analysed, solved)
+
+
+def exponent(rows: Sequence[LinearRow], shape: str, algebra: str) -> float:
+    """Slope of log time over log bodies, from `SMALLEST_FITTED` bodies."""
+    kept = [(row.bodies, row.solve_us) for row in rows if (row.shape, row.algebra) == (shape, algebra)]
+    kept = [(n, t) for n, t in kept if n >= SMALLEST_FITTED and np.isfinite(t)]
+    if len(kept) < 2:
+        return float("nan")
+    n, t = np.log(np.array(kept)).T
+    return float(np.polyfit(n, t, 1)[0])
+
+
+@dataclass(frozen=True)
+class SolveRow:
+    """A whole solve: evaluations, factorisations and judgement of steps.
+
+    Attributes:
+        variables, nonzeros: of the Jacobian.
+        iterations, systems: Newton iterations, and linear systems solved.
+        us_each: time for a system and a variable.
+        errors: the last ones, with the most exact last.
+    """
+
+    case: str
+    variables: int
+    nonzeros: int
+    iterations: float
+    systems: float
+    ms: float
+    us_each: float
+    errors: str
+
+
+def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
+    """A reach from where an assembly stands."""
+    system = made.system()
+    return _reach_row(case, ActiveSystem(system, linear_algebra(system.pattern)), made.variables(), repeats)
+
+
+def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -> SolveRow:
+    def once() -> FeasibilityResult:
+        return satisfy(active_system, x, tolerance=1e-5, iterations=50)
+
+    found, us = once(), median_us(once, repeats)
+    return _solve_row(case, active_system.system.pattern, (found.iterations, found.systems), us, found.residuals)
+
+
+def _solve_row(
+    case: str, pattern: Pattern, counts: tuple[float, float], us: float, errors: Sequence[float]
+) -> SolveRow:
+    """A row; `counts` are iterations and systems."""
+    each, last = us / max(counts[1], 1) / pattern.width, " ".join(f"{value:.1e}" for value in errors[-4:])
+    return SolveRow(case, pattern.width, len(pattern.rows), *counts, 1e-3 * us, each, last)
+
+
+@dataclass(frozen=True)
+class AgreementRow:
+    """One problem by two methods.
+
+    Attributes:
+        newton_ms, qp_ms: time of a solve.
+        apart: greatest difference of a joint [rad].
+        measures_apart: relative difference of the measures.
+    """
+
+    case: str
+    newton_ms: float
+    qp_ms: float
+    apart: float
+    measures_apart: float
+
+
+def paper_row(repeats: int) -> SolveRow:
+    """The paper's size: a chain of 30 bodies whose end is dragged so far that it takes three systems."""
+    return assembly_row("the paper's size", pulled_chain(PAPER_BODIES), repeats)
+
+
+def drag_of_assembly_row(moves: int) -> SolveRow:
+    """The same chain dragged in a circle through the public interface: a new place of the goal, and a solve."""
+    made, last, tip = chain(PAPER_BODIES), f"b{PAPER_BODIES - 1}", np.array((LINK, 0.0, 0.0))
+    here, times, found = made.placement(last).act(tip), [], []
+    for angle in CIRCLE * np.arange(moves):
+        target = here + (0.03 * np.cos(angle) - 0.05, 0.03 * np.sin(angle), -0.03)
+        began = time.process_time()
+        found.append(made.drop_goals().point_goal(last, target, place=tip).solve())
+        times.append(time.process_time() - began)
+    counts = float(np.mean([one.iterations for one in found])), float(np.mean([one.systems for one in found]))
+    us, errors = 1e6 * float(np.median(times)), found[-1].residuals
+    return _solve_row("the same, a move of a drag", made.system().pattern, counts, us, errors)
+
+
+def loop_rows(repeats: int) -> list[SolveRow]:
+    """Closed loops beside open chains with as many bodies, each moved by a goal."""
+    closed, opened = four_bar(), three_bar()
+    for made in (closed, opened):
+        turned = made.placement("crank").rotation @ pin.utils.rotate("y", 0.1)
+        made.point_goal("crank", turned @ np.array((0.0, 0.0, 0.3)), place=(0, 0, 0.3))
+    rows = [assembly_row("three bars, open", opened, repeats), assembly_row("four-bar, closed", closed, repeats)]
+    for name, made in (("chain of 100, open", chain(100)), ("ring of 100, closed", ring(100))):
+        made.point_goal("b50", made.placement("b50").translation + np.array((0.02, 0.01, 0.03)))
+        rows.append(assembly_row(name, made, repeats))
+    return rows + [figure_row(name, problem, repeats) for name, problem in _hands_problems()]
+
+
+def nearest_row(repeats: int) -> SolveRow:
+    """The nearest place by Newton on the KKT system, whose last errors show the order of convergence."""
+    made = ring(30)
+    made.point_goal("b0", made.placement("b0").translation + np.array((-0.1, 0.06, 0.15)))
+    start = made.variables()
+
+    def solve() -> Any:
+        made.place(start)
+        return made.solve(tolerance=1e-9, nearest=True)
+
+    found, us = solve(), median_us(solve, max(3, repeats // 10))
+    more = len(found.nearness)
+    case, counts = "nearest place of a ring of 30", (found.iterations + more - 1, found.systems + more)
+    return _solve_row(case, made.system().pattern, counts, us, found.nearness)
+
+
+def figure_row(case: str, problem: wb.Problem, repeats: int) -> SolveRow:
+    """A reach of a figure, without polishing of the measures."""
+    active_system = FigureSystem(problem, problem.workspace(), "auto")
+    return _reach_row(case, active_system, active_system.variables(problem.start), max(3, repeats // 10))
+
+
+def agreement_rows(repeats: int) -> list[AgreementRow]:
+    """Problems whose least effort is unique, by both methods, the loop being an equality in either."""
+    rows = []
+    for case, problem in _hands_problems():
+        ours, theirs = wb.Newton(tolerance=FINE), wb.QP(tolerance=FINE)
+        ends = [method.solve(problem) for method in (ours, theirs)]
+        times = [1e-3 * median_us(partial(method.solve, problem), max(3, repeats // 30)) for method in (ours, theirs)]
+        apart = float(np.abs(pin.difference(problem.scene.model, ends[0].q, ends[1].q)).max())
+        least = [end.assessment.measure for end in ends]
+        rows.append(AgreementRow(case, times[0], times[1], apart, abs(least[0] - least[1]) / least[1]))
+    return rows
+
+
+def _hands_problems() -> Iterator[tuple[str, wb.Problem]]:
+    """The human alone with both arms forward and both feet held, the left palm to be raised by 10 cm."""
+    scene = wb.Scene(wb.load("human"))
+    q = scene.figure.posture("arms_forward")
+    palm = scene.state(q).frame(scene.frame_id("left_palm")).translation.copy()
+    goals = [wb.Point("left_palm", palm + (0.0, 0.0, 0.1))]
+    feet, grip = [wb.Hold("left_foot"), wb.Hold("right_foot")], wb.Hold("right_palm", relative_to="left_palm")
+    for name, held in (("two hands, open", feet), ("two hands on one box, closed", [*feet, grip])):
+        yield name, wb.Problem(scene, q, goals=goals, constraints=held)
+
+
+@dataclass(frozen=True)
+class DragRow:
+    """A drag.
+
+    Attributes:
+        ms, ms_95: time of a frame that half and 95 % of the frames stay below.
+        iterations: Newton iterations a frame, mean.
+        touching: share of the frames after which the hand touches the table.
+        structures: patterns laid out: contacts that come or go in combinations not met before.
+        structure_ms: time of each.
+        drift: greatest error of a constraint after any frame [m or rad].
+        deepest: deepest overlap with the table after any frame [m].
+    """
+
+    case: str
+    frames: int
+    ms: float
+    ms_95: float
+    iterations: float
+    touching: float
+    structures: int
+    structure_ms: float
+    drift: float
+    deepest: float
+
+
+def drag_row(frames: int, contacts: bool) -> DragRow:
+    """A drag of the right hand in an upright circle; with contacts, its lower part lies under a table's top."""
+    scene = wb.Scene(wb.load("human"))
+    if contacts:
+        scene.add(wb.Box((1.2, 0.7, 0.04)), name="table", at=(0.75, 0.0, TABLE_TOP - 0.02))
+    start = np.array((0.45, -0.25, 0.9))
+    holds = [wb.Hold("left_foot"), wb.Hold("right_foot")]
+    problem = wb.Problem(scene, "standing", goals=[wb.Point("right_index_tip", start)], constraints=holds)
+    drag = wb.Drag(problem, wb.Newton())
+    for _ in range(20):  # to the circle, which is not measured
+        drag.to(start)
+    low = TABLE_TOP - 0.02 if contacts else 0.8
+    owners = scene.piece_owner
+    table = np.array(["table" in (owners[a], owners[b]) for a, b in scene.pair_table.pairs], dtype=bool)
+    times, iterations, drift, least, workspace = [], [], 0.0, [], scene.workspace()
+    for k in range(frames):
+        angle = 0.05 * k
+        place = (0.45, -0.25 + 0.1 * np.sin(angle), low + 0.1 * (1.0 + np.cos(angle)))
+        began = time.process_time()
+        frame = drag.to(place)
+        times.append(1e3 * (time.process_time() - began))
+        iterations.append(frame.iterations)
+        near = workspace.near(frame.q, 0.01)
+        state = workspace.state
+        for term in problem.constraints:
+            value = term.value(state)
+            drift = max(drift, float(np.abs(value - np.clip(value, term.lower, term.upper)).max()))
+        least.append(float(near.distance[table[near.number]].min(initial=np.inf)))
+    distance = np.array(least)
+    assert isinstance(drag.tracker, NewtonTracker)
+    structures, seconds = drag.tracker.laid_out
+    return DragRow(
+        case="with a table under the lower part of the circle" if contacts else "free",
+        frames=frames,
+        ms=float(np.median(times)),
+        ms_95=float(np.percentile(times, 95)),
+        iterations=float(np.mean(iterations)),
+        touching=float((distance < TOUCHING).mean()),
+        structures=structures,
+        structure_ms=1e3 * seconds / max(structures, 1),
+        drift=drift,
+        deepest=max(0.0, -float(distance.min(initial=np.inf))),
+    )
+
+
+def report(
+    linear: Sequence[LinearRow],
+    solves: Sequence[SolveRow],
+    agreements: Sequence[AgreementRow],
+    drags: Sequence[DragRow],
+    facts: Mapping[str, str],
+) -> str:
+    """Tables to read."""
+    by_place = {(row.shape, row.bodies, row.algebra): row for row in linear}
+    sizes = [
+        (place, [by_place.get((*place, name)) for name in ALGEBRAS])
+        for place in dict.fromkeys((row.shape, row.bodies) for row in linear)
+    ]
+    exponents = [(shape, [exponent(linear, shape, name) for name in ALGEBRAS[:4]]) for shape in SHAPES]
+    return render(
+        "newton.md",
+        TEMPLATES, solves=solves, agreements=agreements, drags=drags, facts=facts, algebras=ALGEBRAS, sizes=sizes,
+        exponents=exponents,
+    )  # fmt: skip

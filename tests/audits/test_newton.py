@@ -1,0 +1,48 @@
+"""`python -m tests.audits newton`, as short as it can be."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.audits import newton
+from tests.audits.__main__ import main
+from wholebody.bench.measure.newton_shapes import median_us
+from wholebody.bench.tables import read_rows
+
+
+def test_the_shapes_are_assembled() -> None:
+    for name, make in newton.SHAPES.items():
+        made = make(7)
+        assert len(made.bodies) == 7
+        system = made.system()
+        assert np.abs(system.residual(made.variables())).max() < 1e-12, name
+
+
+def test_the_papers_size_is_met() -> None:
+    row = newton.paper_row(1)
+    assert abs(row.variables - 212) <= 5
+    assert abs(row.nonzeros - 1455) <= 60
+    assert row.systems == 3
+
+
+def test_a_move_of_a_drag_is_of_the_papers_size() -> None:
+    row = newton.drag_of_assembly_row(5)
+    assert (row.variables, row.nonzeros) == (newton.paper_row(1).variables, newton.paper_row(1).nonzeros)
+    assert 1.0 <= row.systems <= 4.0
+
+
+def test_exponents_are_slopes() -> None:
+    rows = [newton.LinearRow("ring", n, "kkt", 0, 0, 0, 0, 0.0, 3.0 * n**1.1) for n in (10, 100, 300, 1000)]
+    assert np.isclose(newton.exponent(rows, "ring", "kkt"), 1.1)
+
+
+def test_the_command_writes_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(newton, "median_us", lambda call, repeats: median_us(call, 1))
+    assert main(["newton", "--quick", "--out", str(tmp_path)]) == 0
+    assert "the paper's size" in (tmp_path / "newton.md").read_text()
+    _, rows = read_rows(tmp_path / "newton-linear.csv", newton.LinearRow)
+    assert {row.shape for row in rows} == set(newton.SHAPES)
+    assert all(row.fill > 0 for row in rows)

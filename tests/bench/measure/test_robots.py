@@ -1,0 +1,99 @@
+"""The table of robots: every description is listed, what is refused with its reason, and reaches are possible."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.base.errors import InputError
+from wholebody.bench.measure.robots import descriptions, examine, measure, page, tip_targets
+from wholebody.cli import main
+
+ROBOT = """<robot name="r"><link name="a"/>
+<link name="b"><collision><origin xyz="0 0 0.2"/><geometry><cylinder radius="0.02" length="0.3"/></geometry>
+</collision></link>
+<link name="c"><collision><origin xyz="0 0 0.2"/><geometry><sphere radius="0.03"/></geometry></collision></link>
+<link name="d"><collision><geometry><sphere radius="0.03"/></geometry></collision></link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 0.4"/><axis xyz="1 0 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+<joint name="l" type="revolute"><parent link="c"/><child link="d"/><origin xyz="0 0 0.4"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+
+SLOT = """<robot name="s">
+<link name="a"><collision><origin xyz="0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision>
+<collision><origin xyz="-0.24 0 0.2"/><geometry><box size="0.4 0.4 1"/></geometry></collision></link>
+<link name="b"><collision><geometry><sphere radius="0.03"/></geometry></collision></link>
+<link name="c"><collision><origin xyz="0 0 0.4"/><geometry><cylinder radius="0.02" length="0.5"/></geometry></collision>
+</link>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 1 0"/>
+<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/></joint>
+<joint name="k" type="revolute"><parent link="b"/><child link="c"/><origin xyz="0 0 0.1"/><axis xyz="0 0 1"/>
+<limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+"""A rod in a slot: most of its postures are inside of one of two boxes, some far on the way from upright too."""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "good").mkdir()
+    (tmp_path / "good" / "robot.urdf").write_text(ROBOT)
+    (tmp_path / "bad.urdf").write_text("<robot name='r'/>")
+    (tmp_path / "package.xml").write_text("<package/>")
+    return tmp_path
+
+
+def test_every_description_is_loaded_twice_or_refused(folder: Path) -> None:
+    bad, good = sorted(measure(folder, 3), key=lambda robot: robot.name)
+    assert bad.again is None
+    assert "there are no links in it" in bad.first.refused
+    assert good.again is not None
+    assert (good.first.nv, good.first.pieces, good.first.pairs) == (3, 3, 1)
+    assert good.first.free > 0.0
+    assert good.again.statuses == ("solved",) * 3
+    text = page([bad, good], {"wholebody": "1"}, 3)
+    assert "1 of 2 descriptions load" in text
+    assert "| `good/robot.urdf` |" in text
+    assert "3 of 3" in text
+    assert "- `bad.urdf`: bad.urdf: there are no links in it" in text
+
+
+def test_a_mujoco_file_is_a_description_and_a_package_file_is_none(folder: Path) -> None:
+    (folder / "arm.xml").write_text("<mujoco/>")
+    assert [path.name for path in descriptions(folder)] == ["bad.urdf", "robot.urdf", "arm.xml"]
+    with pytest.raises(InputError, match="no such folder"):
+        descriptions(folder / "nowhere")
+    (folder / "empty").mkdir()
+    with pytest.raises(InputError, match=r"no \.urdf files"):
+        descriptions(folder / "empty")
+
+
+def test_targets_are_where_free_postures_have_the_tip(folder: Path) -> None:
+    figure = wb.load(folder / "good" / "robot.urdf")
+    scene = wb.Scene(figure)
+    first, again = (tip_targets(figure, scene, 5) for _ in range(2))
+    assert [tip for tip, _ in first] == ["d"] * 5
+    for (_, a), (_, b) in zip(first, again, strict=True):
+        assert np.array_equal(a, b)
+        assert np.linalg.norm(a) < 0.8
+    assert examine(str(folder / "good" / "robot.urdf"), 0).times == ()
+
+
+def test_targets_are_of_free_postures_where_most_are_not(tmp_path: Path) -> None:
+    (tmp_path / "slot.urdf").write_text(SLOT)
+    figure = wb.load(tmp_path / "slot.urdf")
+    targets = np.array([target for _, target in tip_targets(figure, wb.Scene(figure), 20)])
+    assert (np.abs(np.arctan2(targets[:, 0], targets[:, 2])) < np.arctan2(0.04, 0.6)).all()
+
+
+def test_the_command_writes_the_page(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    docs, out = folder / "docs", folder / "out"
+    wanted = ["bench", "robots", str(folder / "good"), "--quick", "--out", str(out), "--update-docs", str(docs)]
+    assert main(wanted) == 0
+    assert "robot.urdf" in capsys.readouterr().out
+    assert (docs / "robots.md").read_text().startswith("# Robots\n")
+    assert (docs / "robots.md").read_text() == (out / "robots.md").read_text()
+    assert main(["bench", "robots", str(folder / "nowhere")]) == 2

@@ -1,0 +1,43 @@
+"""`wholebody bench compare` from end to end, as short as it can be."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import pytest
+
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.suite.compare.record import Record
+from wholebody.bench.tables import read_rows
+from wholebody.cli.bench import add_to
+
+
+def bench(*words: str) -> int:
+    parser = argparse.ArgumentParser()
+    add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["bench", "compare", *words])
+    return int(arguments.run(arguments))
+
+
+def test_two_methods_on_one_problem(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("--quick", "--cases", "1", "--sets", "robot_arm", "--methods", "qp/daqp", "dls", "--out", str(tmp_path))
+    assert bench(*words) == 0
+    assert "report.html" in capsys.readouterr().out
+    facts, rows = read_rows(tmp_path / "solves.csv", Record)
+    assert facts["cases beside each other"] == "1 on this machine"
+    assert {row.method for row in rows} == {"qp/daqp", "dls"}
+    assert "Robot arm" in (tmp_path / "report.html").read_text()
+    with pytest.raises(InputError, match=r"holds a run with seeds = \[0, 1, 2\], and \[3, 4, 5\] is asked for"):
+        bench(*words, "--seed", "3")
+
+
+def test_what_cannot_be_is_refused_before_anything_is_computed(tmp_path: Path) -> None:
+    with pytest.raises(UnknownNameError, match="did you mean clutter"):
+        bench("--sets", "cluter", "--out", str(tmp_path / "a"))
+    with pytest.raises(UnknownNameError, match="did you mean"):
+        bench("--methods", "qp/ospq", "--out", str(tmp_path / "b"))
+    for option in ("--jobs", "--cases"):
+        with pytest.raises(InputError, match="give 1 or more"):
+            bench(option, "0", "--out", str(tmp_path / "c"))
+    assert not list(tmp_path.iterdir())

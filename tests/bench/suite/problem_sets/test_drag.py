@@ -1,0 +1,44 @@
+"""Drags are possible in every frame and smooth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.suite.problem_sets import drag
+from wholebody.bench.suite.problem_sets.bodies import human
+from wholebody.bench.suite.problem_sets.case import generator
+
+
+def test_a_known_posture_meets_each_frame() -> None:
+    case = drag.SET.make(0, 0)
+    problem, postures = case.problem, drag.way(human(), generator(drag.SET.name, 0, 0))
+    assert 100 <= len(case.frames) == len(postures) - 1 <= 200
+    for q, goals in zip(postures[1:], case.frames, strict=True):
+        problem.retarget(goals)
+        judged = wb.assess(problem, q)
+        assert judged.met(1e-6)
+        assert judged.holds(1e-6)
+
+
+@pytest.mark.parametrize("number", range(3))
+def test_the_goals_move_far_smoothly_and_at_a_speed_of_people(number: int) -> None:
+    case = drag.SET.make(number, 0)
+    goals = [goals[0] for goals in (case.problem.goals, *case.frames)]
+    places = np.array([goal.target for goal in goals if isinstance(goal, wb.Point)])
+    assert np.linalg.norm(places - places[0], axis=1).max() > 0.2
+    speed = np.diff(places, axis=0) / case.dt
+    assert np.linalg.norm(speed, axis=1).max() < 4.0  # m/s
+    jump = np.linalg.norm(np.diff(speed, axis=0), axis=1) / case.dt
+    assert jump.max() < 40.0  # m/s^2: no frame kinks
+    assert np.linalg.norm(speed[0]) < 0.01
+    assert np.linalg.norm(speed[-1]) < 0.01
+
+
+def test_the_spline_has_no_corners() -> None:
+    """Value, first and second differences go on from one span to the next."""
+    control = np.random.default_rng(0).normal(size=(6, 2))
+    whole = np.vstack([drag._span(control[k : k + 4]) for k in range(3)])
+    third = np.abs(np.diff(whole, 3, axis=0)).max() * drag.SPAN**3
+    assert third < 3.0 * np.abs(np.diff(control, 3, axis=0)).max()

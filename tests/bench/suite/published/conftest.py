@@ -1,0 +1,39 @@
+from __future__ import annotations
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from wholebody.bench.suite.problem_sets.case import Posed
+from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.published.export import export
+
+sys.path.insert(0, str(Path(__file__).parent))
+from published_helpers import SEED
+
+EVERY = 10  # of how many frames of a drag one is there: each of them is judged
+
+
+@pytest.fixture(scope="session")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return an export of two problems of every set, of whose drags only some frames are there."""
+    found, whole = tmp_path_factory.mktemp("published") / "problems", SETS["drag"]
+
+    def short(number: int, rng: np.random.Generator) -> Posed:
+        problem, witness, *ways = whole.pose(number, rng)
+        frames, path = ways
+        return problem, witness, frames[::EVERY], path[::EVERY]
+
+    export([*({**SETS, "drag": replace(whole, pose=short)}).values()], 2, SEED, found)
+    return found
+
+
+@pytest.fixture(scope="session")
+def names(folder: Path) -> list[str]:
+    """Return the names of all exported problems."""
+    index = json.loads((folder / "index.json").read_text())
+    return [name for family in index["sets"].values() for name in family["problems"]]

@@ -1,0 +1,159 @@
+"""A change reaches the code that it is about, is taken back, and is counted."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.bench.measure.motion import ablated
+from wholebody.bench.suite import ablation
+from wholebody.bench.suite.ablation import Constant, Row, report
+from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.cli.bench.counts import ablation as command
+from wholebody.methods import contradictions, starts
+from wholebody.methods.qp import working_set
+from wholebody.motion import per_frame
+
+CHANGES = ("free", "deepest_mm", "deviation", "jerk", "sliding_mm", "programs")
+
+
+@pytest.fixture(scope="module")
+def given():
+    return [SETS["robot_arm"].make(number, 5).problem for number in range(2)]
+
+
+def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
+    found, _ = ablation.constants("qp")
+    by_name = {(each.module, each.name): each.value for each in found}
+    assert by_name["wholebody.methods.starts", "SPREADS"] == starts.SPREADS
+    assert "wholebody.methods.qp.solvers.osqp_solver" in {each.module for each in found}  # folders within too
+    assert all(not each.module.startswith("wholebody.methods.newton") for each in found)
+
+
+def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
+    found, compiled = ablation.constants("ccd")
+    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert all(each.module not in compiled for each in found)
+
+
+def test_only_problems_that_the_method_takes_are_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ablation, "SETS", {name: SETS[name] for name in ("balance", "robot_arm", "drag")})
+    solver = wb.methods.CCD()
+    asked = ablation.problems(1, "ccd")
+    assert len(ablation.problems(1, "qp")) > len(asked) > 0
+    assert all(solver.accepts(problem) is None for problem in asked)
+
+
+def test_whole_numbers_stay_whole_and_at_least_one() -> None:
+    assert Constant("m", "N", 4).times(0.1) == 1
+    assert Constant("m", "N", 4).times(10.0) == 40
+    assert Constant("m", "N", (1.0, 2.0)).times(0.5) == (0.5, 1.0)
+    halved = Constant("m", "N", (3, 50)).times(0.5)
+    assert halved == (2, 25)
+    assert all(isinstance(each, int) for each in halved)
+
+
+def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.MonkeyPatch) -> None:
+    constant = Constant("wholebody.methods.contradictions", "NEAREST", contradictions.NEAREST)
+    places = ablation.places(constant)
+    assert len(places) > 1
+    with ablation.replaced(places, 7.0):
+        assert all(getattr(owner, name) == 7.0 for owner, name in places)
+    assert all(getattr(owner, name) == constant.value for owner, name in places)
+
+
+def test_what_a_module_made_of_a_constant_is_made_anew() -> None:
+    """Loops get the limits of a working set in an array."""
+    before = working_set.LIMITS.copy()
+    constant = Constant("wholebody.methods.qp.working_set", "BOUND_TOLERANCE", working_set.BOUND_TOLERANCE)
+    with ablation.changed(constant, 2.0 * constant.value):
+        now = working_set.LIMITS
+        assert np.flatnonzero(now != before).size == 1
+        assert 2.0 * constant.value in now
+    assert (before == working_set.LIMITS).all()
+
+
+def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(ablation, "constants", lambda method: ([], []))
+
+    class Nothing:
+        value = 1
+
+    told: list[str] = []
+    whole, rows = ablation.ablation("qp", given, {"nothing": (Nothing, "value", 2)}, told.append)
+    assert Nothing.value == 1
+    assert rows == [replace(rows[0], what="nothing", change="off", differ=0, solved=0, iterations=0, left=0.0)]
+    assert 0.1 < rows[0].time < 10.0
+    assert len(told) == 1
+    text = report("qp", len(given), whole, [*rows, Row("x.Y", "halved", 0, 0, 0, 0.0, 1.0)], ["a.kernel"])
+    assert "`x.Y`" in text
+    assert "a.kernel" in text
+
+
+@pytest.mark.parametrize(("words", "asked"), [((), 1), (("--count", "3"), 3)])
+def test_a_quick_run_has_one_problem_of_every_set_where_no_count_is_given(
+    words: tuple[str, ...], asked: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    class AskedError(Exception):
+        pass
+
+    def problems(count: int, method: str) -> None:
+        raise AskedError(f"{count} of {method}")
+
+    monkeypatch.setattr(ablation, "problems", problems)
+    parser = argparse.ArgumentParser()
+    command.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["ablation", "--quick", *words])
+    with pytest.raises(AskedError, match=f"^{asked} of qp$"):
+        arguments.run(arguments)
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--method", "qp", "--only", "per_frame"), "--only chooses modules of --method motion, not of qp"),
+        (("--only", "no-such-module"), "--only"),
+        (("--method", "motion", "--count", "6"), "leave --count out"),
+    ],
+)
+def test_options_that_a_method_does_not_have_are_refused(
+    words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(ablation, "problems", None)
+    monkeypatch.setattr(ablated, "ablation", None)
+    parser = argparse.ArgumentParser()
+    command.add_to(parser.add_subparsers())
+    arguments = parser.parse_args(["ablation", *words])
+    with pytest.raises(wb.InputError, match=said):
+        arguments.run(arguments)
+
+
+def test_every_mechanism_that_is_switched_off_is_there() -> None:
+    for owner, attribute, _ in ablation.mechanisms("qp").values():
+        assert getattr(owner, attribute, None) is not None
+
+
+def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods(monkeypatch) -> None:
+    monkeypatch.setattr(ablated, "USED", {"per_frame": ("frames",), "bisection.method": ("bisection",)})
+    told: list[str] = []
+    figure = wb.load("human")
+    whole, rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
+    assert whole.free == (True,)
+    assert [row.what for row in rows[::2]] == ["per_frame.MARGIN", "per_frame.ROOM", "per_frame.LIFTS"]
+    assert {row.change for row in rows} == {"halved", "doubled"}
+    assert per_frame.MARGIN == 0.3
+    by_name = {(row.what, row.change): row for row in rows}
+    assert by_name["per_frame.MARGIN", "doubled"].differ == 1  # more frames are passed
+    text = ablated.report([*rows, replace(rows[0], what="x.Y", **dict.fromkeys(CHANGES, 0))])
+    assert "`per_frame.MARGIN`" in text
+    assert "nothing on these cases: " in text
+    assert "`x.Y`" in text.split("nothing on these cases: ")[1]
+
+
+def test_the_modules_whose_constants_are_changed_have_some() -> None:
+    for module in ablated.USED:
+        assert ablation.constants_in([f"wholebody.motion.{module}"])[0], module

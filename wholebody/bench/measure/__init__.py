@@ -1,0 +1,1 @@
+"""What the package costs: steps, solves, clips, worlds and drags, with tables and charts."""

@@ -1,0 +1,231 @@
+"""The reach that every tool makes: 200 steps of a fingertip, both feet held, among twenty convex objects.
+
+Two ways for the fingertip: "free" passes the body and the objects and comes near many without having to touch any;
+"contact" asks for a place inside a box, which nobody can reach, and then for one before the chest. "alone" is the free
+way without the objects: far fewer pairs, which tells what a tool's time is made of.
+
+What a tool does is judged by the judge of all motions, and by where the tip and the feet are: no tool's own distances
+are believed, ours included.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.assessment.motion import limit_violation, pairs_along, velocities
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+
+VARIANTS = ("free", "contact", "alone")
+DT = 0.01  # s
+CLEARANCE = 0.010  # m
+WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
+JOINT_SPEED = 4.0  # rad/s
+ROOT_SPEED, ROOT_TURN = 1.0, 2.0  # m/s, rad/s
+SEED = 7  # of the objects
+BOXES, SPHERES, HULLS, HULL_POINTS = 7, 6, 7, 100
+BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box that the contact reach is asked into
+INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
+INTO, ALONG = 0.35, 0.25  # shares of the time for the ways into the box and within it
+FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by way of these places
+CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
+ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
+TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
+SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
+
+
+@dataclass(frozen=True)
+class Track:
+    """One reach, the same for every tool.
+
+    Attributes:
+        name: "free", "contact" or "alone".
+        scene: the human and the objects.
+        start: (nq,) standing.
+        targets: (steps, 3) where the fingertip is asked to be [m].
+        tip: name of the frame that reaches.
+        feet: names of the frames that stay where they are.
+        clearance: that every pair keeps [m].
+    """
+
+    name: str
+    scene: wb.Scene
+    start: Array
+    targets: Array
+    tip: str = "right_index_tip"
+    feet: tuple[str, ...] = ("left_foot", "right_foot")
+    clearance: float = CLEARANCE
+
+    @property
+    def floating(self) -> bool:
+        """Whether the root moves."""
+        return self.scene.figure.root == "free"
+
+    @property
+    def pairs(self) -> int:
+        """How many pairs of pieces can touch."""
+        return len(self.scene.geometry.collisionPairs)
+
+
+def track(name: str, steps: int = 200) -> Track:
+    """Build a reach.
+
+    Args:
+        name: "free", "contact" or "alone".
+        steps: of the way.
+
+    Raises:
+        UnknownNameError: another name.
+        InputError: fewer than two steps.
+    """
+    if name not in VARIANTS:
+        raise UnknownNameError("reach", name, VARIANTS)
+    if steps < 2:
+        raise InputError(f"a reach of {steps} steps has no way; give --steps 2 or more")
+    figure = wb.load("human")
+    start = figure.posture("standing")
+    tip, thorax = (figure.placement(start, name).translation for name in ("right_index_tip", "thorax"))
+    free = smooth_way(np.vstack([tip, FREE]), 400)
+    scene = wb.Scene(figure)
+    if name != "alone":
+        add_objects(scene, start, free, np.random.default_rng(SEED))
+    if name != "contact":
+        return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
+    chest = thorax + (CHEST, 0.0, 0.0)
+    first, second = round(INTO * steps), round((INTO + ALONG) * steps)
+    ways = [
+        smooth_way(np.array([start_place, end_place]), count)
+        for start_place, end_place, count in (
+            (tip, INSIDE[0], first),
+            (INSIDE[0], INSIDE[1], second - first),
+            (INSIDE[1], chest, steps - second),
+        )
+    ]
+    return Track(name, scene, start, np.vstack(ways))
+
+
+def smooth_way(places: Array, steps: int) -> Array:
+    """Way (steps, 3) through places (k, 3), at rest at both ends (minimum jerk), with a tenth of the time at the end.
+
+    The share of the way done at the time t of 0 to 1 is 10 t^3 - 15 t^4 + 6 t^5: Flash and Hogan 1985, "The
+    coordination of arm movements".
+    """
+    from scipy.interpolate import CubicSpline
+
+    chord = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))])
+    t = np.minimum(np.arange(1, steps + 1) / (0.9 * steps), 1.0)
+    share = t**3 * (10.0 - 15.0 * t + 6.0 * t**2)
+    return np.asarray(CubicSpline(chord / chord[-1], places, bc_type="natural")(share), dtype=float)
+
+
+def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
+    """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
+    scene.add(wb.Box(BLOCK[0]), name="block", at=BLOCK[1])
+    put_objects(scene, Occupied(scene.figure, (start,)), way, rng)
+
+
+def put_objects(
+    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]] = SPACE,
+    size: float = 1.0, boxes: int = BOXES - 1,
+) -> None:  # fmt: skip
+    """Put boxes, spheres and hulls into a space, clear of what is taken up and of a way for a tip.
+
+    Args:
+        scene: gets the objects.
+        taken: by the figure.
+        way: (k, 3) of the tip [m].
+        rng: of their kinds' sizes and places.
+        space: (2, 3) corners of the space [m].
+        size: of the objects and of the room around them, as a share of those of the human's reaches.
+        boxes: how many of them are boxes.
+
+    Raises:
+        InputError: no place was found for one of them.
+    """
+    kinds = ["box"] * boxes + ["sphere"] * SPHERES + ["hull"] * HULLS
+    taken.keep_free(way[::8], size * (ROOM_WAY - ROOM_START))
+
+    def make(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
+        return kinds[number], _shape(kinds[number], rng, size)
+
+    add_things(scene, len(kinds), taken, size * ROOM_START, rng, space, make)
+
+
+def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
+    if kind == "box":
+        edges = size * rng.uniform(0.06, 0.28, 3)
+        return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
+    if kind == "sphere":
+        return wb.Sphere(size * float(rng.uniform(0.04, 0.12)))
+    points = rng.normal(size=(HULL_POINTS, 3))
+    points *= size * rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
+    return wb.Hull(points)
+
+
+class Verdict(NamedTuple):
+    """What came of one run.
+
+    Attributes:
+        least_distance: (steps,) least signed distance of all pairs after each step [m].
+        near: (steps,) pairs nearer than `WITHIN`.
+        touching: (steps,) pairs at the clearance or nearer, to 1 mm.
+        error: (steps,) distance of the fingertip from its target [m].
+        foot_drift: greatest distance of a foot from where it began [m].
+        foot_turn: greatest angle of a foot from how it began [rad].
+        limit_violation: how far the worst joint was out of its limits [rad].
+        fastest_joint: greatest step of a joint, as a share of what the speed bound allows.
+        fastest_root: the same for the root, in its place and its orientation.
+        acceleration: mean of all joints' absolute accelerations [rad/s^2]; high where a tool trembles.
+    """
+
+    least_distance: Array
+    near: Array
+    touching: Array
+    error: Array
+    foot_drift: float
+    foot_turn: float
+    limit_violation: float
+    fastest_joint: float
+    fastest_root: float
+    acceleration: float
+
+
+def judge(track: Track, postures: Array) -> Verdict:
+    """Judge the postures (steps, nq) that a tool went through.
+
+    Raises:
+        ValueError: a posture is not finite.
+    """
+    if not np.isfinite(postures).all():
+        raise ValueError("a tool went to a posture that is not finite")
+    scene, figure = track.scene, track.scene.figure
+    feet, tip = [figure.frame_id(name) for name in track.feet], figure.frame_id(track.tip)
+    state = scene.state(track.start)
+    stood = [pin.SE3(state.frame(foot)) for foot in feet]
+    least, near, touching, error, drift, turn = [], [], [], [], [0.0], [0.0]
+    for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
+        least.append(pairs.least)
+        near.append(int((pairs.distance < WITHIN).sum()))
+        touching.append(int((pairs.distance < track.clearance + TOUCHING).sum()))
+        error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
+        for foot, there in zip(feet, stood, strict=True):
+            moved = there.actInv(pairs.state.frame(foot))
+            drift.append(float(np.linalg.norm(moved.translation)))
+            turn.append(float(np.linalg.norm(pin.log3(moved.rotation))))
+    whole = np.vstack([track.start, postures])
+    speed = np.abs(velocities(scene.model, whole, DT)).max(axis=0)
+    root, joints = np.split(speed, [6 if track.floating else 0])
+    angles = np.vstack([track.start, whole])[:, figure.limits.idx_q]
+    return Verdict(
+        np.array(least), np.array(near), np.array(touching), np.array(error), max(drift), max(turn),
+        limit_violation(figure, postures), float(joints.max(initial=0.0)) / JOINT_SPEED,
+        max(float(root[:3].max(initial=0.0)) / ROOT_SPEED, float(root[3:].max(initial=0.0)) / ROOT_TURN),
+        float(np.abs(np.diff(angles, 2, axis=0)).mean()) / DT**2,
+    )  # fmt: skip

@@ -1,1 +1,0 @@
-"""`wholebody bench regress`: counts that do not depend on the machine, compared with those that were locked."""

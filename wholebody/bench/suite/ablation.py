@@ -1,0 +1,312 @@
+"""Which constants and mechanisms of a method matter: each changed or switched off, on problems that stay the same.
+
+Problems solved, iterations, and whether any answer differs at all do not depend on the machine; the processor's time is
+compared as a ratio to that of the unchanged method in the same run. A constant that changes no answer when it is halved
+and doubled decides nothing here.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+import pkgutil
+import sys
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.bench.report import render
+from wholebody.bench.suite.problem_sets.registry import SETS
+from wholebody.bench.suite.stability.case import Posed
+from wholebody.bench.suite.stability.catalogue import cases
+from wholebody.methods.solve import method_named
+from wholebody.problem import Problem
+
+Value = float | int | tuple[float, ...]
+
+SHARED = ("wholebody.methods.starts", "wholebody.geometry.continuous.passing_through")
+"""Modules that methods share and that have constants of their own."""
+
+FACTORS = {"halved": 0.5, "doubled": 2.0}
+SEED = 5
+
+
+@dataclass(frozen=True)
+class Constant:
+    """A number, or several, that a module gives a name in capitals."""
+
+    module: str
+    name: str
+    value: Value
+
+    def times(self, factor: float) -> Value:
+        """The value times a factor; whole numbers stay whole and at least one."""
+        if isinstance(self.value, tuple):
+            return tuple(_times(each, factor) for each in self.value)
+        return _times(self.value, factor)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a method did with all problems.
+
+    Attributes:
+        solved: how many it solved.
+        iterations: of all of them together.
+        left: goal errors that are left, metres and radians, of all of them together.
+        seconds: of the processor, of all of them together.
+        answers: postures, one a problem.
+    """
+
+    solved: int
+    iterations: int
+    left: float
+    seconds: float
+    answers: tuple[Array, ...]
+
+    def differ(self, other: Outcome) -> int:
+        """How many answers differ, in any digit."""
+        return sum(not np.array_equal(a, b) for a, b in zip(self.answers, other.answers, strict=True))
+
+
+@dataclass(frozen=True)
+class Row:
+    """What a change did.
+
+    Attributes:
+        differ: answers that differ in any digit.
+        solved, iterations, left: changes of these, as in `Outcome`.
+        time: processor's time over that of the unchanged method, which is measured anew after every mechanism.
+    """
+
+    what: str
+    change: str
+    differ: int
+    solved: int
+    iterations: int
+    left: float
+    time: float
+
+
+def constants(method: str) -> tuple[list[Constant], list[str]]:
+    """Constants of a method, a package of `wholebody.methods`, but those of tracking.
+
+    Modules whose constants are compiled in and cannot be changed are the second part.
+    """
+    package = import_module(f"wholebody.methods.{method}")
+    names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
+    names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
+    return constants_in((*names, *SHARED))
+
+
+def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
+    """Constants of modules by name, and those modules whose constants are compiled in; see `constants`."""
+    found: list[Constant] = []
+    compiled: list[str] = []
+    for name in modules:
+        try:
+            module = import_module(name)
+        except ModuleNotFoundError as missing:
+            if missing.name is not None and missing.name.startswith("wholebody"):
+                raise
+            continue  # of an optional package that is not installed
+        mine = [Constant(name, each, getattr(module, each)) for each in _assigned(module)]
+        mine = [each for each in mine if _is_number(each.value)]
+        if mine and any(hasattr(value, "signatures") for value in vars(module).values()):  # loops of numba
+            compiled.append(name)
+        else:
+            found += mine
+    return found, compiled
+
+
+def problems(count: int, method: str) -> list[Problem]:
+    """The first problems of every still set, and the hard cases that are solved once: those that the method takes."""
+    made = [SETS[name].make(number, SEED).problem for name in SETS if not SETS[name].moving for number in range(count)]
+    posed = [given.problem for given in (case.question() for case in cases()) if isinstance(given, Posed)]
+    solver = method_named(method)
+    return [problem for problem in made + posed if solver.accepts(problem) is None]
+
+
+def outcome(method: str, given: Sequence[Problem]) -> Outcome:
+    """Solve all problems."""
+    solver = method_named(method)
+    began = time.process_time()
+    solutions = [solver.solve(problem) for problem in given]
+    seconds = time.process_time() - began
+    left = sum(each.assessment.goal_error + each.assessment.goal_angle for each in solutions)
+    return Outcome(
+        sum(each.solved for each in solutions),
+        sum(each.iterations for each in solutions),
+        float(left),
+        seconds,
+        tuple(each.q for each in solutions),
+    )
+
+
+def ablation(
+    method: str,
+    given: Sequence[Problem],
+    mechanisms: Mapping[str, tuple[Any, str, Any]],
+    tell: Callable[[str], None],
+) -> tuple[Outcome, list[Row]]:
+    """Change one thing after the other; return what the method does unchanged, and a row a change.
+
+    `mechanisms` are what is switched off by name: an owner, its attribute, and what takes its place. `tell` is told
+    of every row.
+    """
+    outcome(method, given)  # what is compiled or loaded at first use
+    whole = outcome(method, given)
+    rows: list[Row] = []
+    unchanged = [whole.seconds]
+
+    def note(what: str, change: str) -> None:
+        now = outcome(method, given)
+        done = (now.solved - whole.solved, now.iterations - whole.iterations, now.left - whole.left)
+        rows.append(Row(what, change, now.differ(whole), *done, now.seconds / whole.seconds))
+        tell(
+            f"{what}, {change}: {rows[-1].differ} differ, {rows[-1].solved:+d} solved, {rows[-1].time:.2f} of the time"
+        )
+
+    for name, (owner, attribute, instead) in mechanisms.items():
+        with replaced([(owner, attribute)], instead):
+            note(name, "off")
+        unchanged.append(outcome(method, given).seconds)  # the machine's speed drifts
+    for constant in constants(method)[0]:
+        for change, factor in FACTORS.items():
+            value = constant.times(factor)
+            if value != constant.value:
+                with changed(constant, value):
+                    note(f"{constant.module.removeprefix('wholebody.methods.')}.{constant.name}", change)
+    return whole, rows
+
+
+def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
+    """What a method can do without, by name; empty where nothing is listed."""
+    if method != "qp":
+        return {}
+    from wholebody.methods.acceleration import Anderson
+    from wholebody.methods.qp import method as qp
+    from wholebody.methods.qp import multistart, sqp
+    from wholebody.methods.qp.feasibility import Feasibility
+    from wholebody.methods.qp.funnel import Funnel
+    from wholebody.methods.qp.multipliers import Multipliers
+    from wholebody.methods.qp.working_set import WorkingSet
+
+    search, descent = multistart.Search, sqp.SQP
+    return {
+        "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
+        "watchdog": (descent, "_promises", lambda self, here, there: False),
+        "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
+        "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
+        "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
+        "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
+        "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
+        "arms without contacts first": (qp, "unobstructed", lambda *given: None),
+        "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),
+        "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
+        "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
+        "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
+        "named postures": (multistart, "named_postures", lambda problem, state, start: iter(())),
+        "leaving contacts that cancel": (search, "_leave_cancelling", lambda self: None),
+        "relaxed probes": (search, "_relaxed_probes", lambda self, starts: iter(())),
+        "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
+        "closest posture to goals that are not met": (search, "_come_nearest", lambda self: None),
+        "closest posture among things": (search, "_near_best", lambda self: None),
+    }
+
+
+def _times(value: float | int, factor: float) -> float | int:
+    return max(1, round(factor * value)) if isinstance(value, int) else factor * value
+
+
+def _assignments(module: ModuleType) -> Iterator[tuple[tuple[str, ...], ast.expr]]:
+    """Names that a module assigns at its top, and the expression that they are given."""
+    for node in ast.parse(Path(str(module.__file__)).read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and len(node.targets) == 1:
+            target = node.targets[0]
+            names = target.elts if isinstance(target, ast.Tuple) else [target]
+            yield tuple(each.id for each in names if isinstance(each, ast.Name)), node.value
+
+
+def _assigned(module: ModuleType) -> list[str]:
+    """Names in capitals that a module assigns itself."""
+    return [name for names, _ in _assignments(module) for name in names if name.isupper()]
+
+
+def _is_number(value: Any) -> bool:
+    parts = value if isinstance(value, tuple) else (value,)
+    return bool(parts) and all(
+        isinstance(part, int | float) and not isinstance(part, bool) and math.isfinite(part) for part in parts
+    )
+
+
+def places(constant: Constant) -> list[tuple[Any, str]]:
+    """The module of a constant, and those that import it by its name."""
+    owner = sys.modules[constant.module]
+    others = [
+        module
+        for name, module in sys.modules.items()
+        if name.startswith("wholebody.") and module is not owner and constant.name in vars(module)
+        and vars(module)[constant.name] is constant.value and constant.name not in _assigned(module)
+    ]  # fmt: skip
+    return [(module, constant.name) for module in (owner, *others)]
+
+
+@contextmanager
+def changed(constant: Constant, value: Value) -> Iterator[None]:
+    """Give a constant another value for a while, and what its module made of it when it was imported.
+
+    Compiled loops get constants in arrays that modules make of them; these are made anew.
+    """
+    owner = sys.modules[constant.module]
+    with ExitStack() as stack:
+        stack.enter_context(replaced(places(constant), value))
+        anew = {constant.name}
+        for names, expression in _assignments(owner):
+            used = {node.id for node in ast.walk(expression) if isinstance(node, ast.Name)}
+            if used & anew and len(names) == 1:
+                made = eval(compile(ast.Expression(expression), str(owner.__file__), "eval"), vars(owner))
+                old = getattr(owner, names[0])
+                holders = [
+                    module
+                    for name, module in sys.modules.items()
+                    if name.startswith("wholebody.") and vars(module).get(names[0]) is old
+                ]
+                stack.enter_context(replaced([(module, names[0]) for module in holders], made))
+                anew.add(names[0])
+        yield
+
+
+@contextmanager
+def replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
+    """Put something in the place of attributes for a while."""
+    before = [getattr(owner, name) for owner, name in places]
+    for owner, name in places:
+        setattr(owner, name, value)
+    try:
+        yield
+    finally:
+        for (owner, name), old in zip(places, before, strict=True):
+            setattr(owner, name, old)
+
+
+def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str]) -> str:
+    """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
+    changed = [row for row in rows if row.change != "off"]
+    matter = {row.what for row in changed if row.differ}
+    unnoticed = dict.fromkeys(row.what for row in changed if row.what not in matter)
+    tables = {
+        "switched off": [row for row in rows if row.change == "off"],
+        "constant": [row for row in changed if row.differ],
+    }
+    return render(
+        "ablation.md", method=method, given=given, whole=whole, tables=tables, unnoticed=unnoticed, compiled=compiled
+    )

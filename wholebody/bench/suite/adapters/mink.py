@@ -1,0 +1,356 @@
+"""mink: `solve_ik` with its tasks and limits on a MuJoCo model made from ours; the QPs are solved by DAQP.
+
+To solve a problem it is iterated; a reach is followed with one call a step.
+"""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+import numpy as np
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
+from wholebody.bench.suite.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.suite.adapters.loop import (
+    NEAR,
+    OUT,
+    Loop,
+    Stepper,
+    kept_apart,
+    longest_moves,
+    placements,
+    posture_costs,
+    size,
+)
+from wholebody.bench.suite.adapters.mjcf import ROOT, mjcf
+from wholebody.bench.suite.adapters.urdf import Frames, own_frame
+from wholebody.figures.figure import Figure
+from wholebody.methods.differential import TOOL, StepError
+from wholebody.problem import Problem
+from wholebody.tasks.inputs import Place
+from wholebody.tasks.residuals import PlacementResidual
+
+HOLDING = 10.0  # cost of what is held, where goals cost 1
+COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
+
+
+_DIFFERENCES = (
+    "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
+    "mink has no Balance, Plane or ReachCones, and holds whole frames only",
+    "mink minimises Effort and Displacement only",
+    "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
+)
+
+
+def mink_adapter(variant: str = "") -> Adapter:
+    """The kinematics of mink in our loop: holds as heavy soft tasks, or as equalities where the variant is "hard"."""
+    hard = variant == "hard"
+    loop = HardMinkLoop if hard else MinkLoop
+    holds = "whole holds as equality constraints" if hard else f"whole holds as soft ones of cost {HOLDING:g}"
+    more = "pairs that equality constraints keep in place are left out, since their rows leave mink no solution"
+    return Adapter(
+        name=loop.name,
+        make=loop,
+        prepare=loop.prepare,
+        loose=(*few(5, 10, 20), *LADDER),
+        setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
+        f"LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, {holds}, "
+        f"DofFreezingTask, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of {loop.longest} rad or, for "
+        "each metre of the figure, m a step, a CollisionAvoidanceLimit for every clearance that occurs, gain "
+        f"{loop.gain}; for each metre of the figure it looks {100 * NEAR:g} cm far and keeps {1e3 * loop.margin:g} mm "
+        "more than the clearance, less where the start has less room; one start, at most 200 steps, the loop of our "
+        "adapter to placo. Building its model is set-up.",
+        differences=(*_DIFFERENCES, more) if hard else _DIFFERENCES,
+    )
+
+
+class MinkLoop(Loop):
+    """Steps of mink."""
+
+    name = "mink"
+    kinds = (*Loop.kinds, wb.Axis)
+    hard: ClassVar[bool] = False
+    gain: ClassVar[float] = 0.85  # share of what is free of a gap that may be used up in one step: mink's default
+
+    def build(self, problem: Problem) -> Stepper:
+        """Write the model."""
+        return _MinkStepper(problem, type(self))
+
+
+class HardMinkLoop(MinkLoop):
+    """The same with holds as equality constraints, mink's `constraints`."""
+
+    name = "mink/hard"
+    hard = True
+    longest = 0.025
+    margin = 0.0  # rows that ask for room beside a foot that cannot move leave a program no solution
+    gain = 1.0  # with less, what is held cannot come back
+
+
+class _MinkStepper:
+    def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
+        self._problem, self._loop, self._longest, self._holds_hard = problem, loop, loop.longest, loop.hard
+        self._sites = Frames()
+        self._room = 0.0
+        for term in (*problem.goals, *problem.constraints):
+            if isinstance(term, wb.Point):
+                self._site(term.place, term.resolved_offset)
+            elif isinstance(term, wb.Axis):
+                self._site(term.place)
+            elif isinstance(term, (wb.Frame, wb.Orientation, wb.Relative, wb.Hold)):
+                self._site(term.residual.place)
+                self._site(term.residual.base)
+        self._compile()
+
+    def begin(self, room: float) -> None:
+        """Make the tasks anew, and the model where objects moved since it was made."""
+        import mink
+
+        problem, scene = self._problem, self._problem.scene
+        if room != self._room or not np.array_equal(placements(self._problem), self._placed):
+            self._room = room
+            self._compile()
+        model = self._mujoco
+        self._points: list[tuple[Any, str, Array]] = []
+        self._tasks = [self._goal(goal) for goal in problem.goals]
+        cost = 1.0 if self._holds_hard else HOLDING
+        holds = [self._placement(term.residual, cost) for term in problem.constraints if isinstance(term, wb.Hold)]
+        self._hard = holds if self._holds_hard else []
+        self._tasks += [] if self._holds_hard else holds
+        frozen = [bound for bound in problem.bounds if isinstance(bound, wb.Freeze)]
+        if frozen:
+            dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
+            self._hard.append(mink.DofFreezingTask(model, sorted(dofs)))
+        self._measures = []
+        for posture in posture_costs(problem):
+            self._measures.append((self._joints(posture.reference), self._spread(np.sqrt(posture.weights))))
+
+    def step(self, q: Array, weight: float, damping: float) -> Array:
+        """One `solve_ik`, with a time step of one second."""
+        import mink
+
+        configuration, theirs = self._configuration, self._order.theirs(q)
+        with TOOL:
+            configuration.update(theirs)
+        for task, site, place in self._points:
+            turn = configuration.get_transform_frame_to_world(site, "site").rotation()
+            task.set_target(mink.SE3.from_rotation_and_translation(turn, place))
+        for task, share in self._measures:
+            task.set_cost(weight**0.5 * share)
+        try:
+            with TOOL:
+                velocity = mink.solve_ik(
+                    configuration, [*self._tasks, *(task for task, _ in self._measures)], 1.0, solver="daqp",
+                    damping=damping, limits=self._limits, constraints=self._hard or None,
+                )  # fmt: skip
+        except mink.NoSolutionFound as error:
+            raise StepError(f"{type(error).__name__}: its program has no solution") from None
+        return np.asarray(velocity, dtype=float)[self._dof]
+
+    def _compile(self) -> None:
+        import mink
+        import mujoco
+
+        self._mujoco = mujoco.MjModel.from_xml_string(mjcf(self._problem.scene, self._sites))
+        self._configuration = mink.Configuration(self._mujoco)
+        self._limits, self._placed = self._made_limits(), placements(self._problem)
+
+    def _site(self, place: Place, offset: Array | None = None) -> str:
+        return self._sites.named(self._problem.scene.model, place, offset)
+
+    def _made_limits(self) -> list[Any]:
+        import mink
+
+        problem, model = self._problem, self._mujoco
+        figure = problem.scene.figure
+        self._order = _Order(figure, model)
+        self._dof = self._order.dof
+        most, reach = longest_moves(figure, self._longest), size(figure)
+        limits = [
+            mink.ConfigurationLimit(model, gain=1.0),
+            mink.VelocityLimit(model, {name: float(most[figure.dofs([name])[0]]) for name in figure.joints}),
+        ]
+        if figure.root == "free":
+            limits.append(mink.FreeJointVelocityLimit(model, self._longest * reach, self._longest, joint_name=ROOT))
+        names = [piece.name for piece in problem.scene.geometry.geometryObjects]
+        pieces = problem.scene.geometry.geometryObjects
+        groups: dict[tuple[float, float], list[Any]] = {}
+        for pair in kept_apart(problem, self._loop.margin * reach, self._holds_hard):
+            room = 0.0 if pieces[pair.first].parentJoint and pieces[pair.second].parentJoint else self._room
+            asked = pair.clearance + max(pair.margin, room), room
+            groups.setdefault(asked, []).append(([names[pair.first]], [names[pair.second]]))
+        for (clearance, room), pairs in groups.items():
+            apart = mink.CollisionAvoidanceLimit(
+                model,
+                pairs,
+                gain=self._loop.gain,
+                minimum_distance_from_collisions=clearance,
+                collision_detection_distance=clearance + NEAR * reach,
+                bound_relaxation=-OUT * room,  # without it, a pair that is nearer than it may be stays so
+            )
+            limits.append(apart)
+        return limits
+
+    def _spread(self, ours: Array) -> Array:
+        """Values (nv,) by degree of freedom, in MuJoCo's order."""
+        theirs = np.zeros(self._mujoco.nv)
+        theirs[self._dof] = ours
+        return theirs
+
+    def _goal(self, goal: Any) -> Any:
+        import mink
+
+        cost = goal.weight**0.5
+        if isinstance(goal, wb.Point):
+            site = self._site(goal.place, goal.resolved_offset)
+            task = mink.FrameTask(site, "site", position_cost=cost, orientation_cost=0.0)
+            self._points.append((task, site, np.array(goal.resolved_target)))
+        elif isinstance(goal, wb.Axis):
+            kind = mink.AxisAlignTask if goal.toward is None else mink.LookAtTask
+            task = kind(self._site(goal.place), "site", axis=np.array(goal.basis[2]), cost=cost)
+            task.set_target(np.array(goal.resolved_target))
+        elif isinstance(goal, wb.CenterOfMass):
+            task = mink.ComTask(cost=np.array([cost, cost, cost if goal.axes == "xyz" else 0.0]))
+            task.set_target(np.array((*goal.resolved_target, 0.0)[:3]))
+        elif isinstance(goal, wb.Posture):
+            task = self._joints(goal.resolved_target)
+            costs = np.zeros(self._mujoco.nv)
+            costs[self._dof[np.asarray(goal.dofs)]] = cost
+            task.set_cost(costs)
+        else:
+            task = self._placement(goal.residual, cost)
+        return task
+
+    def _placement(self, residual: PlacementResidual, cost: float) -> Any:
+        import mink
+
+        costs = {"position_cost": cost * residual.position, "orientation_cost": cost * residual.orientation}
+        target = mink.SE3.from_matrix(residual.placement.homogeneous)
+        site = self._site(residual.place)
+        if residual.base.frame:
+            task = mink.RelativeFrameTask(site, "site", self._site(residual.base), "site", **costs)
+        else:
+            task = mink.FrameTask(site, "site", **costs)
+        task.set_target(target)
+        return task
+
+    def _joints(self, reference: Array) -> Any:
+        import mink
+
+        task = mink.PostureTask(self._mujoco, cost=0.0)
+        task.set_target(self._order.theirs(reference))
+        return task
+
+
+class _Order:
+    """Postures and degrees of freedom in the order of MuJoCo's model.
+
+    Attributes:
+        dof: (nv,) MuJoCo's place of each of ours.
+    """
+
+    def __init__(self, figure: Figure, model: Any) -> None:
+        self._size, self._free = (figure.model.nq, model.nq), figure.root == "free"
+        pairs = [(model.joint(name), figure.model.joints[figure.joint_id(name)]) for name in figure.joints]
+        self._addresses = [(int(theirs.qposadr[0]), ours) for theirs, ours in pairs]
+        self.dof = np.arange(figure.model.nv)
+        for theirs, ours in pairs:
+            self.dof[ours.idx_v] = int(theirs.dofadr[0])
+
+    def theirs(self, q: Array) -> Array:
+        """Posture in MuJoCo's order, from ours (nq,)."""
+        there = np.zeros(self._size[1])
+        if self._free:
+            there[:3], there[3], there[4:7] = q[:3], q[6], q[3:6]
+        for address, joint in self._addresses:
+            part = q[joint.idx_q : joint.idx_q + joint.nq]
+            there[address] = part[0] if joint.nq == 1 else np.arctan2(part[1], part[0])
+        return there
+
+    def ours(self, there: Array) -> Array:
+        """Our posture (nq,) from MuJoCo's."""
+        q = np.empty(self._size[0])
+        if self._free:
+            q[:3], q[3:6], q[6] = there[:3], there[4:7], there[3]
+        for address, joint in self._addresses:
+            angle = there[address]
+            q[joint.idx_q : joint.idx_q + joint.nq] = angle if joint.nq == 1 else (np.cos(angle), np.sin(angle))
+        return q
+
+
+class MinkTool(Tool):
+    """One `solve_ik` and `integrate_inplace` a step."""
+
+    name = "mink"
+    differences: ClassVar[tuple[str, ...]] = (
+        "mink bounds a displacement by gain × gap ÷ dt, which is a velocity; its gain is given here times dt, so that "
+        "half of a gap may be used up in a step, as its documentation means it (as written, it stops only inside)",
+        "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
+    )
+
+    def __init__(self, track: Track) -> None:
+        """Set the model and the tasks up."""
+        import mink
+        import mujoco
+
+        self._mink = mink
+        figure = track.scene.figure
+        sites = {name: own_frame(figure, name) for name in (track.tip, *track.feet)}
+        model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, sites))
+        self._order = _Order(figure, model)
+        self.reset(track.start)
+        self._reach = self._task(track.tip, REACH_COST, 0.0)
+        posture = mink.PostureTask(model, cost=POSTURE_COST)
+        posture.set_target(self._configuration.q)
+        self._tasks = [self._reach, posture]
+        self._feet = [self._task(foot, 1.0, 1.0) for foot in track.feet]
+        for task in self._feet:
+            task.set_target_from_configuration(self._configuration)
+        geometry = track.scene.geometry
+        names = [piece.name for piece in geometry.geometryObjects]
+        apart = mink.CollisionAvoidanceLimit(
+            model,
+            [([names[pair.first]], [names[pair.second]]) for pair in geometry.collisionPairs],
+            gain=COLLISION_GAIN,
+            minimum_distance_from_collisions=track.clearance,
+            collision_detection_distance=WITHIN,
+        )
+        self.pairs = len(apart.geom_id_pairs)
+        self._limits = [
+            mink.ConfigurationLimit(model),
+            mink.VelocityLimit(model, dict.fromkeys(figure.joints, JOINT_SPEED)),
+            apart,
+        ]
+        if track.floating:
+            self._limits.append(mink.FreeJointVelocityLimit(model, ROOT_SPEED, ROOT_TURN, joint_name=ROOT))
+
+    def _task(self, frame: str, position: float, orientation: float) -> Any:
+        return self._mink.FrameTask(frame, "site", position_cost=position, orientation_cost=orientation)
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._configuration = self._mink.Configuration(self._mujoco_model, q=self._order.theirs(q))
+        self.failures = 0
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._reach.set_target(self._mink.SE3.from_translation(target))
+        try:
+            velocity = self._mink.solve_ik(
+                self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
+                limits=self._limits, constraints=self._feet or None,
+            )  # fmt: skip
+        except self._mink.NoSolutionFound:
+            self.failures += 1
+            return
+        self._configuration.integrate_inplace(velocity, DT)
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return self._order.ours(self._configuration.q)
+
+    def remarks(self) -> dict[str, float]:
+        """How many pairs it looks at."""
+        return {"pairs": float(self.pairs)}

@@ -1,0 +1,253 @@
+"""Our own methods as they take part: qp with every QP solver, newton in three ways, ccd and dls."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Budget, Tool, few, made
+from wholebody.figures.state import State, Wrench
+from wholebody.methods.base import Method
+from wholebody.methods.qp.active_set import guess_active_set
+from wholebody.methods.qp.method import QP
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.solvers.base import QPSolver
+from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
+from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.steps import QPStep
+from wholebody.tasks.base import Goal, Surroundings, filled
+
+_QP_BUDGETS: tuple[Budget, ...] = (
+    *((tolerance, FEASIBILITY_ONLY) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
+    *LADDER[1:],
+)
+
+ONE_START = {"restarts": 0}
+
+NEWTONS: dict[str, dict[str, Any]] = {
+    "slack": {"inequalities": "slack"},
+    "barrier": {"inequalities": "barrier"},
+    "kkt": {"inequalities": "slack", "algebra": "kkt"},
+}
+"""The ways of newton, as arguments of `Newton`."""
+
+_NEWTON_SETUPS = {
+    "slack": "squared slacks, and the factorisation that it chooses itself",
+    "barrier": "a logarithmic barrier, and the factorisation that it chooses itself",
+    "kkt": "squared slacks, and LDL^T of the symmetric saddle-point system in place of the normal equations",
+}
+
+
+def qp_settings(solver: str) -> dict[str, Any]:
+    """The settings of an method: as it comes for "", active sets throughout, else every program by that solver."""
+    if not solver:
+        return {}
+    return {"solver": solver} if solver == "active_set" else {"solver": solver, "hot_start": False}
+
+
+def qp_adapter(solver: str) -> Adapter:
+    """The QP method as it comes for "", else with the settings of `qp_settings`."""
+    settings = qp_settings(solver)
+    said = ", ".join(f"{name}={value!r}" for name, value in settings.items())
+    if not solver:
+        closes = "the first program of a solve is OSQP's, later ones begin with the last active set, corrected"
+    elif solver == "active_set":
+        closes = "active sets are corrected throughout; OSQP is asked where they do not settle"
+    else:
+        closes = f"every program is {solver}'s"
+    return Adapter(
+        name=f"qp/{solver}" if solver else "qp",
+        make=partial(_qp, settings),
+        hindered=partial(UnfinishedQP, **settings),
+        loose=_QP_BUDGETS,
+        setup=f"wb.QP({said}), all else as it comes: {closes}; feasibility first, relaxed probes and further starts "
+        "follow where the first descent does not reach the goals. Budgets of feasibility only are "
+        "wb.QP(measures=False), those of few iterations have one descent only.",
+    )
+
+
+def one_start(family: str) -> Adapter:
+    """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
+    known: dict[str, tuple[Adapter, Callable[..., Method], str]] = {
+        "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0), "wb.QP(budget=0, restarts=0)"),
+        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0), "wb.Newton(restarts=0)"),
+        "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0), "wb.methods.CCD(restarts=0)"),
+    }
+    adapter, kind, said = known[family]
+    return replace(
+        adapter,
+        name=f"{family}/one_start",
+        make=partial(made, kind, {}),
+        hindered=partial(kind, iterations=1),
+        loose=tuple(level for level in adapter.loose if level[1] != FEASIBILITY_ONLY),
+        setup=f"{said}, all else as it comes; one start, and nothing after the descent from it.",
+    )
+
+
+def ccd_adapter() -> Adapter:
+    """Cyclic coordinate descent."""
+    return Adapter(
+        name="ccd",
+        make=partial(made, wb.methods.CCD, ONE_START),
+        hindered=partial(wb.methods.CCD, iterations=1),
+        loose=(*few(2, 5, 20), *LADDER[:8]),
+        setup="wb.methods.CCD(), all else as it comes: 400 sweeps from one start, at most 12 further starts. A budget "
+        "of few iterations has no further starts.",
+        differences=(
+            "ccd minimises nothing: it stops at the first posture that serves",
+            "ccd takes Point, Frame and Orientation goals, holds that the reaching joints do not move, Freeze and "
+            "ReachCones; the root of the figure stays",
+        ),
+    )
+
+
+def dls_adapter() -> Adapter:
+    """Damped least squares, the textbook baseline."""
+    return Adapter(
+        name="dls",
+        make=partial(made, wb.methods.DampedLeastSquares, {}),
+        loose=(*few(2, 3, 4, 6), *LADDER),
+        setup="wb.methods.DampedLeastSquares(), all else as it comes: one start, 300 steps, damping by Sugihara 2011.",
+        differences=(
+            "dls knows no contacts: it passes through things and may end inside of them",
+            "dls minimises no measure: each step is the least motion",
+            "dls takes equalities only: Balance, ReachCones and Plane with side 'above' are refused",
+        ),
+    )
+
+
+def newton_adapter(way: str) -> Adapter:
+    """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
+    newton = partial(wb.Newton, **NEWTONS[way])
+    return Adapter(
+        name=f"newton/{way}",
+        make=partial(made, newton, ONE_START),
+        hindered=partial(newton, iterations=1),
+        loose=(*few(3, 6, 12, 25), *LADDER[1:]),
+        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
+        "start.",
+        differences=(
+            "newton minimises measures up to what the stopping of its iteration leaves, and PotentialEnergy not at all",
+        ),
+    )
+
+
+def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
+    if iterations is None or iterations == FEASIBILITY_ONLY:
+        return QP(**settings, tolerance=tolerance, measures=iterations is None)
+    return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
+
+
+LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
+
+
+class Unfinished(OSQPSolver):
+    """OSQP that is stopped early, without the active sets and the fallback that make its answers exact."""
+
+    name = "osqp, unfinished"
+
+    def solve(self, program: QuadraticProgram, guess: ActiveSet | None) -> QPSolution:
+        """Minimise, not quite; a guess is not used."""
+        return self.solve_cold(program)
+
+    def solve_cold(self, program: QuadraticProgram) -> QPSolution:
+        """What some iterations lead to, inside the box of the program."""
+        workspace = self.workspace(program)
+        used = workspace.run(LIMIT)
+        x = workspace.x().clip(program.lower, program.upper)
+        return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
+
+
+class UnfinishedQP(QP):
+    """The QP method with such a solver."""
+
+    def _qp_solver(self) -> QPSolver:
+        """One that never finishes."""
+        return Unfinished()
+
+
+FORCES = np.eye(3, 6)  # along the world's axes, without their moments
+
+
+class MovingPoint(Goal):
+    """The origin of a frame at a place that moves: write the place into `target`, shape (3,)."""
+
+    def __init__(self, frame: str, target: Array) -> None:
+        """Name the frame; the array is kept, not copied."""
+        self.frame, self.target = frame, target
+        self._id = self._joint = 0
+
+    def resolve(self, scene: Surroundings, start: Array) -> MovingPoint:
+        """Find the frame."""
+        index = scene.figure.frame_id(self.frame)
+        return filled(self, _id=index, _joint=int(scene.model.frames[index].parentJoint))
+
+    def error(self, state: State) -> Array:
+        """(3,) from the target to the frame [m]."""
+        return np.asarray(state.frame(self._id).translation - self.target)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Three forces along the world's axes, through the frame's origin."""
+        x, y, z = state.frame(self._id).translation.tolist()
+        rows = FORCES.copy()
+        rows[0, 4], rows[0, 5], rows[1, 3], rows[1, 5], rows[2, 3], rows[2, 4] = z, -y, -z, x, y, -x
+        return Wrench(rows, self._joint)
+
+
+def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
+    """The problem of a reach with its feet and bounds on speed, and its goal, whose target is moved afterwards."""
+    goal = MovingPoint(track.tip, np.array(track.targets[0]))
+    speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
+    bound = wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn)
+    kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
+    stated = wb.Problem(
+        track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
+    )  # fmt: skip
+    return stated, goal
+
+
+class WholebodyTool(Tool):
+    """One program a step, with the workspace of the step before."""
+
+    def __init__(self, track: Track, solver: str = "") -> None:
+        """State the problem; the target is moved afterwards. The solver is one of `qp_settings`."""
+        self.name = f"wholebody/{solver}" if solver else "wholebody"
+        # the other tools cannot be told of what a person keeps
+        self.problem, goal = reach_problem(track, measures=[wb.Displacement()], range_of_motion=False, balance=False)
+        self._target = goal.target
+        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
+        self._q = np.array(track.start)
+        self._told: list[QPStep] = []
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._q = np.array(q)
+        self._told.clear()
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._target[:] = target
+        step = self._tracker.step(self._q)
+        self._q = step.q
+        self._told.append(step)
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return np.array(self._q)
+
+    def remarks(self) -> dict[str, float]:
+        """Mean number of contact rows, and share of steps whose program was solved exactly."""
+        rows, exact = ([getattr(step, name) for step in self._told] for name in ("rows", "exact"))
+        return {"rows": float(np.mean(rows)), "exact": float(np.mean(exact))}
+
+    def programs(self) -> dict[str, int]:
+        """How many programs each closed."""
+        return dict(sum((Counter(step.programs) for step in self._told), Counter[str]()))

@@ -1,0 +1,206 @@
+"""placo: our method of that name, and `KinematicsSolver` with its documented tasks for a reach.
+
+In a reach, feet and the self-collision constraint are hard tasks. placo knows collisions of a robot with itself only.
+The objects are added to its collision model, fixed to the world; it then treats them as parts of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import ClassVar
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.bench.measure.track import DT, JOINT_SPEED, WITHIN, Track
+from wholebody.bench.suite.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
+from wholebody.bench.suite.adapters.urdf import own_frame
+from wholebody.methods.placo.robot import Robot
+from wholebody.problem import Problem
+from wholebody.scene.geometry_model import SceneGeometry
+
+SAMPLES = 2000
+OWN_SAMPLES = 10_000  # of a figure alone, as many as MoveIt's setup assistant takes by default
+OWN_WITHIN = 0.01  # m: more than clearances are; the assistant leaves out what never collides
+ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
+
+
+def placo_adapter(variant: str = "") -> Adapter:
+    """The adapter to placo's kinematics solver; with "soft" holds, or with the pairs of a figure "pruned"."""
+    holds = "soft" if variant == "soft" else "hard"
+    said = "holds and" if holds == "hard" else "holds soft with weight 100,"
+    pruned = (
+        f" Pairs of the figure with itself that come no nearer than {100 * OWN_WITHIN:g} cm in any of {OWN_SAMPLES:,} "
+        "random postures are left out; the sampling, once for a figure, is set-up."
+    )
+    left_out = (
+        f"placo/pruned does not keep apart pairs of the figure that {OWN_SAMPLES:,} random postures never bring near"
+    )
+    kind = PrunedPlaco if variant == "pruned" else wb.methods.Placo
+    return Adapter(
+        name=f"placo/{variant}".removesuffix("/"),
+        make=partial(made, partial(kind, holds=holds), {}),
+        prepare=wb.methods.Placo.prepare,
+        loose=(*few(5, 10, 20), *LADDER),
+        setup=f"wb.methods.Placo(holds={holds!r}), all else as it comes: goals as soft tasks, {said} the "
+        "self-collision constraint hard, joint limits, at most 0.1 rad or m a program, joints tasks for the measures "
+        "with a weight that fades; one start, at most 200 programs. The objects are added to its collision model, with "
+        "the clearance of each pair. Building its robot is set-up." + (pruned if variant == "pruned" else ""),
+        differences=(
+            *((left_out,) if variant == "pruned" else ()),
+            "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
+            "placo minimises Effort and Displacement only",
+            "placo has no reach cones, no half-spaces for frames and no axis toward a place",
+            "placo has one row a pair, between the two nearest points",
+            "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
+        ),
+    )
+
+
+@dataclass(frozen=True)
+class PrunedPlaco(wb.methods.Placo):
+    """placo without the pairs of a figure with itself that do not come near: what its users prune in a robot's file."""
+
+    def pairs(self, problem: Problem) -> Indices:
+        """Numbers of the scene's pairs that placo is given: those that come near, and all with things."""
+        return _kept(problem.scene.figure, problem.scene.built)
+
+
+class PlacoTool(Tool):
+    """One `solve(True)` and `update_kinematics()` a step."""
+
+    name = "placo"
+    differences: ClassVar[tuple[str, ...]] = (
+        "placo has no bound on the speed of a floating base",
+        "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
+    )
+
+    def __init__(self, track: Track) -> None:
+        """Set the solver up."""
+        import placo
+
+        figure, scene = track.scene.figure, track.scene.geometry
+        self._robot = Robot(figure, {name: own_frame(figure, name) for name in (track.tip, *track.feet)})
+        wrapper = self._robot.wrapper
+        pieces = wrapper.collision_model
+        for piece in scene.geometryObjects:
+            there = self._robot.joint(piece.parentJoint)
+            pieces.addGeometryObject(pin.GeometryObject(piece.name, there, piece.placement, piece.geometry))
+        for first, second in self.pairs(track):
+            pieces.addCollisionPair(pin.CollisionPair(first, second))
+        wrapper.set_velocity_limits(JOINT_SPEED)
+        self.reset(track.start)
+
+        self._solver = placo.KinematicsSolver(wrapper)
+        self._solver.mask_fbase(not track.floating)
+        self._robot.couple(self._solver)
+        self._solver.dt = DT
+        self._solver.enable_joint_limits(True)
+        self._solver.enable_velocity_limits(True)
+        self._reach = self._solver.add_position_task(track.tip, np.array(track.targets[0]))
+        self._reach.configure("reach", "soft", REACH_COST**2)
+        for foot in track.feet:
+            task = self._solver.add_frame_task(foot, wrapper.get_T_world_frame(foot))
+            task.configure(foot, "hard", 1.0, 1.0)
+        posture = self._solver.add_joints_task()
+        values = figure.joint_values(track.start)
+        posture.set_joints({self._robot.joint_name(figure.joint_id(name)): value for name, value in values.items()})
+        posture.configure("posture", "soft", POSTURE_COST**2)
+        self._solver.add_regularization_task(POSTURE_COST**2)
+        if track.pairs:
+            apart = self._solver.add_avoid_self_collisions_constraint()
+            apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, WITHIN
+            apart.configure("apart", "hard", 1.0)
+
+    def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
+        """The pairs of pieces that it is given: all of the scene."""
+        return [(pair.first, pair.second) for pair in track.scene.geometry.collisionPairs]
+
+    def reset(self, q: Array) -> None:
+        """Go to a posture."""
+        self._robot.move(q)
+        self.failures = 0
+
+    def step(self, target: Array) -> None:
+        """Move one step."""
+        self._reach.target_world = target
+        try:
+            self._solver.solve(True)
+        except RuntimeError:  # no solution of its program
+            self.failures += 1
+        self._robot.wrapper.update_kinematics()
+
+    def posture(self) -> Array:
+        """Where it is."""
+        return self._robot.posture()
+
+
+class PrunedPlacoTool(PlacoTool):
+    """The same with the pairs that a careful user would leave: those that sampled postures bring near."""
+
+    name = "placo/pruned"
+    differences: ClassVar[tuple[str, ...]] = (
+        f"placo/pruned has only the pairs that come nearer than {1e3 * WITHIN:g} mm in one of {SAMPLES} sampled "
+        "postures, joints anywhere within their limits and the root near where it stands; the sampling is not timed, "
+        "and pairs that it left out are not kept apart",
+    )
+
+    def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
+        """The pairs that come near."""
+        return near_pairs(track.scene, track.start.tobytes())
+
+    def remarks(self) -> dict[str, float]:
+        """How many pairs it has."""
+        return {"pairs": float(len(self._robot.wrapper.collision_model.collisionPairs))}
+
+
+@lru_cache(maxsize=4)
+def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
+    """Pairs of pieces that come nearer than `WITHIN` in sampled postures.
+
+    Args:
+        scene: whose pairs.
+        start: (nq,) posture about which the root is sampled, as bytes.
+    """
+    found = _sampled(scene, np.frombuffer(start), SAMPLES, WITHIN)
+    pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
+    return [pair for pair, near in zip(pairs, found, strict=True) if near]
+
+
+def _sampled(scene: wb.Scene, q: Array, samples: int, within: float) -> Mask:
+    """Which pairs (pairs,) come nearer than `within` metres in random postures, the root near its place in q (nq,)."""
+    rng, model = np.random.default_rng(0), scene.model
+    limits, found = scene.figure.limits, np.zeros(len(scene.geometry.collisionPairs), dtype=bool)
+    workspace = scene.workspace()
+    for _ in range(samples):
+        move = np.zeros(model.nv)
+        if scene.figure.root == "free":
+            move[:6] = rng.normal(size=6) * ROOT_SPREAD
+        posture = np.asarray(pin.integrate(model, q, move))
+        posture[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
+        found[workspace.near(posture, within).number] = True
+    return found
+
+
+@lru_cache(maxsize=8)
+def _apart(figure: wb.Figure) -> frozenset[tuple[str, str]]:
+    """Names of the pieces of a figure that do not come near each other in random postures, in pairs."""
+    alone = wb.Scene(figure)
+    near = _sampled(alone, figure.neutral, OWN_SAMPLES, OWN_WITHIN)
+    return frozenset(name for name, found in zip(_named(alone.built), near, strict=True) if not found)
+
+
+@lru_cache(maxsize=4)
+def _kept(figure: wb.Figure, built: SceneGeometry) -> Indices:
+    """Numbers of the pairs of a scene but for those."""
+    apart = _apart(figure)
+    return np.array([number for number, pair in enumerate(_named(built)) if pair not in apart], dtype=np.intp)
+
+
+def _named(built: SceneGeometry) -> list[tuple[str, str]]:
+    pieces = built.geometry.geometryObjects
+    return [(pieces[pair.first].name, pieces[pair.second].name) for pair in built.geometry.collisionPairs]

@@ -1,0 +1,178 @@
+"""A scene as a URDF file, for tools that read nothing else: the same joints, limits, pieces, objects and frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.bench.suite.adapters.loop import size
+from wholebody.figures.figure import Figure
+from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, urdf_axis
+from wholebody.scene.scene import Scene
+from wholebody.tasks.inputs import Place
+
+ROOT = "root"
+FAST = 1e3  # rad/s, m/s: in place of a limit of speed that is none
+SLAB = 8.0  # of the figure's size: edges of the box that stands for a half-space; its height is a quarter of that
+
+
+class Frames(dict[str, tuple[int, pin.SE3]]):
+    """Frames, and points in them, that a tool is given by name: name -> our joint and the placement in it."""
+
+    def named(self, model: pin.Model, place: Place, offset: Array | None = None) -> str:
+        """Note a frame, or a point in its axes (3,), and return its name."""
+        frame = model.frames[place.frame]
+        there = frame.placement if offset is None else frame.placement * pin.SE3(np.eye(3), offset)
+        name = f"frame {place.frame} {there.translation.tolist()}"
+        self[name] = (place.joint, there)
+        return name
+
+
+def own_frame(figure: Figure, name: str) -> tuple[int, pin.SE3]:
+    """Joint of a frame of a figure, and its placement in it."""
+    frame = figure.model.frames[figure.frame_id(name)]
+    return int(frame.parentJoint), frame.placement
+
+
+def joint_name(index: int) -> str:
+    """Name of our joint in the file."""
+    return f"joint {index}"
+
+
+def piece_name(number: int) -> str:
+    """Name of the link that carries one of our pieces; none is part of another."""
+    return f"piece {number:05d}"
+
+
+def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: Path) -> Path:
+    """Write a scene as URDF, with a file for each hull, and return its path.
+
+    Every piece and every frame is a link of its own, fixed to the link that carries it. Objects are fixed to the root.
+    Links have no mass. A half-space is the top of a box.
+
+    Args:
+        scene: a figure with turning and sliding joints on a fixed root, and things.
+        frames: names of further links -> our joint and the placement in it.
+        folder: for the files.
+
+    Raises:
+        InputError: a joint or a shape that this translation does not know.
+    """
+    model = scene.model
+    top = ElementTree.Element("robot", name="figure")
+    for index in range(model.njoints):
+        ElementTree.SubElement(top, "link", name=_link(index))
+    for index in range(1, model.njoints):
+        add_model_joint(top, model, index, _link(model.parents[index]), _link(index))
+    for number, piece in enumerate(scene.geometry.geometryObjects):
+        shape, shift = _shape(scene, piece, folder / f"{number}.obj")
+        _fixed(top, piece_name(number), piece.parentJoint, piece.placement * shift).append(shape)
+        link = top[-2]
+        link.append(_convexity(piece))
+    for name, (joint, place) in frames.items():
+        _fixed(top, name, joint, place)
+    path = folder / "scene.urdf"
+    path.write_bytes(ElementTree.tostring(top))
+    return path
+
+
+def _link(index: int) -> str:
+    return f"link {index}" if index else ROOT
+
+
+def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
+    """Add a turning or sliding joint of a model, with its placement, axis and limits, between two links.
+
+    Raises:
+        InputError: a joint of another kind.
+    """
+    joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
+    speed = float(model.velocityLimit[joint.idx_v])
+    limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < FAST else FAST}
+    if joint.nq == 1:
+        limit["lower"] = model.lowerPositionLimit[joint.idx_q]
+        limit["upper"] = model.upperPositionLimit[joint.idx_q]
+    place = model.jointPlacements[index]
+    add_joint(top, joint_name(index), known.kind, parent, child, origin=place, axis=known.axis, limit=limit)
+
+
+def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
+    """Kind and axis of a joint that turns about or slides along one axis by itself.
+
+    Raises:
+        InputError: a joint of another kind; `written_for` ends the sentence.
+    """
+    known, kind = urdf_axis(model, index), model.joints[index].shortname()
+    if known is None or kind == FOLLOWS:
+        raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
+    return known
+
+
+def _fixed(top: ElementTree.Element, name: str, joint: int, place: pin.SE3) -> ElementTree.Element:
+    """Add a link that is fixed to that of a joint; return it."""
+    link = ElementTree.SubElement(top, "link", name=name)
+    add_joint(top, f"{name} is fixed", "fixed", _link(joint), name, origin=place)
+    return link
+
+
+def _convexity(piece: Any) -> ElementTree.Element:
+    """Pinocchio's extension of URDF: which cylinders are capsules, and which meshes are hulls."""
+    made = ElementTree.Element("collision_checking")
+    if isinstance(piece.geometry, coal.Capsule):
+        ElementTree.SubElement(made, "capsule", name="shape")
+    elif isinstance(piece.geometry, coal.ConvexBase):
+        ElementTree.SubElement(made, "convex", name="shape")
+    return made
+
+
+def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, pin.SE3]:
+    """The shape of a piece, and how it is shifted against the piece."""
+    shape, shift = piece.geometry, pin.SE3.Identity()
+    made = ElementTree.Element("collision", name="shape")
+    inner = ElementTree.SubElement(made, "geometry")
+    if isinstance(shape, coal.Sphere):
+        ElementTree.SubElement(inner, "sphere", radius=repr(float(shape.radius)))
+    elif isinstance(shape, (coal.Capsule, coal.Cylinder)):
+        length = repr(2.0 * float(shape.halfLength))
+        ElementTree.SubElement(inner, "cylinder", radius=repr(float(shape.radius)), length=length)
+    elif isinstance(shape, coal.Box):
+        ElementTree.SubElement(inner, "box", size=exact(2.0 * np.array(shape.halfSide)))
+    elif isinstance(shape, coal.Halfspace) and not piece.parentJoint:
+        edge = SLAB * size(scene.figure)
+        ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
+        shift = _slab(scene, piece, 0.125 * edge)
+    elif isinstance(shape, coal.Convex):
+        path.write_text(_obj(shape), encoding="utf-8")
+        ElementTree.SubElement(inner, "mesh", filename=str(path))
+    else:
+        raise InputError(
+            f"{piece.name!r} is a {type(shape).__name__}; URDF is written for spheres, capsules, cylinders, boxes, "
+            "hulls and half-spaces of the world"
+        )
+    return made, shift
+
+
+def _slab(scene: Scene, piece: Any, depth: float) -> pin.SE3:
+    """Placement, in a half-space n . x <= d, of a box that reaches from so far inside to the surface, at the root."""
+    normal = np.array(piece.geometry.n)
+    turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+    places = scene.model.jointPlacements
+    root = piece.placement.actInv(places[1].translation) if len(places) > 1 else np.zeros(3)
+    return pin.SE3(turn, root - (normal @ root - piece.geometry.d + depth) * normal)
+
+
+def _obj(shape: Any) -> str:
+    """A hull as a Wavefront file."""
+    lines = ["v " + exact(shape.point(k)) for k in range(shape.num_points)]
+    for k in range(shape.num_polygons):
+        triangle = shape.polygons(k)
+        lines.append("f " + " ".join(str(triangle[corner] + 1) for corner in range(3)))
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,136 @@
+"""One chunk of work of a comparison."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+from wholebody.base.batches import own_child
+from wholebody.base.runner import Child, EndedError
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
+from wholebody.bench.suite.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
+from wholebody.bench.suite.compare.reference_kernel import kernel_seconds
+from wholebody.bench.suite.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
+from wholebody.bench.suite.compare.store import Chunk
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+
+_local = threading.local()
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a chunk of work is.
+
+    Attributes:
+        family, number, seed: which case.
+        solves: methods, each with its further budgets (none where only the default one is asked for).
+        cap: seconds of the processor's time after which a solve is ended.
+        most: seconds that a sweep may be expected to take, by the solve before it; it is left out where it is more.
+    """
+
+    family: ProblemSet
+    number: int
+    seed: int
+    solves: tuple[tuple[Adapter, tuple[Budget, ...]], ...]
+    cap: float
+    most: float
+
+
+def work(task: Task) -> Chunk:
+    """Build a case and let every method solve it, one after the other in a process of their own."""
+    child, which = own_child(), Which(task.family, task.number, task.seed)
+    child.close_if_full()
+    began = time.perf_counter()
+    try:
+        fault = child.call(built, which, seconds=BUILDING)
+    except EndedError as error:
+        fault = str(error)
+    building = time.perf_counter() - began
+    if fault:
+        return Chunk(task.family.name, task.number, (), building=building, fault=fault)
+    hard = _difficulty(child, which)
+    records: list[Record] = []
+    spent, swept, cold = {}, {}, {}
+    kernel = child.call(kernel_seconds, seconds=BUILDING)
+    for adapter, ladder in task.solves:
+        first_time = _warm_up(child, which, adapter, task.cap)  # compiling, which says nothing of what its solves cost
+        if first_time > 0.0:
+            cold[adapter.name] = first_time
+        began = time.perf_counter()
+        first, ended = _solve(child, adapter, DEFAULT, task)
+        records.append(first)
+        between = time.perf_counter()
+        spent[adapter.name] = between - began
+        if ladder and spent[adapter.name] * len(ladder) <= task.most:
+            records += _sweep(child, adapter, ladder, task, first, ended)
+            swept[adapter.name] = time.perf_counter() - between
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel, hard)
+
+
+def _difficulty(child: Child, which: Which) -> Difficulty | None:
+    """How hard the case is; None where that ended the process, which no method has to answer for."""
+    try:
+        found: Difficulty = child.call(difficulty, which, seconds=BUILDING)
+    except EndedError:
+        return None
+    return found
+
+
+def _sweep(
+    child: Child, adapter: Adapter, ladder: Iterable[Budget], task: Task, first: Record, ended: bool
+) -> list[Record]:
+    """All further budgets; where the process has ended over one, the rest count as what they would have been.
+
+    Budgets of feasibility only are cheaper than all others, and count for themselves.
+    """
+    records: list[Record] = []
+    if first.outcome == REFUSED:
+        return records
+    last = {False: (first, ended), True: (first, False)}
+    for level in ladder:
+        kind = level[1] == FEASIBILITY_ONLY
+        record, over = last[kind]
+        if not over:
+            last[kind] = record, over = _solve(child, adapter, level, task)
+            records.append(record)
+        else:
+            records.append(replace(record, tolerance=level[0], budget=level[1] or 0))
+    return records
+
+
+def _solve(child: Child, adapter: Adapter, level: Budget, task: Task) -> tuple[Record, bool]:
+    """What came of a solve, and whether the process has ended over it."""
+    try:
+        which = Which(task.family, task.number, task.seed)
+        record: Record = child.call(solved, which, adapter, level, task.cap, seconds=BUILDING)
+    except EndedError as error:
+        empty = Record(task.family.name, task.number, adapter.name, level[0], level[1] or 0, FAILED)
+        if error.overtime:
+            return replace(empty, outcome=OVERTIME, said=f"ended after {task.cap:g} s"), True
+        return replace(empty, said=str(error)), True
+    return record, False
+
+
+def _warm_up(child: Child, which: Which, adapter: Adapter, cap: float) -> float:
+    """Let a method import and compile what it needs. What goes wrong over it will do so again in its solve.
+
+    Returns:
+        Seconds of its first solve in the process; 0 where it has run there before, or never came back.
+    """
+    if adapter.name in _hopeless():
+        return 0.0
+    try:
+        return float(child.call(warmed, which, adapter, cap, seconds=BUILDING))
+    except EndedError:
+        _hopeless().add(adapter.name)
+        return 0.0
+
+
+def _hopeless() -> set[str]:
+    """Names of the methods that ended this thread's process over warming up."""
+    if not hasattr(_local, "hopeless"):
+        _local.hopeless = set[str]()
+    found: set[str] = _local.hopeless
+    return found

@@ -1,0 +1,109 @@
+"""What a comparison is asked to do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import inf
+from typing import Any
+
+from wholebody.base.errors import InputError
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
+from wholebody.bench.suite.compare.record import DEFAULT
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.version import __version__
+
+MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
+SEEDS = 3  # from which the cases of a set are made in turn
+MOVING = 4  # swept cases of other sets for one whose goals move, which is hundreds of solves at every budget
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What is compared, and how much of it.
+
+    Attributes:
+        sets, adapters: problem sets and methods.
+        cases: of every set at the default budget.
+        sweep: of these, the first so many at every budget.
+        levels: most budgets beside the default one.
+        seed: the first of `SEEDS` from which the problems are made in turn.
+        cap: seconds of the processor's time after which a solve is ended.
+        minutes: of all solving; methods that are too slow for it get fewer cases.
+    """
+
+    sets: tuple[ProblemSet, ...]
+    adapters: tuple[Adapter, ...]
+    cases: int = 200
+    sweep: int = 40
+    levels: int = 6
+    seed: int = 0
+    cap: float = 20.0
+    minutes: float = 25.0
+
+    def __post_init__(self) -> None:
+        """Check the numbers.
+
+        Raises:
+            InputError: one that makes no sense.
+        """
+        for name, least in (("cases", 1), ("sweep", 0), ("levels", 1), ("seed", 0)):
+            if getattr(self, name) < least:
+                raise InputError(f"{name} is {getattr(self, name)}; give {least} or more")
+        for name in ("cap", "minutes"):
+            if not (0.0 < getattr(self, name) < inf):
+                raise InputError(f"{name} is {getattr(self, name)}; give a number above 0")
+        if not self.sets or not self.adapters:
+            raise InputError("a comparison needs a problem set and a method; name at least one of each")
+
+    def described(self) -> dict[str, Any]:
+        """What a folder's run must agree in to be gone on with."""
+        return {
+            "wholebody": __version__,
+            "sets": [family.name for family in self.sets],
+            "methods": [adapter.name for adapter in self.adapters],
+            "cases": self.cases,
+            "sweep": self.sweep,
+            "levels": {adapter.name: [list(level) for level in self.ladder(adapter)] for adapter in self.adapters},
+            "seeds": [seed_of(self.seed, number) for number in range(SEEDS)],
+            "cap": self.cap,
+            "minutes": self.minutes,
+        }
+
+    def asked(self, family: ProblemSet) -> tuple[int, int]:
+        """Cases of a set at the default budget, and at all budgets: fewer of these where a case is hundreds of solves.
+
+        A set whose goals move has as many cases as the others; the plan gives a method as many as its share allows.
+        """
+        return self.cases, self.sweep // MOVING if family.moving else self.sweep
+
+    def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
+        """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
+
+        Budgets of feasibility only are chosen among themselves, as many as their share: the most exact of them is the
+        time to an exact posture where least measures are not asked for.
+        """
+        unused = FEASIBILITY_ONLY if moving else 0
+        listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
+        most = min(self.levels, MOVING_LEVELS) if moving else self.levels
+        if len(listed) <= most:
+            return listed
+        first = [level for level in listed if level[1] == FEASIBILITY_ONLY]
+        others = [level for level in listed if level[1] != FEASIBILITY_ONLY]
+        share = round(most * len(first) / len(listed))
+        return [*_evenly(first, share), *_evenly(others, most - share)]
+
+
+def _evenly(listed: list[Budget], most: int) -> list[Budget]:
+    """So many of them, the first and the last among them; the first where it is one."""
+    if len(listed) <= most:
+        return listed
+    return [listed[round(place * (len(listed) - 1) / max(most - 1, 1))] for place in range(most)]
+
+
+def seed_of(seed: int, number: int) -> int:
+    """Seed of a case: every set is made from `SEEDS` seeds in turn, so that what depends on one of them shows."""
+    return seed + number % SEEDS
+
+
+QUICK: dict[str, Any] = {"cases": 20, "sweep": 6, "levels": 5, "cap": 5.0, "minutes": 2.0}
+"""A short comparison, within three minutes on two cores."""

@@ -1,0 +1,280 @@
+"""One solve of one case, or goals that move followed frame by frame, timed, and judged by `assess` alone.
+
+`built`, `warmed` and `solved` are jobs of a process of `wholebody.base.runner`, which keeps the last case and knows
+which methods have run in it.
+"""
+
+from __future__ import annotations
+
+import copy
+import gc
+import time
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from wholebody.assessment.motion import third_differences
+from wholebody.assessment.posture import Assessment, assess
+from wholebody.base.arrays import Array
+from wholebody.base.compiled import compile_all
+from wholebody.base.errors import WholebodyError
+from wholebody.base.runner import allow, allow_processor, processor_time
+from wholebody.bench.suite.adapters.base import Adapter, Budget
+from wholebody.bench.suite.compare.record import (
+    ANSWERED,
+    COARSE,
+    DEFAULT,
+    FAILED,
+    REFUSED,
+    Difficulty,
+    Record,
+    frame_cap,
+)
+from wholebody.bench.suite.problem_sets.case import Case, ProblemSet
+from wholebody.bench.suite.problem_sets.difficulty import away, descended
+from wholebody.bench.tables import programs_text
+from wholebody.methods.base import SolvedStep, Tracker
+from wholebody.methods.differential import TOOL
+from wholebody.problem import Problem
+
+BUILDING = 300.0  # s: to build a case and what belongs to its scene; compiling once included
+LEAST = 1e-6  # s: no call of a solver is faster; differences of two clock readings may be
+JUDGED = (
+    "goal_error", "goal_angle", "penetration", "clearance_violation", "limit_violation", "constraint_violation",
+    "measure", "optimality",
+)  # fmt: skip
+"""Figures of a judgement that records have too: of the goals, of what must hold, and of the measures."""
+
+USUAL = 0.95  # share of the frames whose tracking error counts: in the first ones the goal is far away
+STILL = 1e-6  # m: a gap that changes less in a frame does not turn
+GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
+
+
+class Which(NamedTuple):
+    """A case of a set."""
+
+    family: ProblemSet
+    number: int
+    seed: int
+
+
+@dataclass(frozen=True)
+class Ready:
+    """A case, built, with everything that belongs to the scene and to no method built too.
+
+    Attributes:
+        case: as the set made it.
+        best: measure of the witness.
+    """
+
+    case: Case
+    best: float
+
+
+_kept: dict[tuple[str, int, int], Ready] = {}  # the last case of this process
+_warm: set[tuple[str, bool]] = set()  # methods that have run in this process, on cases that stand still or move
+
+
+def built(which: Which) -> str | None:
+    """Build a case; return what went wrong, if anything."""
+    try:
+        case_of(which)
+    except Exception as error:
+        return f"{type(error).__name__}: {sentence(error)}"
+    return None
+
+
+def difficulty(which: Which) -> Difficulty:
+    """How hard a case is; one whose goals move by its first frame, and by how far it goes from there."""
+    case = case_of(which).case
+    problem = copy.copy(case.problem)
+    if case.frames:
+        problem.retarget(case.frames[0])
+    found = descended(case, case.problem.start)
+    solved = found is not None and _worst(assess(problem, found)) <= COARSE
+    return Difficulty(not solved, float(np.linalg.norm(away(case))))
+
+
+def _worst(judgement: Assessment) -> float:
+    return max(float(getattr(judgement, name)) for name in JUDGED[:6])
+
+
+def warmed(which: Which, adapter: Adapter, cap: float) -> float:
+    """Let a method import and compile what it needs, before it is timed for the first time in this process.
+
+    Returns:
+        Seconds of that first time, the building of a model of its own included; 0 where it has run before.
+    """
+    made = case_of(which)
+    key = (adapter.name, bool(made.case.frames))
+    if key in _warm:
+        return 0.0
+    _warm.add(key)
+    allow_processor(cap)
+    began = time.perf_counter()
+    solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    return time.perf_counter() - began
+
+
+def solved(which: Which, adapter: Adapter, level: Budget, cap: float) -> Record:
+    """Solve a case; the process ends where that takes longer than it may."""
+    warmed(which, adapter, cap)
+    made = case_of(which)
+    frames = len(made.case.frames)
+    allow_processor(frame_cap(cap, frames) * frames if frames else cap)
+    return solve(adapter, level, made)
+
+
+def case_of(which: Which) -> Ready:
+    """The case, built where it is not the last one of this process."""
+    key = (which.family.name, which.number, which.seed)
+    if key not in _kept:
+        _kept.clear()
+        gc.collect()
+        allow(BUILDING)
+        _kept[key] = ready(*which)
+    return _kept[key]
+
+
+def ready(family: ProblemSet, number: int, seed: int) -> Ready:
+    """Build a case; what is built at first use by whoever asks first is built here, in nobody's time."""
+    compile_all()  # seconds at the first time on a machine, more than the quick comparison gives a solve
+    case = family.make(number, seed)
+    with case.problem.borrow():  # room that the solves below use again
+        pass
+    assess(case.problem, case.problem.start)
+    return Ready(case, assess(case.problem, case.witness).measure)
+
+
+def solve(adapter: Adapter, level: Budget, made: Ready) -> Record:
+    """Solve a case with a fresh method. Whatever the method does, this returns what came of it."""
+    empty = blank(adapter, level, made.case.set, made.case.number)
+    try:
+        method = adapter.make(*level)
+        moving = bool(made.case.frames)
+        problem = copy.copy(made.case.problem) if moving else made.case.problem  # each moves the goals of its own copy
+        began = time.perf_counter()
+        adapter.prepare(method, problem)
+        empty = replace(empty, setup_seconds=time.perf_counter() - began, best=made.best)
+        gc.disable()
+        if moving:
+            return _followed(method, problem, made.case, empty)
+        return _once(method, problem, empty)
+    except WholebodyError as error:
+        return replace(empty, outcome=REFUSED, said=sentence(error))
+    except Exception as error:  # a peer may raise anything; what it was is the result
+        return replace(empty, outcome=FAILED, said=f"{type(error).__name__}: {sentence(error)}")
+    finally:
+        gc.enable()
+
+
+def blank(adapter: Adapter, level: Budget, family: str, number: int) -> Record:
+    """A record without an answer."""
+    tolerance, iterations = level
+    return Record(family, number, adapter.name, tolerance, iterations or 0, FAILED)
+
+
+def sentence(error: BaseException) -> str:
+    """What an error says, in one line."""
+    return " ".join(str(error).split())[:300]
+
+
+def _once(method: Any, problem: Problem, empty: Record) -> Record:
+    of_tool, worked, began = TOOL.seconds, processor_time(), time.perf_counter()
+    solution = method.solve(problem)
+    spent = time.perf_counter() - began - solution.assessment.seconds
+    worked = processor_time() - worked
+    q = np.asarray(solution.q, dtype=float)
+    if not np.isfinite(q).all():
+        return replace(empty, said="the answer is not finite", seconds=spent, status=solution.status)
+    judging = processor_time()
+    judgement = assess(problem, q)
+    worked -= min(processor_time() - judging, solution.assessment.seconds)  # the one within the call took as much
+    filled = replace(
+        empty,
+        outcome=ANSWERED,
+        status=solution.status,
+        said=" ".join(solution.message.split())[:300],
+        seconds=max(spent, LEAST),
+        cpu_seconds=max(worked, LEAST),
+        tool_seconds=TOOL.seconds - of_tool,
+        iterations=float(solution.iterations),
+        programs=programs_text(solution.programs),
+    )
+    return judged(filled, judgement)
+
+
+def judged(record: Record, judgement: Assessment) -> Record:
+    """The record with the figures of a judgement."""
+    return replace(record, **{name: getattr(judgement, name) for name in JUDGED})
+
+
+class _Frame(NamedTuple):
+    q: Array
+    seconds: float
+    cpu_seconds: float
+    iterations: int
+    judgement: Assessment
+
+
+def _followed(method: Any, problem: Problem, case: Case, empty: Record) -> Record:
+    """Follow the goals of a case frame by frame; `problem` is a copy of its problem, that may be changed.
+
+    Each frame is one of the method's tracker, to the method's tolerance: qp and newton make a few steps, as `wb.Drag`
+    does; every other method solves each frame from the posture of the frame before.
+    """
+    q = problem.scene.figure.clamp(problem.start)
+    frames: list[_Frame] = []
+    tracker: Tracker = method.tracker(problem, case.dt)
+    for goals in case.frames:
+        problem.retarget(goals)
+        worked, began = processor_time(), time.perf_counter()
+        step = tracker.frame(q, method.tolerance)
+        q, iterations = step.q, step.iterations
+        judging = step.judging if isinstance(step, SolvedStep) else 0.0
+        seconds = time.perf_counter() - began - judging
+        worked = processor_time() - worked
+        if not np.isfinite(q).all():
+            return replace(empty, said=f"frame {len(frames)}: the posture is not finite")
+        again = processor_time()
+        judgement = assess(problem, q)
+        worked -= min(processor_time() - again, judging)  # the judgement within the call, if any, took as much
+        frames.append(_Frame(q, max(seconds, LEAST), max(worked, LEAST), iterations, judgement))
+    return _summary(frames, case, empty)
+
+
+def _summary(frames: list[_Frame], case: Case, empty: Record) -> Record:
+    judgements = [frame.judgement for frame in frames]
+    figures = {name: np.array([getattr(judged, name) for judged in judgements]) for name in JUDGED}
+    kept: dict[str, Any] = {name: float(np.quantile(figures[name], USUAL)) for name in JUDGED[:2]}
+    kept |= {name: float(figures[name].max()) for name in JUDGED[2:6]}
+    kept |= {name: float(figures[name][-1]) for name in JUDGED[6:]}
+    seconds = np.array([frame.seconds for frame in frames])
+    gaps = np.array([judged.least_distance for judged in judgements])
+    return replace(
+        empty,
+        outcome=ANSWERED,
+        said=f"{len(frames)} frames",
+        seconds=float(np.median(seconds)),
+        cpu_seconds=float(np.median([frame.cpu_seconds for frame in frames])),
+        iterations=float(np.mean([frame.iterations for frame in frames])),
+        **kept,
+        frames=len(frames),
+        frame_p95=float(np.quantile(seconds, USUAL)),
+        jerk=jerk(case.problem.scene.model, [case.problem.start, *(frame.q for frame in frames)], case.dt),
+        turns=turns(gaps) / (max(len(frames) - 1, 1) * case.dt),
+    )
+
+
+def jerk(model: Any, postures: list[Array], dt: float) -> float:
+    """Root mean square over frames and degrees of freedom of the third difference of postures [rad/s^3, m/s^3]."""
+    found = third_differences(model, np.array(postures), dt)
+    return float(np.sqrt(np.mean(found**2))) if len(found) else 0.0
+
+
+def turns(gaps: Array) -> int:
+    """How often the velocity of a gap (frames,) changes its sign: what a trembling contact does."""
+    change = np.diff(gaps[np.isfinite(gaps)])
+    signs = np.sign(change[np.abs(change) > STILL])
+    return int(np.count_nonzero(signs[1:] != signs[:-1]))

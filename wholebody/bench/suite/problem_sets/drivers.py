@@ -1,0 +1,182 @@
+"""People of all sizes at controls: a seat with a backrest, something for both hands, something for the feet.
+
+A cabin is built around a seated posture, which is the witness: the seat under the pelvis, the backrest at the trunk, a
+board or two pedals under the soles, bars in the hands or a panel at a fingertip. The start is the figure's own seated
+posture somewhere near, so that it is often inside of what it is to touch, as where a user adds a seat to a scene.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.suite.problem_sets.bodies import alone, is_free, movable, until_found
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.fitting import fitted
+from wholebody.figures.postures import lowest, support
+
+PEOPLE = tuple((sex, percentile) for sex in ("female", "male") for percentile in (5, 20, 35, 50, 65, 80, 95))
+SEATED = {
+    "hip_flexion": (80.0, 105.0), "knee_flexion": (35.0, 85.0), "shoulder_flexion": (15.0, 60.0),
+    "shoulder_abduction": (8.0, 30.0), "elbow_flexion": (35.0, 95.0), "elbow_pronation": (-20.0, 40.0),
+}  # fmt: skip
+"""Degrees between which both sides of a witness are, in turn for all of it."""
+LEANS, LESS = (3.0, 11.0), (2.0, 12.0)  # degrees: the pelvis leans backwards, and the backrest less than that
+SLOPES = (0.0, 35.0)  # degrees: of what the feet are on
+FEET_APART = (0.09, 0.14)  # m: of each foot from the middle
+OFF_FLOOR = 0.1  # m: of the lowest point
+AWAY = 0.3  # m: of the start from the witness, along both axes of the ground
+BAR, PANEL = (0.015, 0.24), 0.02  # m: radius and length of a bar; half the thickness of a panel
+EXACT = 1e-6  # m, rad: to which a witness is one
+TRUNK = ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
+
+
+@lru_cache(maxsize=len(PEOPLE))
+def driver(number: int) -> wb.Figure:
+    """One of `PEOPLE`."""
+    sex, percentile = PEOPLE[number]
+    return wb.load("human", sex=sex, percentile=percentile)
+
+
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """Persons take turns; after all of them the feet, and then the right hand, have other controls."""
+    figure = driver(number % len(PEOPLE))
+    kind = number // len(PEOPLE)
+
+    def attempt() -> tuple[wb.Problem, Array] | None:
+        witness, slope, lean = _seated(figure, rng)
+        if witness is None or not is_free(alone(figure), witness):
+            return None
+        problem = _cabin(figure, witness, slope, lean, kind, rng)
+        if problem is None:
+            return None
+        judged = wb.assess(problem, witness)
+        return (problem, witness) if judged.met(EXACT) and judged.holds(EXACT) else None
+
+    return until_found(attempt)
+
+
+def _seated(figure: wb.Figure, rng: np.random.Generator) -> tuple[Array | None, float, float]:
+    """A seated posture (nq,) with both soles in one plane, its slope and how the pelvis leans, degrees."""
+    lean, slope, apart = (float(rng.uniform(*ends)) for ends in (LEANS, SLOPES, FEET_APART))
+    angles = {name: np.radians(rng.uniform(*ends)) for name, ends in SEATED.items()}
+    values = {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
+    q = figure.clamp(figure.with_joints(figure.posture("sitting"), values))
+    q[3:7] = _pitch(-lean)
+    rest, goals = figure.posture("standing"), []
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        at, turn = figure.placement(q, f"{side}_foot").translation, pin.utils.rotate("y", -np.radians(slope))
+        flat = turn @ figure.placement(rest, f"{side}_foot").rotation
+        goals.append(wb.Frame(f"{side}_foot", pin.SE3(flat, np.array((at[0], sign * apart, at[2])))))
+    legs = np.intersect1d(movable(figure), figure.dofs(figure.groups["legs"]))
+    found = fitted(figure, q, [goal.resolve(alone(figure), q) for goal in goals], legs)
+    if found is not None:
+        found[2] += OFF_FLOOR - lowest(figure, found)
+    return found, slope, lean
+
+
+def _cabin(
+    figure: wb.Figure, q: Array, slope: float, lean: float, kind: int, rng: np.random.Generator
+) -> wb.Problem | None:
+    """A cabin around a posture; None where the trunk is not what the backrest meets first."""
+    scene = wb.Scene(figure)
+    seat = _lowest_along(figure, q, np.array((0.0, 0.0, 1.0)), ("pelvis", "left_thigh", "right_thigh"))
+    scene.add(wb.Box((0.46, 0.52, 0.08)), name="seat", at=(q[0] - 0.02, 0.0, seat - 0.04))
+    lean -= float(rng.uniform(*LESS))
+    ahead = np.array((np.cos(np.radians(lean)), 0.0, np.sin(np.radians(lean))))
+    back, pelvis = _lowest_along(figure, q, ahead, TRUNK), _lowest_along(figure, q, ahead, ("pelvis",))
+    if back > pelvis:
+        return None
+    middle = q[:3] + (0.0, 0.0, 0.25)
+    middle = middle + (back - middle @ ahead - 0.04) * ahead
+    scene.add(wb.Box((0.08, 0.50, 0.66)), name="backrest", at=(*middle, *_pitch(-lean)))
+    goals: list[wb.Goal] = [wb.Sit("seat", back="backrest")]
+    constraints: list[wb.Constraint] = []
+    up = pin.utils.rotate("y", -np.radians(slope))[:, 2]
+    soles = [figure.placement(q, f"{side}_sole").translation for side in ("left", "right")]
+    if kind % 2 == 0:
+        center = 0.5 * (soles[0] + soles[1]) - 0.01 * up
+        scene.add(wb.Box((0.36, 0.6, 0.02)), name="board", at=(*center, *_pitch(-slope)))
+        constraints.append(wb.Stand("board", balance=False))
+    else:
+        for side in ("left", "right"):
+            center = figure.placement(q, f"{side}_ball").translation - 0.01 * up
+            scene.add(wb.Box((0.12, 0.12, 0.02)), name=f"{side}_pedal", at=(*center, *_pitch(-slope)))
+            goals.append(wb.Touch(f"{side}_ball", f"{side}_pedal"))
+    for side in ("left", "right") if kind // 2 % 2 == 0 else ("left",):
+        scene.add(wb.Capsule(*BAR), name=f"{side}_bar", at=_bar(figure, q, side))
+        goals.append(wb.Grasp(side, f"{side}_bar", kind="power"))
+    if kind // 2 % 2:
+        tip = figure.placement(q, "right_index_tip")
+        at = pin.SE3(tip.rotation, tip.act(np.array((PANEL, 0.0, 0.0))))
+        scene.add(wb.Box((2.0 * PANEL, 0.12, 0.12)), name="panel", at=at)
+        goals.append(wb.Touch("right_index_tip", "panel"))
+    look = figure.placement(q, "gaze").rotation[:, 0]
+    goals.append(wb.Axis("gaze", (1, 0, 0), direction=look, weight=0.1))
+    start = figure.posture("sitting")
+    start[:2] += q[:2] + rng.uniform(-AWAY, AWAY, 2) * (1.0, 0.3)
+    return wb.Problem(scene, start, goals=goals, constraints=constraints)
+
+
+def _pitch(degrees: float) -> tuple[float, float, float, float]:
+    """Quaternion x, y, z, w of a turn about y."""
+    half = np.radians(degrees) / 2.0
+    return 0.0, float(np.sin(half)), 0.0, float(np.cos(half))
+
+
+def _lowest_along(figure: wb.Figure, q: Array, direction: Array, segments: tuple[str, ...]) -> float:
+    """How far the pieces of segments reach against a unit direction (3,), metres along it."""
+    places = _placed(figure, q)
+    pieces = figure.geometry.geometryObjects
+    return min(
+        -support(piece.geometry, place, -direction)
+        for piece, place in zip(pieces, places, strict=True)
+        if piece.name.partition(":")[0] in segments
+    )
+
+
+def _bar(figure: wb.Figure, q: Array, side: str) -> pin.SE3:
+    """Where a bar lies along a palm and touches the hand."""
+    palm = figure.placement(q, f"{side}_palm")
+    joint = figure.model.frames[figure.frame_id(f"{side}_palm")].parentJoint
+    hand = [
+        (piece.geometry, coal.Transform3s(place.rotation, place.translation))
+        for piece, place in zip(figure.geometry.geometryObjects, _placed(figure, q), strict=True)
+        if piece.parentJoint == joint
+    ]
+    shape, request = coal.Capsule(*BAR), coal.DistanceRequest()
+    request.gjk_tolerance = request.epa_tolerance = 1e-9
+    turn = np.column_stack([palm.rotation[:, 2], palm.rotation[:, 0], palm.rotation[:, 1]])
+
+    def gap(height: float) -> float:
+        at = coal.Transform3s(turn, palm.translation + height * palm.rotation[:, 2])
+        return min(
+            float(coal.distance(piece, place, shape, at, request, coal.DistanceResult())) for piece, place in hand
+        )
+
+    low, high = 0.0, 0.2
+    for _ in range(50):
+        half = 0.5 * (low + high)
+        low, high = (half, high) if gap(half) < 0.0 else (low, half)
+    return pin.SE3(turn, palm.translation + high * palm.rotation[:, 2])
+
+
+def _placed(figure: wb.Figure, q: Array) -> list[pin.SE3]:
+    data = figure.model.createData()
+    geometry_data = pin.GeometryData(figure.geometry)
+    pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
+    return list(geometry_data.oMg)
+
+
+SET = ProblemSet(
+    "drivers",
+    "drivers",
+    f"{len(PEOPLE)} women and men sit against a backrest, take bars or press a panel, and have their feet on a board "
+    "or on two pedals; what touches may slide.",
+    _posed,
+)

@@ -1,0 +1,150 @@
+"""Robot arms of six and seven axes with links of random lengths, their tool to a place among obstacles."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.base.files import Scratch
+from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, until_found
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+
+THINGS = 8
+SPACE = ((-0.8, -0.8, 0.05), (0.8, 0.8, 1.3))  # m: where they are put
+KINDS = ("seven axes", "industrial", "parallel")
+RADII = (0.065, 0.030)  # m: of the first link and of the last one
+SHORT = 0.06  # m: a link shorter than this is a ball
+
+
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """The kinds of arm in turn; a place and an orientation in every other round, only a place in the others."""
+    figure, ready = arm(KINDS[number % len(KINDS)], rng)
+    model, start = figure.model, figure.with_joints(figure.neutral, ready)
+
+    def sampled() -> Array | None:
+        q: Array = rng.uniform(model.lowerPositionLimit, model.upperPositionLimit)
+        return q if is_free(alone(figure), q) else None
+
+    witness = until_found(sampled)
+    scene = floor_scene(figure)
+    add_things(scene, THINGS, Occupied(figure, (start, witness)), ROOM, rng, SPACE)
+    place = figure.placement(witness, "tool")
+    turned = number // len(KINDS) % 2 == 1
+    goal = wb.Frame("tool", place) if turned else wb.Point("tool", place.translation)
+    return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness
+
+
+class Axis(NamedTuple):
+    """A joint: its axis, where it is on the link before it [m], its limits and how it stands when work begins [rad]."""
+
+    axis: str
+    at: tuple[float, float, float]
+    limit: float
+    ready: float
+
+
+def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float]]:
+    """Return an arm, and the joint values it is ready with, elbow bent, the tool in front.
+
+    Args:
+        kind: "seven axes": a shoulder, an elbow and a wrist that turn as a person's do; "industrial": six axes, the
+            elbow beside the shoulder's plane, the last three crossing; "parallel": six axes, three of them parallel,
+            no three of the last crossing.
+        rng: for the lengths.
+    """
+    lower, upper, fore, hand = (
+        round(float(length), 3) for length in rng.uniform((0.22, 0.28, 0.26, 0.12), (0.36, 0.48, 0.44, 0.20))
+    )
+    if kind == "seven axes":
+        axes = [
+            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
+            Axis("0 1 0", (0.0, 0.0, lower - 0.10), 2.05, 0.5),
+            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
+            Axis("0 1 0", (0.0, 0.0, upper - 0.10), 2.3, 1.3),
+            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
+            Axis("0 1 0", (0.0, 0.0, fore - 0.10), 2.05, 1.0),
+            Axis("0 0 1", (0.0, 0.0, 0.08), 3.05, 0.0),
+        ]
+        tool = (0.0, 0.0, hand)
+    elif kind == "industrial":
+        beside = round(float(rng.uniform(0.03, 0.12)), 3)
+        axes = [
+            Axis("0 0 1", (0.0, 0.0, 0.12), 2.95, 0.0),
+            Axis("0 1 0", (beside, 0.0, lower - 0.12), 1.9, 0.2),
+            Axis("0 1 0", (0.0, 0.0, upper), 2.4, 1.4),
+            Axis("0 0 1", (beside, 0.0, 0.12), 3.1, 0.0),
+            Axis("0 1 0", (0.0, 0.0, fore - 0.12), 2.1, 0.9),
+            Axis("0 0 1", (0.0, 0.0, 0.09), 3.1, 0.0),
+        ]
+        tool = (0.0, 0.0, hand)
+    else:
+        axes = [
+            Axis("0 0 1", (0.0, 0.0, 0.08), 3.1, 0.0),
+            Axis("0 1 0", (0.0, 0.13, lower - 0.15), 2.0, 0.3),
+            Axis("0 1 0", (0.0, -0.12, upper), 2.7, 1.5),
+            Axis("0 1 0", (0.0, 0.11, fore), 2.7, 0.6),
+            Axis("0 0 1", (0.0, 0.0, 0.09), 3.1, 0.0),
+            Axis("0 1 0", (0.0, 0.09, 0.0), 3.1, 0.0),
+        ]
+        tool = (0.0, hand, 0.0)
+    with Scratch() as folder:
+        path = folder / f"{kind.replace(' ', '_')}.urdf"
+        path.write_text(_urdf(kind.replace(" ", "_"), axes, tool), encoding="utf-8")
+        figure = wb.load(path)
+    return figure, {f"axis{number}": axis.ready for number, axis in enumerate(axes, start=1)}
+
+
+def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
+    """The file: every link is a cylinder from its joint to the next one."""
+    ends = [axis.at for axis in axes] + [tool]
+    radii = np.linspace(*RADII, len(ends))
+    lines = [f'<robot name="{name}">']
+    lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
+    lines.append('<link name="tool"/>')
+    for number, axis in enumerate(axes, start=1):
+        lines.append(
+            f'<joint name="axis{number}" type="revolute"><parent link="link{number - 1}"/><child link="link{number}"/>'
+            f'<origin xyz="{_numbers(axis.at)}"/><axis xyz="{axis.axis}"/>'
+            f'<limit lower="{-axis.limit}" upper="{axis.limit}" effort="100" velocity="3"/></joint>'
+        )
+    lines.append(
+        f'<joint name="grip" type="fixed"><parent link="link{len(axes)}"/><child link="tool"/>'
+        f'<origin xyz="{_numbers(tool)}"/></joint>'
+    )
+    return "\n".join([*lines, "</robot>"])
+
+
+def _link(name: str, end: tuple[float, float, float], radius: float) -> str:
+    way = np.array(end)
+    length = float(np.linalg.norm(way))
+    middle = _numbers(tuple(0.5 * way))
+    if length < SHORT:
+        shape = f'<geometry><sphere radius="{radius:.4f}"/></geometry>'
+        turn = (0.0, 0.0, 0.0)
+    else:
+        shape = f'<geometry><cylinder radius="{radius:.4f}" length="{length:.4f}"/></geometry>'
+        turn = (0.0, float(np.arccos(way[2] / length)), float(np.arctan2(way[1], way[0])))
+    mass = 20.0 * length + 0.5
+    spin = 0.1 * mass * length**2 + 1e-3
+    return (
+        f'<link name="{name}"><inertial><mass value="{mass:.3f}"/><origin xyz="{middle}"/>'
+        f'<inertia ixx="{spin:.5f}" ixy="0" ixz="0" iyy="{spin:.5f}" iyz="0" izz="{spin:.5f}"/></inertial>'
+        f'<collision><origin xyz="{middle}" rpy="{_numbers(turn)}"/>{shape}</collision></link>'
+    )
+
+
+def _numbers(values: tuple[float, ...]) -> str:
+    return " ".join(f"{value:.6f}" for value in values)
+
+
+SET = ProblemSet(
+    "robot_arm",
+    "robot arms",
+    "Arms of six or seven axes, every one with links of other lengths, bring their tool to a place among eight things, "
+    "in half of the problems with an orientation.",
+    _posed,
+)

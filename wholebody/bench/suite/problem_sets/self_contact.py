@@ -1,0 +1,157 @@
+"""Hands on the body they belong to: on the opposite elbow, on the hips, arms crossed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.suite.problem_sets.bodies import (
+    alone,
+    floor_scene,
+    human,
+    is_free,
+    shaken,
+    standing_problem,
+    until_found,
+)
+from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.fitting import fitted
+
+LEAST, MOST = 0.0027, 0.005  # m: between a hand and what it lies on, in the witness
+TURNS = 6  # of laying a hand on what is under it
+FAR = 0.5  # m: distances beyond are not looked for
+SIDES = ("left", "right")
+OTHER = {"left": "right", "right": "left"}
+ELBOW, FRONT = (0.0, 2.5), (-0.5, 1.5)  # rad: around an upper arm from its front outwards
+BEGIN = (
+    {"shoulder_flexion": 60.0, "shoulder_abduction": 15.0, "shoulder_rotation": 45.0, "elbow_flexion": 90.0},
+    {"shoulder_abduction": 40.0, "elbow_flexion": 80.0, "shoulder_rotation": 20.0},
+    {
+        "clavicle_protraction": 25.0,
+        "clavicle_elevation": 30.0,
+        "shoulder_flexion": 65.0,
+        "shoulder_abduction": 20.0,
+        "shoulder_rotation": 65.0,
+        "elbow_flexion": 105.0,
+    },
+)
+"""Degrees that both arms begin with, for each kind."""
+SPREAD = 0.2  # share of the range of every joint of the upper body that is added or taken away
+
+
+@dataclass(frozen=True)
+class Touch:
+    """A palm that is to lie on a segment.
+
+    Attributes:
+        hand: "left" or "right".
+        segment: what it lies on.
+        axis: (3,) a place within the segment, in the segment's axes, metres.
+        normal: (3,) unit vector from there out of the segment.
+        near: the segment and neighbours that the hand may lie on as well.
+    """
+
+    hand: str
+    segment: str
+    axis: Array
+    normal: Array
+    near: tuple[str, ...]
+
+    def at(self, height: float) -> Array:
+        """Where the middle of the palm is, (3,) in the segment's axes, if it is this far from within, metres."""
+        return self.axis + height * self.normal
+
+
+def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
+    figure = human()
+    start = figure.posture("standing")
+    kind, turned = number % 3, number // 3 % 2 == 1
+    bent = {f"{side}_{name}": np.radians(angle) for side in SIDES for name, angle in BEGIN[kind].items()}
+    begin = figure.with_joints(start, bent)
+
+    def attempt() -> tuple[Array, list[Touch]] | None:
+        touches = _touches(kind, SIDES[number // 6 % 2], rng)
+        witness = _laid(figure, shaken(figure, begin, SPREAD, rng), touches)
+        return (witness, touches) if witness is not None and is_free(alone(figure), witness, LEAST) else None
+
+    witness, touches = until_found(attempt)
+    goals = [_goal(figure, witness, touch, turned) for touch in touches]
+    return standing_problem(floor_scene(figure), start, goals), witness
+
+
+def _touches(kind: int, hand: str, rng: np.random.Generator) -> list[Touch]:
+    if kind == 0:
+        return [_on_arm(hand, (-0.30, -0.22), ELBOW, rng)]
+    if kind == 1:
+        return [_on_hip(side, rng) for side in SIDES]
+    return [_on_arm(side, (-0.34, -0.16), FRONT, rng) for side in SIDES]
+
+
+def _on_arm(hand: str, along: tuple[float, float], around: tuple[float, float], rng: np.random.Generator) -> Touch:
+    """A place on the other upper arm, which goes along -z of its axes."""
+    side = OTHER[hand]
+    out = 1.0 if side == "left" else -1.0
+    angle = rng.uniform(*around)
+    normal = np.array((np.cos(angle), out * np.sin(angle), 0.0))
+    axis = np.array((0.0, 0.0, rng.uniform(*along)))
+    return Touch(hand, f"{side}_upper_arm", axis, normal, (f"{side}_upper_arm", f"{side}_forearm"))
+
+
+def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
+    """A place on the side of the pelvis."""
+    out = 1.0 if hand == "left" else -1.0
+    normal = np.array((rng.uniform(-0.3, 0.6), out, rng.uniform(-0.1, 0.3)))
+    axis = np.array((0.0, 0.05 * out, 0.03))
+    return Touch(hand, "pelvis", axis, normal / np.linalg.norm(normal), ("pelvis", "lower_lumbar", f"{hand}_thigh"))
+
+
+def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
+    """A posture near q, (nq,), with the hands between `LEAST` and `MOST` from what they lie on; None if there is none.
+
+    The distances are measured, and the hands moved along the normals by what is too much or too little.
+    """
+    scene, dofs = alone(figure), figure.dofs("upper_body")
+    heights = [0.1] * len(touches)
+    for _ in range(TURNS):
+        goals = [
+            wb.Relative(f"{touch.hand}_palm", touch.segment, touch.at(height), orientation=False).resolve(scene, q)
+            for touch, height in zip(touches, heights, strict=True)
+        ]
+        found = fitted(figure, q, goals, dofs)
+        if found is None:
+            return None
+        q = found
+        gaps = [_gap(scene, q, touch) for touch in touches]
+        if all(LEAST <= gap <= MOST for gap in gaps):
+            return q
+        heights = [height - gap + 0.5 * (LEAST + MOST) for height, gap in zip(heights, gaps, strict=True)]
+    return None
+
+
+def _gap(scene: wb.Scene, q: Array, touch: Touch) -> float:
+    owners, wanted = scene.piece_owner, [{f"{touch.hand}_hand", segment} for segment in touch.near]
+    near = scene.contacts(q, within=FAR)
+    found = [d for (a, b), d in zip(near.pair, near.distance, strict=True) if {owners[a], owners[b]} in wanted]
+    return float(min(found, default=FAR))
+
+
+def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relative:
+    """The palm where it is in the posture q, as seen from the segment."""
+    palm = f"{touch.hand}_palm"
+    state = alone(figure).state(q)
+    base, hand = (pin.SE3(state.frame(figure.frame_id(name))) for name in (touch.segment, palm))
+    return wb.Relative(palm, touch.segment, base.actInv(hand), orientation=turned)
+
+
+SET = ProblemSet(
+    "self_contact",
+    "self-contact",
+    "A standing person lays a hand on the other elbow, both hands on the hips, or crosses its arms: hands end a few "
+    "millimetres from the body they belong to, in half of the problems turned as asked.",
+    _posed,
+)

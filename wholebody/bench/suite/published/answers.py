@@ -1,0 +1,186 @@
+"""Answers to published problems, from whatever wrote them: read, and refused with one sentence that names the place."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any, Literal, cast
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, UnknownNameError
+from wholebody.bench.suite.published.reading import VERSION, loaded, read_index
+from wholebody.bench.suite.published.rebuilt import UNIT, Rebuilt
+
+Seed = Literal["near", "far"]
+SEEDS: tuple[Seed, ...] = ("near", "far")
+KEYS = {"format", "version", "method", "about", "machine", "kernel_seconds", "answers"}
+ANSWER_KEYS = {"problem", "seed", "posture", "postures", "seconds", "refused"}
+LARGEST = 1e6  # of a number in a posture [rad, m]; more is refused as a mistake
+LONGEST = 200  # characters of a method's name
+
+
+@dataclass(frozen=True)
+class Answer:
+    """One answer.
+
+    Attributes:
+        problem, seed: to which problem, and from which seed.
+        postures: (frames, nq), one where the goals do not move; None for a refusal.
+        seconds: of the solve, or of a frame; NaN where it is not told.
+        refused: why there is none.
+    """
+
+    problem: str
+    seed: Seed
+    postures: Array | None
+    seconds: float
+    refused: str
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The content of a file of answers.
+
+    Attributes:
+        method, about, machine: as the file says; empty where it does not.
+        kernel_seconds: time of the reference kernel on that machine; NaN where it is not told.
+        answers: in the order of the file.
+    """
+
+    method: str
+    about: str
+    machine: str
+    kernel_seconds: float
+    answers: tuple[Answer, ...]
+
+
+def read_answers(path: Path, folder: Path) -> Answers:
+    """Read a file of answers to the problems of an export.
+
+    Raises:
+        FileFormatError: the file is none of answers; the message names the entry and how to correct it.
+        UnknownNameError: an answer is to a problem that the export does not have.
+        InputError: there is no export in the folder.
+    """
+    index = read_index(folder)
+    known = {name for family in index["sets"].values() for name in family["problems"]}
+    content = loaded(path, "file of answers")
+    if not isinstance(content, dict):
+        raise FileFormatError(f"{path}: holds {_kind(content)}, not an object with method and answers")
+    _check_keys(content, KEYS, f"{path}")
+    for key, wanted in (("format", "wholebody answers"), ("version", VERSION)):
+        if content.get(key) != wanted:
+            raise FileFormatError(f'{path}: {key} is {shown(content.get(key))}; write "{key}": "{wanted}"')
+    listed = content.get("answers")
+    if not isinstance(listed, list):
+        raise FileFormatError(f"{path}: answers is {_kind(listed)}; give a list of objects, one a problem")
+    if not listed:
+        raise FileFormatError(f"{path}: answers is empty; give an object for each problem, or refuse it with a reason")
+    texts = {key: _text(content, key, str(path)) for key in ("method", "about", "machine")}
+    if not texts["method"].strip() or len(texts["method"]) > LONGEST:
+        raise FileFormatError(f"{path}: method has no name, or one of more than {LONGEST} letters; name your solver")
+    reader = _Reader(path, folder, known)
+    return Answers(
+        **texts,
+        kernel_seconds=_seconds(content, "kernel_seconds", str(path)),
+        answers=tuple(reader.read(item, f"{path}: answers[{place}]") for place, item in enumerate(listed)),
+    )
+
+
+class _Reader:
+    def __init__(self, path: Path, folder: Path, known: set[str]) -> None:
+        self._folder, self._known = folder, known
+        self._seen: dict[tuple[str, str], str] = {}
+
+    def read(self, item: Any, where: str) -> Answer:
+        if not isinstance(item, dict):
+            raise FileFormatError(f"{where} is {_kind(item)}; give an object with problem and posture")
+        _check_keys(item, ANSWER_KEYS, where)
+        name, seed = item.get("problem"), item.get("seed", "near")
+        if not isinstance(name, str):
+            raise FileFormatError(f"{where}.problem is {shown(name)}; give a name such as 'clutter/0007'")
+        if name not in self._known:
+            raise UnknownNameError("problem", name, self._known, where)
+        if seed not in SEEDS:
+            raise FileFormatError(f"{where}.seed is {shown(seed)}; give 'near' or 'far'")
+        if (name, seed) in self._seen:
+            raise FileFormatError(f"{where} answers {name} from the {seed} seed a second time; keep one of them")
+        self._seen[name, seed] = where
+        given = [key for key in ("posture", "postures", "refused") if item.get(key) is not None]
+        if len(given) != 1:
+            raise FileFormatError(f"{where} has {' and '.join(given) or 'no posture'}; give one of posture(s), refused")
+        seconds = _seconds(item, "seconds", where)
+        refused = _text(item, "refused", where)
+        if given == ["refused"]:
+            return Answer(name, cast(Seed, seed), None, seconds, refused.strip() or "without a reason")
+        return Answer(name, cast(Seed, seed), self._postures(name, item, given[0], where), seconds, "")
+
+    def _postures(self, name: str, item: Mapping[str, Any], key: str, where: str) -> Array:
+        problem = Rebuilt(self._folder, name)
+        wanted = "postures" if problem.moving else "posture"
+        if key != wanted:
+            what = f"one for each of its {problem.frames} frames" if problem.moving else "one list of numbers"
+            raise FileFormatError(f"{where} has {key}, and {name} takes {wanted}: {what}")
+        rows = item[key] if problem.moving else [item[key]]
+        if not isinstance(rows, list) or len(rows) != problem.frames:
+            count = len(rows) if isinstance(rows, list) else 0
+            raise FileFormatError(f"{where}.postures has {count} entries; {name} has {problem.frames} frames")
+        places = [f"{where}.{key}[{number}]" if problem.moving else f"{where}.{key}" for number in range(len(rows))]
+        return np.array([_posture(row, problem, place) for row, place in zip(rows, places, strict=True)])
+
+
+def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
+    name, body, count = problem.content["name"], problem.content["body"], problem.model.nq
+    if not isinstance(row, list):
+        order = f"in the order of coordinates in {body}"
+        raise FileFormatError(f"{where} is {_kind(row)}; give a list of {count} numbers, {order}")
+    if len(row) != count:
+        raise FileFormatError(f"{where} has {len(row)} numbers; {name} takes {count}, one a coordinate of {body}")
+    for place, value in enumerate(row):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
+            raise FileFormatError(f"{where}[{place}] is {shown(value)}; give finite radians and metres")
+    q = np.array(row, dtype=float)
+    if problem.free:
+        length = float(np.linalg.norm(q[3:7]))
+        if abs(length - 1.0) > UNIT:
+            raise FileFormatError(
+                f"{where}: the root's quaternion (numbers 3 to 6: x, y, z, w) has length {length:.6g}; normalise it"
+            )
+    return q
+
+
+def _check_keys(item: Mapping[str, Any], known: set[str], where: str) -> None:
+    for key in item:
+        if key not in known:
+            raise FileFormatError(str(UnknownNameError("entry", str(key), known, where)))
+
+
+def _text(item: Mapping[str, Any], key: str, where: str) -> str:
+    value = item.get(key)
+    if value is None:
+        return ""
+    if not isinstance(value, str):
+        raise FileFormatError(f"{where}.{key} is {_kind(value)}; give a text")
+    return " ".join(value.split())
+
+
+def _seconds(item: Mapping[str, Any], key: str, where: str) -> float:
+    value = item.get(key)
+    if value is None:
+        return float("nan")
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not (isfinite(value) and value >= 0.0):
+        raise FileFormatError(f"{where}.{key} is {shown(value)}; give seconds, 0 or more")
+    return float(value)
+
+
+def _kind(value: Any) -> str:
+    names: Sequence[tuple[type, str]] = (
+        (dict, "an object"), (list, "a list"), (str, "a text"), (bool, "true or false"), (int, "a number"),
+        (float, "a number"),
+    )  # fmt: skip
+    return next((name for kind, name in names if isinstance(value, kind)), "nothing")

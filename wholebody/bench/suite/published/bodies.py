@@ -1,0 +1,209 @@
+"""A body as files: a URDF that every program reads, and a JSON file with its collision pieces and its coordinates.
+
+The URDF is written from Pinocchio's model, so that a figure of any origin gives one: links, hinges, slides, limits,
+masses, and frames to reach with as links without mass. The order of the numbers of a posture is the one that Pinocchio
+gives to the written file, so whoever reads it with Pinocchio has the same postures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import InputError
+from wholebody.bench.suite.published.reading import VERSION
+from wholebody.bench.suite.published.shapes import Meshes, described, pose_of
+from wholebody.figures.figure import Figure
+from wholebody.figures.urdf.writing import urdf_axis
+
+ROOT = ("root x", "root y", "root z", "root qx", "root qy", "root qz", "root qw")
+NO_LIMIT = 1e6  # rad, m: beyond which a limit is none
+LIGHT = 1e-6  # kg: of a link that only has a place
+
+
+@dataclass(frozen=True)
+class BodyFiles:
+    """A body, written.
+
+    Attributes:
+        name: for its files.
+        urdf: text of the URDF.
+        content: of the JSON file.
+        order: (nq,) `q[order]` has the order of the files, for a posture q of the figure.
+        links: (njoints,) the link that stands at each joint of the figure.
+    """
+
+    name: str
+    urdf: str
+    content: Mapping[str, Any]
+    order: Indices
+    links: tuple[str, ...]
+
+    def posture(self, q: Array) -> list[float]:
+        """The numbers of a posture (nq,) in the order of the files."""
+        return [float(value) for value in np.asarray(q)[self.order]]
+
+
+def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
+    """Write a figure; convex pieces go to the meshes.
+
+    Raises:
+        InputError: a joint is neither a hinge, nor a slide, nor a free root; or joints follow each other.
+    """
+    if figure.followers:
+        raise InputError(f"{name}: joints of it follow others, which a published body does not say; leave it out")
+    model = figure.model
+    links = _links(model)
+    text = _urdf(figure, name, links, meshes)
+    read = _read(text, figure.root)
+    order = _order(figure, read)
+    joints = [joint for joint in read.names if joint != "universe" and joint in figure.joints]
+    place = {joint: model.joints[figure.joint_id(joint)] for joint in joints}
+    known = figure.limits
+    limits = {int(k): (float(a), float(b)) for k, a, b in zip(known.idx_q, known.lower, known.upper, strict=True)}
+    bounds = {joint: limits[place[joint].idx_q] for joint in joints if place[joint].idx_q in limits}
+    content = {
+        "format": "wholebody body",
+        "version": VERSION,
+        "name": name,
+        "urdf": f"bodies/{name}.urdf",
+        "root": figure.root,
+        "coordinates": [*(ROOT if figure.root == "free" else ()), *joints],
+        "limits": {joint: list(ends) for joint, ends in bounds.items()},
+        "effort_weights": {joint: float(figure.effort_weights[place[joint].idx_v]) for joint in joints},
+        "root_effort_weights": [float(weight) for weight in figure.effort_weights[: 6 if figure.root == "free" else 0]],
+        "pieces": [
+            {
+                "name": piece.name,
+                "link": links[piece.parentJoint],
+                "pose": pose_of(piece.placement),
+                "shape": described(piece.geometry, meshes, f"{name}-{piece.name}"),
+            }
+            for piece in figure.geometry.geometryObjects
+        ],
+        "pairs": [
+            [figure.geometry.geometryObjects[pair.first].name, figure.geometry.geometryObjects[pair.second].name]
+            for pair in figure.geometry.collisionPairs
+        ],
+    }
+    return BodyFiles(name, text, content, order, links)
+
+
+def _links(model: pin.Model) -> tuple[str, ...]:
+    """The link at each joint: the first body frame that coincides with it, else one named after the joint."""
+    found = [f"{name}_link" for name in model.names]
+    found[0] = "world_link"
+    for frame in reversed(list(model.frames)):
+        if frame.type == pin.FrameType.BODY and frame.placement.isIdentity(1e-12):
+            found[frame.parentJoint] = frame.name
+    return tuple(found)
+
+
+def _urdf(figure: Figure, name: str, links: tuple[str, ...], meshes: Meshes) -> str:
+    model = figure.model
+    first = 1 if figure.root == "free" else 0
+    lines = ['<?xml version="1.0" encoding="utf-8"?>', f"<robot name={quoteattr(name)}>"]
+    for joint in range(first, model.njoints):
+        lines.append(f"  <link name={quoteattr(links[joint])}>")
+        if joint:
+            lines += _inertial(model.inertias[joint])
+        for piece in figure.geometry.geometryObjects:
+            if piece.parentJoint == joint:
+                lines += _collision(piece, meshes, name)
+        lines.append("  </link>")
+    for joint in range(first + 1, model.njoints):
+        lines += _joint(model, joint, links)
+    for frame in model.frames:
+        marks = frame.type in (pin.FrameType.BODY, pin.FrameType.OP_FRAME)
+        if marks and frame.name not in links and frame.parentJoint >= first and frame.name != "universe":
+            lines += [
+                f"  <link name={quoteattr(frame.name)}/>",
+                f'  <joint name={quoteattr(frame.name + "_mount")} type="fixed">',
+                f"    <parent link={quoteattr(links[frame.parentJoint])}/><child link={quoteattr(frame.name)}/>",
+                f"    {_origin(frame.placement)}",
+                "  </joint>",
+            ]
+    return "\n".join([*lines, "</robot>", ""])
+
+
+def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
+    known, at = urdf_axis(model, joint), model.joints[joint].idx_q
+    if known is None or known.kind == "continuous":
+        raise InputError(
+            f"joint {model.names[joint]!r} is a {model.joints[joint].shortname()}; only hinges and slides with limits "
+            "are published"
+        )
+    low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
+    if not max(abs(low), abs(high)) < NO_LIMIT:
+        raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
+    speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), NO_LIMIT)
+    return [
+        f'  <joint name={quoteattr(model.names[joint])} type="{known.kind}">',
+        f"    <parent link={quoteattr(links[model.parents[joint]])}/><child link={quoteattr(links[joint])}/>",
+        f"    {_origin(model.jointPlacements[joint])}",
+        f'    <axis xyz="{_numbers(known.axis)}"/>',
+        f'    <limit lower="{low!r}" upper="{high!r}" effort="1000" velocity="{speed!r}"/>',
+        "  </joint>",
+    ]
+
+
+def _inertial(inertia: pin.Inertia) -> list[str]:
+    if inertia.mass < LIGHT:
+        return []
+    spin = inertia.inertia
+    names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))
+    terms = " ".join(f'{name}="{float(spin[a, b])!r}"' for name, a, b in names)
+    return [
+        f'    <inertial><origin xyz="{_numbers(inertia.lever)}"/><mass value="{float(inertia.mass)!r}"/>',
+        f"      <inertia {terms}/></inertial>",
+    ]
+
+
+def _collision(piece: pin.GeometryObject, meshes: Meshes, body: str) -> list[str]:
+    shape = described(piece.geometry, meshes, f"{body}-{piece.name}")
+    kind, after = shape["type"], []
+    if kind == "box":
+        text = f'<box size="{_numbers(shape["size"])}"/>'
+    elif kind == "sphere":
+        text = f'<sphere radius="{shape["radius"]!r}"/>'
+    elif kind == "capsule":  # as Pinocchio reads capsules; others see the cylinder within
+        text = f'<cylinder radius="{shape["radius"]!r}" length="{shape["length"]!r}"/>'
+        after = [f"    <collision_checking><capsule name={quoteattr(piece.name)}/></collision_checking>"]
+    elif kind == "convex":
+        text = f"<mesh filename={quoteattr('../' + shape['mesh'])}/>"
+    else:
+        raise InputError(f"piece {piece.name!r} is a {kind}, which no URDF has; give the body other pieces")
+    return [
+        f"    <collision name={quoteattr(piece.name)}>{_origin(piece.placement)}",
+        f"      <geometry>{text}</geometry></collision>",
+        *after,
+    ]
+
+
+def _origin(place: pin.SE3) -> str:
+    return f'<origin xyz="{_numbers(place.translation)}" rpy="{_numbers(pin.rpy.matrixToRpy(place.rotation))}"/>'
+
+
+def _numbers(values: Any) -> str:
+    return " ".join(repr(float(value) + 0.0) for value in values)
+
+
+def _read(text: str, root: str) -> pin.Model:
+    return pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if root == "free" else pin.buildModelFromXML(text)
+
+
+def _order(figure: Figure, read: pin.Model) -> Indices:
+    """Where the numbers of a posture of the files are in one of the figure."""
+    if read.nq != figure.model.nq:
+        raise InputError(f"{figure.name}: written as a URDF it has {read.nq} coordinates, not {figure.model.nq}")
+    order = list(range(7)) if figure.root == "free" else []
+    for name, joint in zip(read.names, read.joints, strict=True):
+        if joint.nq == 1 and name in figure.joints:
+            order.append(figure.model.joints[figure.joint_id(name)].idx_q)
+    return np.array(order, dtype=np.intp)

@@ -1,0 +1,198 @@
+"""What a file of answers is worth: every answer scored by the files alone, and shares with intervals for every set."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from math import inf, isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
+from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
+from wholebody.bench.suite.published.reading import VERSION, read_index, read_json
+from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, worst_of
+from wholebody.bench.tables import flat
+
+FINE = 1e-4  # m, rad: the stricter of the two accuracies
+TIMEOUT = 10.0  # s: that a failure counts with in a mean time
+SHARE = ("share_low", "share_high")  # in the file of a verdict, low and high alone
+ANSWERED, REFUSED, UNANSWERED = "answered", "refused", "unanswered"
+NONE = Score(inf, inf, inf, inf, inf, inf, inf)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One problem from one seed, judged.
+
+    Attributes:
+        outcome: "answered", "refused" or "unanswered".
+        said: the reason of a refusal.
+        score: of the answer; of the worst frame where goals move. Infinite without an answer.
+        solved, solved_fine: whether goals are met and all that must hold is kept, to 1e-3 and to 1e-4.
+        effort_above: effort above the best known, as a share; NaN where it is not solved, or where goals move.
+        seconds: as the answers say; NaN where they do not.
+    """
+
+    problem: str
+    seed: str
+    outcome: str
+    said: str
+    score: Score
+    solved: bool
+    solved_fine: bool
+    effort_above: float
+    seconds: float
+
+    @property
+    def set(self) -> str:
+        """Name of its set."""
+        return self.problem.partition("/")[0]
+
+
+@dataclass(frozen=True)
+class SetScore:
+    """A method in one set from one seed.
+
+    Attributes:
+        problems, refused, unanswered: how many; shares leave out the refused ones, and the unanswered are not solved.
+        solved: how many, to 1e-3.
+        share, share_fine: of what was not refused, to 1e-3 and to 1e-4.
+        worst: median of the worst error [m or rad].
+        overlap: deepest of all answers [m].
+        effort_above: median over what is solved, as a share of the best known.
+        seconds: median of all answers; mean of all problems, failures counting `TIMEOUT`. NaN where no times are told.
+    """
+
+    set: str
+    seed: str
+    problems: int
+    refused: int
+    unanswered: int
+    solved: int
+    share: Interval
+    share_fine: Interval
+    worst: Interval
+    overlap: float
+    effort_above: Interval
+    seconds: Interval
+    mean_seconds: Interval
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """All that is said of a file of answers.
+
+    Attributes:
+        answers: what was judged.
+        fingerprint, per_set: of the export.
+        judged: every problem of the sets and seeds that have an answer.
+        sets: one row for each of them.
+    """
+
+    answers: Answers
+    fingerprint: str
+    per_set: int
+    judged: tuple[Judged, ...]
+    sets: tuple[SetScore, ...]
+
+
+def judge(answers: Answers, folder: Path) -> Verdict:
+    """Judge answers to the problems of an export.
+
+    Every problem of a set counts if the answers take part in the set from that seed: what is left out is not solved.
+
+    Raises:
+        FileFormatError, InputError: the folder holds no whole export.
+    """
+    index = read_index(folder)
+    given = {(answer.problem, answer.seed): answer for answer in answers.answers}
+    judged, rows = [], []
+    for name, family in index["sets"].items():
+        best = read_json(folder / "difficulty" / f"{name}.json", "difficulty")["best_known_effort"]
+        for seed in SEEDS:
+            if not any((problem, seed) in given for problem in family["problems"]):
+                continue
+            mine = [
+                _judged(folder, problem, seed, given.get((problem, seed)), best[problem])
+                for problem in family["problems"]
+            ]
+            judged += mine
+            rows.append(set_score(name, seed, mine))
+    return Verdict(answers, str(index["fingerprint"]), int(index["per_set"]), tuple(judged), tuple(rows))
+
+
+def _judged(folder: Path, name: str, seed: str, answer: Answer | None, best: float | None) -> Judged:
+    if answer is None:
+        return Judged(name, seed, UNANSWERED, "", NONE, False, False, nan, nan)
+    if answer.postures is None:
+        return Judged(name, seed, REFUSED, answer.refused, NONE, False, False, nan, nan)
+    problem = Rebuilt(folder, name)
+    score = worst_of([problem.score(q, frame) for frame, q in enumerate(answer.postures)])
+    solved = score.worst <= SOLVED
+    above = score.effort / best - 1.0 if solved and best else nan
+    return Judged(name, seed, ANSWERED, "", score, solved, score.worst <= FINE, above, answer.seconds)
+
+
+def set_score(name: str, seed: str, mine: Sequence[Judged]) -> SetScore:
+    """The figures of one set."""
+    taken = [one for one in mine if one.outcome != REFUSED]
+    answered = [one for one in mine if one.outcome == ANSWERED]
+    timed = [one for one in answered if isfinite(one.seconds)]
+    spent = [one.seconds if one.solved and isfinite(one.seconds) else TIMEOUT for one in taken] if timed else []
+    return SetScore(
+        set=name,
+        seed=seed,
+        problems=len(mine),
+        refused=len(mine) - len(taken),
+        unanswered=len(taken) - len(answered),
+        solved=sum(one.solved for one in taken),
+        share=share([one.solved for one in taken]),
+        share_fine=share([one.solved_fine for one in taken]),
+        worst=median([one.score.worst for one in taken]),
+        overlap=max((one.score.overlap for one in answered), default=nan),
+        effort_above=median([one.effort_above for one in answered if isfinite(one.effort_above)]),
+        seconds=median([one.seconds for one in timed]),
+        mean_seconds=shifted_geometric_mean(spent),
+    )
+
+
+def as_json(verdict: Verdict) -> dict[str, Any]:
+    """A verdict as plain numbers, texts, lists and dictionaries; figures that are none are null."""
+    answers = verdict.answers
+    content = {
+        "format": "wholebody verdict",
+        "version": VERSION,
+        "method": answers.method,
+        "about": answers.about,
+        "machine": answers.machine,
+        "kernel_seconds": answers.kernel_seconds,
+        "fingerprint": verdict.fingerprint,
+        "per_set": verdict.per_set,
+        "exact": EXACT,
+        "solved_to": SOLVED,
+        "timeout": TIMEOUT,
+        "sets": [_row(row) for row in verdict.sets],
+        "answers": [_answer(one) for one in verdict.judged],
+    }
+    found = _plain(content)
+    assert isinstance(found, dict)
+    return found
+
+
+def _row(row: SetScore) -> dict[str, Any]:
+    return {name.removeprefix("share_") if name in SHARE else name: value for name, value in flat(row).items()}
+
+
+def _answer(one: Judged) -> dict[str, Any]:
+    plain = asdict(one)
+    score = plain.pop("score")
+    return {**plain, **score, "worst": one.score.worst}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if isfinite(value) else None
+    if isinstance(value, Mapping):
+        return {name: _plain(item) for name, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, Iterable) and not isinstance(value, str) else value

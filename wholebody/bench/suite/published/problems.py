@@ -1,0 +1,149 @@
+"""One case of a set as the content of a file: everything resolved to numbers, nothing left to any program's habits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.case import Case
+from wholebody.bench.suite.published.bodies import BodyFiles
+from wholebody.bench.suite.published.reading import VERSION
+from wholebody.bench.suite.published.shapes import Meshes, described, pose_of
+from wholebody.tasks.base import Goal
+
+SAME = 1e-12  # m: clearances that differ by less are the same
+
+
+def problem_name(family: str, number: int) -> str:
+    """Name of a problem in files and answers, such as "clutter/0007"."""
+    return f"{family}/{number:04d}"
+
+
+def problem_content(case: Case, body: BodyFiles, far: Array, meshes: Meshes) -> dict[str, Any]:
+    """A case as the content of its file; hulls of things go to the meshes.
+
+    Of the measures that a problem has by default the effort is published, which any solver can be asked for.
+
+    Args:
+        case: the case.
+        body: its figure, written.
+        far: (nq,) the far seed.
+        meshes: takes the hulls.
+
+    Raises:
+        InputError: the case asks for something that the files have no word for.
+    """
+    problem, name = case.problem, problem_name(case.set, case.number)
+    if problem.bounds or problem.measures_given:
+        raise InputError(f"{name}: only problems without bounds and measures of their own are published")
+    things, untested = _things(case, body, meshes)
+    content: dict[str, Any] = {
+        "format": "wholebody problem",
+        "version": VERSION,
+        "name": name,
+        "set": case.set,
+        "body": f"bodies/{body.name}.json",
+        "seeds": {"near": body.posture(problem.start), "far": body.posture(far)},
+        "goals": [] if case.frames else [_goal(goal) for goal in problem.goals],
+        "holds": [_hold(term) for term in problem.constraints if isinstance(term, wb.Hold)],
+        "balance": [_balance(term) for term in problem.constraints if isinstance(term, wb.Balance)],
+        "effort_from": body.posture(problem.start),
+        "things": things,
+        "untested": untested,
+        "clearance": {"every_pair": problem.clearance, "except": _exceptions(problem)},
+    }
+    others = [term for term in problem.constraints if not isinstance(term, (wb.Hold, wb.Balance))]
+    if others:
+        raise InputError(f"{name}: the files have no word for {type(others[0]).__name__}")
+    if case.frames:
+        content |= {"dt": case.dt, "frames": [[_goal(goal) for goal in goals] for goals in case.frames]}
+    return content
+
+
+def _goal(goal: Goal) -> dict[str, Any]:
+    if isinstance(goal, wb.Point):
+        if np.any(goal.resolved_offset):
+            raise InputError(f"Point({goal.frame!r}) has an offset, which the files have no word for; add a frame")
+        return _placed(goal.frame, None, goal.resolved_target, None)
+    if isinstance(goal, wb.Frame):
+        return _placed(goal.frame, None, goal.resolved_target.translation, goal.resolved_target.rotation)
+    if isinstance(goal, wb.Relative):
+        target = goal.residual.placement
+        return _placed(goal.frame, goal.to, target.translation, target.rotation if goal.orientation else None)
+    if isinstance(goal, wb.Axis) and goal.toward is not None:
+        axis, target = goal.basis[2], goal.resolved_target
+        return {"type": "axis", "frame": goal.frame, "axis": _listed(axis), "toward": _listed(target)}
+    raise InputError(f"the files have no word for the goal {type(goal).__name__}")
+
+
+def _hold(hold: wb.Hold) -> dict[str, Any]:
+    at = hold.kept_at
+    return _placed(hold.frame, hold.relative_to, at.translation, at.rotation if hold.orientation else None)
+
+
+def _placed(frame: str, base: str | None, position: Array, rotation: Array | None) -> dict[str, Any]:
+    turn = None if rotation is None else _listed(pin.Quaternion(rotation).coeffs())
+    return {"type": "placement", "frame": frame, "in": base, "position": _listed(position), "quaternion": turn}
+
+
+def _balance(term: wb.Balance) -> dict[str, Any]:
+    """The centre of mass x fulfils `normals @ x[:2] - offsets >= margin`."""
+    return {"normals": [_listed(row) for row in term.normals], "offsets": _listed(term.offsets), "margin": term.margin}
+
+
+def _things(case: Case, body: BodyFiles, meshes: Meshes) -> tuple[list[dict[str, Any]], list[list[str]]]:
+    """Pieces of all things, and the pairs that are not tested although the rule would.
+
+    The rule: every piece of a thing against every piece of the body, and carried things against those in the world.
+    """
+    geometry = case.problem.scene.geometry
+    own = case.problem.scene.figure.geometry.ngeoms
+    pieces = list(geometry.geometryObjects)
+    things = [
+        {
+            "name": piece.name,
+            "link": body.links[piece.parentJoint] if piece.parentJoint else None,
+            "pose": pose_of(piece.placement),
+            "shape": described(piece.geometry, meshes, f"{case.set}-{case.number:04d}-{piece.name}"),
+        }
+        for piece in pieces[own:]
+    ]
+    tested = {(pair.first, pair.second) for pair in geometry.collisionPairs if pair.second >= own}
+    ruled = {
+        (first, second)
+        for second in range(own, len(pieces))
+        for first in range(second)
+        if first < own or (pieces[first].parentJoint > 0) != (pieces[second].parentJoint > 0)
+    }
+    if tested - ruled:
+        first, second = min(tested - ruled)
+        raise InputError(f"{pieces[first].name} and {pieces[second].name} are both carried; the files cannot say that")
+    return things, [[pieces[first].name, pieces[second].name] for first, second in sorted(ruled - tested)]
+
+
+def _exceptions(problem: wb.Problem) -> list[list[Any]]:
+    """Pairs whose least distance is another: what rests on something at the start."""
+    geometry = problem.scene.geometry
+    names = [piece.name for piece in geometry.geometryObjects]
+    return [
+        [names[pair.first], names[pair.second], float(least)]
+        for pair, least in zip(geometry.collisionPairs, problem.clearances, strict=True)
+        if abs(least - problem.clearance) > SAME
+    ]
+
+
+def witness_content(case: Case, body: BodyFiles) -> dict[str, Any]:
+    """What proves the case possible: one posture, or one a frame."""
+    if case.frames:
+        return {"postures": [body.posture(q) for q in case.path]}
+    return {"posture": body.posture(case.witness)}
+
+
+def _listed(values: Sequence[float] | Array) -> list[float]:
+    return [float(value) + 0.0 for value in values]

@@ -1,0 +1,273 @@
+"""A published problem, rebuilt from its files by Pinocchio and coal alone, and what a posture is worth for it.
+
+Nothing of the package's scenes, terms or methods is used, so that no fault of theirs is judged by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import coal
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import read_text
+from wholebody.bench.suite.published.reading import read_json
+
+SOLVED = 1e-3  # m, rad: worst of goals and of all that must hold, up to which a problem counts as solved
+EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts as the best known
+UNIT = 1e-6  # largest deviation of a quaternion from unit length
+
+
+@dataclass(frozen=True)
+class Score:
+    """What a posture is worth for a problem.
+
+    Attributes:
+        goal_error, goal_angle: largest error of a goal [m], [rad].
+        overlap: depth of the deepest overlap of any pair [m].
+        clearance: largest shortfall of a pair from the distance that it must keep [m].
+        limits: largest violation of a joint limit [rad, m].
+        holds: largest violation of what is held, and of balance [m, rad].
+        effort: weighted squared displacement of joints and root from the start [rad^2, m^2].
+    """
+
+    goal_error: float
+    goal_angle: float
+    overlap: float
+    clearance: float
+    limits: float
+    holds: float
+    effort: float
+
+    @property
+    def worst(self) -> float:
+        """The one figure of accuracy: the worst of goals and of all that must hold [m or rad]."""
+        return max(self.goal_error, self.goal_angle, self.overlap, self.clearance, self.limits, self.holds)
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body, read from its files.
+
+    Attributes:
+        model: Pinocchio's model of the URDF.
+        content: of the JSON file.
+        shapes: of the pieces, in their order.
+    """
+
+    model: pin.Model
+    content: Mapping[str, Any]
+    shapes: tuple[Any, ...]
+
+
+class Rebuilt:
+    """A problem as its files state it.
+
+    Attributes:
+        content: of the file.
+        model: Pinocchio's model; a posture has `model.nq` numbers, in the order of the files.
+        moving: whether the goals move, so that an answer is a posture for each frame.
+        free: whether a posture begins with the root's place and quaternion.
+    """
+
+    def __init__(self, folder: Path, name: str) -> None:
+        """Read a problem, such as "clutter/0007", of an export.
+
+        Raises:
+            FileFormatError: a file is missing or is none of an export.
+        """
+        path = folder / "problems" / f"{name}.json"
+        self.content = read_json(path, "problem")
+        body = read_body(folder, str(self.content["body"]))
+        self.model, self.moving, self.free = body.model, "frames" in self.content, body.content["root"] == "free"
+        self._body = body.content
+        self._data = self.model.createData()
+        pieces = [_piece(body, item, shape) for item, shape in zip(self._body["pieces"], body.shapes, strict=True)]
+        pieces += [_piece(body, item, _shape(folder, item["shape"])) for item in self.content["things"]]
+        self._geometry = pin.GeometryModel()
+        for piece in pieces:
+            self._geometry.addGeometryObject(piece)
+        self._required = self._pairs(path)
+        self._results = pin.GeometryData(self._geometry)
+        weights = self._body["effort_weights"]
+        self._weights = np.zeros(self.model.nv)
+        self._weights[: len(self._body["root_effort_weights"])] = self._body["root_effort_weights"]
+        for joint, weight in weights.items():
+            self._weights[self.model.joints[self.model.getJointId(joint)].idx_v] = weight
+        self._effort_from = np.array(self.content["effort_from"])
+        self._holds = [_Placement(self.model, hold) for hold in self.content["holds"]]
+
+    def seed(self, name: str) -> Array:
+        """The posture (nq,) from which a solver begins: "near" or "far"."""
+        return np.array(self.content["seeds"][name])
+
+    @property
+    def frames(self) -> int:
+        """How many postures an answer has."""
+        return len(self.content["frames"]) if self.moving else 1
+
+    def score(self, q: Array, frame: int = 0) -> Score:
+        """Judge a posture (nq,); of a problem whose goals move, for the goals of one frame."""
+        model, data = self.model, self._data
+        pin.forwardKinematics(model, data, q)
+        pin.updateFramePlacements(model, data)
+        goals = self.content["frames"][frame] if self.moving else self.content["goals"]
+        errors = [_error(model, data, goal) for goal in goals]
+        held = [value for hold in self._holds for value in hold.error(data)]
+        held += [value for balance in self.content["balance"] for value in self._balance(balance, q)]
+        distance = self._distances(q)
+        return Score(
+            goal_error=max((error[0] for error in errors), default=0.0),
+            goal_angle=max((error[1] for error in errors), default=0.0),
+            overlap=max(0.0, float(-distance.min(initial=0.0))),
+            clearance=max(0.0, float((self._required - distance).max(initial=0.0))),
+            limits=self._beyond(q),
+            holds=max(held, default=0.0),
+            effort=float(self._weights @ pin.difference(self.model, self._effort_from, q) ** 2),
+        )
+
+    def _pairs(self, path: Path) -> Array:
+        """Add all pairs that are tested, and return the least distance of each (pairs,) [m]."""
+        number = {piece.name: k for k, piece in enumerate(self._geometry.geometryObjects)}
+        if len(number) < self._geometry.ngeoms:
+            raise FileFormatError(f"{path}: two pieces have one name; export the problems again")
+        own = len(self._body["pieces"])
+        things = self.content["things"]
+        chosen = [(number[a], number[b]) for a, b in self._body["pairs"]]
+        untested = {frozenset(pair) for pair in self.content["untested"]}
+        names = [piece.name for piece in self._geometry.geometryObjects]
+        for second in range(own, len(names)):
+            for first in range(second):
+                carried = first >= own and things[first - own]["link"] is not None
+                if first >= own and carried == (things[second - own]["link"] is not None):
+                    continue
+                if frozenset((names[first], names[second])) not in untested:
+                    chosen.append((first, second))
+        asked = self.content["clearance"]
+        other = {frozenset((a, b)): least for a, b, least in asked["except"]}
+        for first, second in chosen:
+            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        return np.array([other.get(frozenset((names[a], names[b])), asked["every_pair"]) for a, b in chosen])
+
+    def _distances(self, q: Array) -> Array:
+        pin.updateGeometryPlacements(self.model, self._data, self._geometry, self._results, q)
+        pin.computeDistances(self._geometry, self._results)
+        return np.array([result.min_distance for result in self._results.distanceResults], dtype=float)
+
+    def _balance(self, balance: Mapping[str, Any], q: Array) -> Array:
+        place = pin.centerOfMass(self.model, self._data, q)[:2]
+        inside = np.array(balance["normals"]) @ place - np.array(balance["offsets"])
+        return np.asarray(np.maximum(balance["margin"] - inside, 0.0))
+
+    def _beyond(self, q: Array) -> float:
+        limits = self._body["limits"]
+        worst = 0.0
+        for value, name in zip(q, self._body["coordinates"], strict=True):
+            low, high = limits.get(name, (-np.inf, np.inf))
+            worst = max(worst, low - value, value - high)
+        return float(worst)
+
+
+class _Placement:
+    """A frame at a placement, in the world or in another frame."""
+
+    def __init__(self, model: pin.Model, stated: Mapping[str, Any]) -> None:
+        self._frame = _frame(model, stated["frame"])
+        self._base = None if stated["in"] is None else _frame(model, stated["in"])
+        self._position = np.array(stated["position"])
+        turn = stated["quaternion"]
+        self._turn = None if turn is None else pin.Quaternion(np.array(turn)).toRotationMatrix()
+
+    def error(self, data: pin.Data) -> tuple[float, float]:
+        """Distance [m] and angle [rad] from where it belongs."""
+        place = data.oMf[self._frame]
+        if self._base is not None:
+            place = data.oMf[self._base].actInv(place)
+        angle = 0.0
+        if self._turn is not None:
+            angle = float(np.linalg.norm(pin.log3(place.rotation @ self._turn.T)))
+        return float(np.linalg.norm(place.translation - self._position)), angle
+
+
+def _error(model: pin.Model, data: pin.Data, goal: Mapping[str, Any]) -> tuple[float, float]:
+    if goal["type"] == "placement":
+        return _Placement(model, goal).error(data)
+    place = data.oMf[_frame(model, goal["frame"])]
+    way = np.array(goal["toward"]) - place.translation
+    axis = place.rotation @ np.array(goal["axis"])
+    return 0.0, float(np.arctan2(np.linalg.norm(np.cross(axis, way)), axis @ way))
+
+
+def _frame(model: pin.Model, link: str) -> int:
+    found = model.getFrameId(link, pin.FrameType.BODY)
+    if found >= model.nframes:
+        raise FileFormatError(f"the body {model.name} has no link {link!r}; export the problems again")
+    return int(found)
+
+
+@lru_cache(maxsize=4)
+def read_body(folder: Path, path: str) -> Body:
+    """Read a body of an export; its JSON file names its URDF.
+
+    Raises:
+        FileFormatError: a file is missing or is none of an export.
+    """
+    content = read_json(folder / path, "body")
+    urdf = folder / str(content["urdf"])
+    text = read_text(urdf, "URDF")
+    try:
+        free = content["root"] == "free"
+        model = pin.buildModelFromXML(text, pin.JointModelFreeFlyer()) if free else pin.buildModelFromXML(text)
+    except (ValueError, RuntimeError) as error:
+        raise FileFormatError(f"{urdf}: Pinocchio cannot read it ({error}); export the problems again") from None
+    if model.nq != len(content["coordinates"]):
+        raise FileFormatError(f"{urdf}: it has {model.nq} coordinates, and {path} names {len(content['coordinates'])}")
+    return Body(model, content, tuple(_shape(folder, item["shape"]) for item in content["pieces"]))
+
+
+def _piece(body: Body, item: Mapping[str, Any], shape: Any) -> pin.GeometryObject:
+    place = pin.XYZQUATToSE3(np.array(item["pose"]))
+    if item["link"] is None:
+        return pin.GeometryObject(item["name"], 0, 0, place, shape)
+    frame = _frame(body.model, item["link"])
+    link = body.model.frames[frame]
+    return pin.GeometryObject(item["name"], link.parentJoint, frame, link.placement * place, shape)
+
+
+def _shape(folder: Path, stated: Mapping[str, Any]) -> Any:
+    kind = stated["type"]
+    if kind == "box":
+        return coal.Box(*stated["size"])
+    if kind == "sphere":
+        return coal.Sphere(stated["radius"])
+    if kind == "capsule":
+        return coal.Capsule(stated["radius"], stated["length"])
+    if kind == "ellipsoid":
+        return coal.Ellipsoid(*stated["semi_axes"])
+    if kind == "half-space":
+        return coal.Halfspace(np.array(stated["normal"]), stated["offset"])
+    return _convex(folder / stated["mesh"])
+
+
+def _convex(path: Path) -> Any:
+    points, faces = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
+    for line in read_text(path, "mesh").splitlines():
+        kind, *values = line.split() or [""]
+        if kind == "v":
+            points.append(np.array([float(value) for value in values]))
+        elif kind == "f":
+            faces.append(coal.Triangle(*(int(value) - 1 for value in values)))
+    return coal.Convex(points, faces)
+
+
+def worst_of(scores: Sequence[Score]) -> Score:
+    """The worst of several frames, figure by figure; the effort is the last one's."""
+    worst = {name: max(getattr(score, name) for score in scores) for name in Score.__dataclass_fields__}
+    return Score(**{**worst, "effort": scores[-1].effort})

@@ -1,0 +1,63 @@
+"""What a descent looks at and answers: a posture with its linearisation, a step with its prediction, and the end."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.geometry.continuous.moved_pairs import QueryResult
+from wholebody.methods.qp.funnel import PredictedReduction
+from wholebody.methods.qp.multipliers import Multipliers
+from wholebody.methods.qp.subproblem import Rows, Violation
+from wholebody.methods.qp.tangential import Parts
+from wholebody.terms.linearisation import Linearisation
+
+
+class LocalSolution(NamedTuple):
+    """Where a descent ended.
+
+    Attributes:
+        q: (nq,) posture.
+        violation: what is left there.
+        measure: weighted sum of the measures.
+        converged: whether it ended because nothing better is near, rather than out of iterations.
+        iterations: how many programs were solved.
+    """
+
+    q: Array
+    violation: Violation
+    measure: float
+    converged: bool
+    iterations: int
+
+
+class Iterate(NamedTuple):
+    """A posture that was looked at, and the longest entry of the step that led there, radians or metres."""
+
+    at: Linearisation
+    rows: Rows
+    violation: Violation
+    placed: QueryResult
+    longest: float = np.inf
+
+
+class Step(NamedTuple):
+    """What a program says about the way from a posture.
+
+    Attributes:
+        dq: (nv,) the step: the program's answer, or its normal part where the measures have nothing to gain.
+        parts: the answer's parts; None far from the goals, and where measures do not count.
+        flat: whether the tangential part saves less of the measures than counts.
+        answer: (nv,) the program's answer.
+        predicted: what the step is to bring.
+        multipliers: of the program; None as for the parts.
+    """
+
+    dq: Array
+    parts: Parts | None
+    flat: bool
+    answer: Array
+    predicted: PredictedReduction
+    multipliers: Multipliers | None

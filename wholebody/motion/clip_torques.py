@@ -1,0 +1,263 @@
+"""Torques of a clip: inverse dynamics, forces of the ground on feet that stand, centre of pressure, strength."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
+from wholebody.base.errors import InputError
+from wholebody.figures.figure import Figure
+from wholebody.motion.clip import Clip
+from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
+from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import FEET
+from wholebody.motion.strength import Strength, torque_limits
+
+CUTOFF = 6.0
+"""Hz: noise of recordings lies above, most of walking below (D. A. Winter, "Biomechanics and motor control of human
+movement", chapter 2.2.4: 4 to 6 Hz for walking)."""
+
+ORDER = 2
+"""Of the Butterworth filter; it runs forward and backward, so without delay and with twice this order (Winter)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Torques:
+    """Torques of a clip, frame by frame; nothing in it is NaN.
+
+    Attributes:
+        figure: the figure.
+        dt: seconds from frame to frame.
+        torque: (n, nv) torque of each joint, N m (force of sliding joints, N), after the ground's forces; positive
+            towards positive angles. The six columns of a free root hold what is missing (see there).
+        feet: names of the feet.
+        force: (n, feet, 3) force of the ground on each foot, N, in the world. It acts on the foot's segment; the
+            joint of the toes bears nothing.
+        moment: (n, feet, 3) moment of the ground on each foot about its centre of pressure, N m, in the world.
+        pressure: (n, feet, 3) centre of pressure of each foot, metres; zero where the foot bears nothing.
+        center_of_pressure: (n, 3) of both feet together, metres; zero where nothing bears.
+        stands: (n, feet) whether each foot stands in the frame.
+        missing: (n, 6) what the ground cannot give of the wrench that the motion needs: force, N, and moment about the
+            centre of mass, N m, in the world. Zero for a motion that is possible on these feet.
+        outside: (n,) by how far the zero moment point of the motion is outside of the support polygon, metres; 0
+            inside, where no foot stands, and in frames that press with less than a fifth of the weight.
+        lower: (nv,) least torque of each joint, N m: published strength of a person, effort limits of a robot; -inf
+            where none is known.
+        upper: (nv,) largest torque of each joint, N m; inf where none is known.
+    """
+
+    figure: Figure
+    dt: float
+    torque: Array = field(repr=False)
+    feet: tuple[str, ...]
+    force: Array = field(repr=False)
+    moment: Array = field(repr=False)
+    pressure: Array = field(repr=False)
+    center_of_pressure: Array = field(repr=False)
+    stands: Mask = field(repr=False)
+    missing: Array = field(repr=False)
+    outside: Array = field(repr=False)
+    lower: Array = field(repr=False)
+    upper: Array = field(repr=False)
+
+    @property
+    def supported(self) -> Mask:
+        """(n,) whether a foot stands in the frame."""
+        return np.asarray(self.stands.any(axis=1))
+
+    @property
+    def share(self) -> Array:
+        """(n, nv) torque as a share of the strength in its direction; more than 1 is more than the person can."""
+        limit = np.where(self.torque >= 0.0, self.upper, -self.lower)
+        found: Array = np.abs(self.torque) / limit
+        return found
+
+    @property
+    def largest_share(self) -> float:
+        """The largest `share` of any joint in any frame."""
+        return float(self.share.max(initial=0.0))
+
+    @property
+    def beyond(self) -> Mask:
+        """(n,) frames in which a joint needs more than its strength."""
+        return np.asarray((self.share > 1.0).any(axis=1))
+
+    def largest(self) -> dict[str, float]:
+        """Largest absolute torque of each joint over the clip, N m, by name."""
+        peaks = np.abs(self.torque).max(axis=0)
+        found = {}
+        for name in self.figure.joints:
+            joint = self.figure.model.joints[self.figure.joint_id(name)]
+            found[name] = float(peaks[joint.idx_v : joint.idx_v + joint.nv].max())
+        return found
+
+    def joint_of(self, column: int) -> str:
+        """Name of the joint of a column of `torque`.
+
+        Raises:
+            InputError: there is no such column.
+        """
+        column = checks.whole(column, "column", 0, self.figure.model.nv - 1)
+        for name in self.figure.joints:
+            joint = self.figure.model.joints[self.figure.joint_id(name)]
+            if joint.idx_v <= column < joint.idx_v + joint.nv:
+                return name
+        return "root"
+
+    def __str__(self) -> str:
+        """Three lines: the joint nearest to its strength, what the ground cannot give, and how many frames stand."""
+        share = self.share
+        frame, column = (int(k) for k in np.unravel_index(np.argmax(share), share.shape))
+        first = "no joint has a known strength"
+        if np.isfinite(self.lower).any():
+            first = (
+                f"{self.joint_of(column)} needs {abs(self.torque[frame, column]):.0f} N m, {share[frame, column]:.0%} "
+                f"of its strength, at {frame * self.dt:.2f} s; {int(self.beyond.sum())} of {len(self.torque)} frames "
+                "need more than the strength of a joint"
+            )
+        force, moment = (np.linalg.norm(part, axis=1) for part in (self.missing[:, :3], self.missing[:, 3:]))
+        return (
+            f"{first}\nthe ground cannot give up to {force.max():.0f} N and {moment.max():.0f} N m (median "
+            f"{np.median(force):.0f} N, {np.median(moment):.0f} N m)\na foot stands in {int(self.supported.sum())} of "
+            f"{len(self.torque)} frames"
+        )
+
+
+def torques(
+    clip: Clip,
+    *,
+    feet: Sequence[str] = FEET,
+    strength: Strength | None = None,
+    friction: float = 0.8,
+    cutoff: float | None = CUTOFF,
+) -> Torques:
+    """Torques of a clip by inverse dynamics (recursive Newton-Euler, Featherstone 2008, chapter 5; `pin.rnea`).
+
+    A figure with a free root stands on feet: the wrench that its motion needs at the root is split over the corners
+    of the soles of the feet that stand, on level ground and with friction, and acts on the joints from there. In flight
+    the ground gives nothing.
+
+    Args:
+        clip: the motion.
+        feet: segments that may stand; the figure's own of these. A foot stands while its heel, ball or tip of the toes
+            is low and slow; without frames of such names, while its own frame is.
+        strength: of the person, for `lower`, `upper` and `share`; a man of median strength if left out. For figures
+            whose joints have no published strength, such as robots, the effort limits of their descriptions count.
+        friction: coefficient of friction of the ground.
+        cutoff: Hz of the low-pass filter (Butterworth, zero lag) that takes the noise of recordings out before
+            differences amplify it; None for none. It is not used where the frame rate is less than four times of it.
+
+    Raises:
+        UnknownNameError: the figure has no such foot.
+        InputError: something else than a clip, a value out of range, or a figure without mass or feet.
+    """
+    clip = checks.instance(clip, Clip, "torques: clip", "read one with wb.read_clip(path, figure)")
+    friction = checks.number(friction, "torques: friction", 1e-3, 100.0)
+    if cutoff is not None:
+        cutoff = checks.number(cutoff, "torques: cutoff", 1e-3, 1e6, "Hz")
+    strength = (
+        Strength()
+        if strength is None
+        else checks.instance(
+            strength, Strength, "torques: strength", "give wb.motion.Strength(percentile=50, sex='female')"
+        )
+    )
+    figure = clip.figure
+    if feet is FEET:
+        feet = [name for name in FEET if name in figure.segments]
+    feet = checks.listed(feet, "torques: feet", "['left_foot', 'right_foot']")
+    for name in feet:
+        figure.frame_id(name)
+    if not sum(inertia.mass for inertia in figure.model.inertias[1:]) > 0.0:
+        raise InputError(f"torques: {figure.name} has no mass; give its segments masses")
+    return clip_torques(clip, standing_feet(clip, feet), strength, friction, cutoff)
+
+
+def clip_torques(
+    clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
+) -> Torques:
+    """Torques of a clip that stands on given feet in given frames; see `torques`.
+
+    Args:
+        clip: the motion.
+        stands: foot -> (n,) frames in which it stands.
+        strength: of the person.
+        friction: coefficient.
+        cutoff: Hz, or None.
+    """
+    figure, steady = clip.figure, smoothed(clip, cutoff)
+    v, a = steady.velocities(), steady.accelerations()
+    dynamics = InverseDynamics(figure, tuple(stands), friction)
+    count, nv = len(clip), figure.model.nv
+    torque, missing = np.zeros((count, nv)), np.zeros((count, ROOT))
+    force, moment, pressure = (np.zeros((count, len(stands), 3)) for _ in range(3))
+    both, outside = np.zeros((count, 3)), np.zeros(count)
+    marks: Mask = np.array(list(stands.values()), dtype=bool).reshape(len(stands), count).T
+    for k in range(count):
+        stand = dynamics.stand(steady.q[k], marks[k].tolist())
+        loads = dynamics.loads(steady.q[k], v[k], a[k], stand)
+        torque[k] = loads.torque
+        if not dynamics.free:
+            continue
+        forces = loads.ground.forces
+        missing[k] = loads.ground.missing
+        for foot, total in enumerate(foot_wrenches(forces, stand, dynamics.soles)):
+            mine = stand.owner == foot
+            force[k, foot] = total[:3]
+            pressure[k, foot] = _pressure(forces[mine], stand.points[mine])
+            moment[k, foot] = total[3:] - np.cross(pressure[k, foot], total[:3])
+        both[k] = _pressure(forces, stand.points)
+        outside[k] = dynamics.outside(loads, stand)
+    lower, upper = torque_limits(figure, strength)
+    return Torques(
+        figure, clip.dt, torque, tuple(stands), force, moment, pressure, both, marks, missing, outside, lower, upper
+    )
+
+
+def smoothed(clip: Clip, cutoff: float | None = CUTOFF) -> Clip:
+    """The clip without what is faster than a cutoff frequency, Hz: Butterworth, forward and backward (Winter).
+
+    Postures are filtered value by value; quaternions are made continuous before and of unit length after. Ends are
+    extended by reflection through the end point. A clip whose frame rate is less than four times the cutoff, or of one
+    frame, stays as it is.
+    """
+    rate = 1.0 / clip.dt
+    if cutoff is None or rate < 4.0 * cutoff:
+        return clip
+    from scipy.signal import butter, sosfiltfilt  # it loads scipy.stats, which takes longer than a short clip
+
+    sections = butter(ORDER, cutoff, fs=rate, output="sos")
+    reach = min(len(clip) - 1, int(np.ceil(3.0 * rate / cutoff)))
+    if reach < 1:
+        return clip
+    q = _continuous(clip)
+    return clip.with_q(_unit(clip.figure, sosfiltfilt(sections, q, axis=0, padtype="odd", padlen=reach)))
+
+
+def _continuous(clip: Clip) -> Array:
+    """Postures whose quaternions do not change sign from frame to frame."""
+    q: Array = clip.q.copy()
+    for joint in clip.figure.model.joints:
+        if joint.nq in (4, 7) and joint.nv in (3, 6):
+            part = q[:, joint.idx_q + joint.nq - 4 : joint.idx_q + joint.nq]
+            turns = np.sign(np.einsum("ij,ij->i", part[1:], part[:-1]))
+            part[1:] *= np.cumprod(np.where(turns < 0.0, -1.0, 1.0))[:, None]
+    return q
+
+
+def _unit(figure: Figure, q: Array) -> Array:
+    return np.array([pin.normalize(figure.model, posture) for posture in q])
+
+
+def _pressure(forces: Array, points: Array) -> Array:
+    """Centre of pressure (3,) of forces on points: weighted by their vertical components; zero without load."""
+    load = float(forces[:, 2].sum())
+    if load <= 0.0:
+        return np.zeros(3)
+    found: Array = forces[:, 2] @ points / load
+    return found
