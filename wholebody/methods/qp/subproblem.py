@@ -17,7 +17,8 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.problem import Problem
-from wholebody.terms.linearisation import Linearisation, TermPlanes
+from wholebody.terms.linearisation import Linearisation
+from wholebody.terms.planes import TermPlanes
 
 PROXIMAL_SHARE = 0.01  # share of the curvature left where measures do not count: they still say which joints move
 GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
