@@ -278,6 +278,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Contacts.nearer", Call(near.nearer, {"distance": 0.5})
     yield "Contacts.nearest_first", Call(near.nearest_first, {})
     yield "Scene.penetration", Call(there.penetration, {"q": q})
+    yield "Scene.overlapping", Call(there.overlapping, {"q": q})
     yield "Scene.borrow", Call(there.borrow, {})
     yield "Scene.workspace", Call(there.workspace, {})
     yield "Scene.remove", Call(lambda **given: scene(path).remove(**given), {"name": "ball"})
@@ -686,6 +687,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     kept = wb.studies.Records([wb.studies.SolveRecord("a")])
     yield "Records.counts", Call(kept.counts, {})
     yield "Records.first_without_answer", Call(kept.first_without_answer, {})
+    yield "Records.from_neighbours_in_words", Call(kept.from_neighbours_in_words, {})
     yield "Records.rows", Call(kept.rows, {})
     yield "Records.chart", Call(kept.chart, {"path": path / "records.png"})
     yield "Records.to_csv", Call(kept.to_csv, {"path": path / "records.csv"})
@@ -841,7 +843,7 @@ ANSWERS = (
     "Torques", "SphereFilling", "AssemblySolution", "AssemblyStep",
     "SolveRecord", "SolveRecord.of", "SolveRecord.row", "SolveRecord.as_json", "SolveRecord.from_json", "SolveProgress",
     "Records.to_parquet", "ReachMap", "Accommodation", "Ergonomics", "BodyAngles", "Rula", "Reba", "StaticTorques",
-    "Sight", "Result",
+    "Sight", "Result", "Contacts.joined",
     "Scene.of_parts", "ClipCheck", "DerivativeCheck", "Beyond", "Avoided", "AvoidanceReport", "Contact", "Sliding",
     "Deviation",
     "Torques", "SphereFilling",
@@ -869,6 +871,11 @@ DERIVATIVES = (
     "rows",
     "dense_jacobian",
     "wrench_jacobian",
+    "supporting_planes",
+    "nearest_points",
+    "placed",
+    "bounded",
+    "warn_of_angles",
 )
 """What problems and methods, not people, ask of terms and states; at every posture, which is too often for checks."""
 

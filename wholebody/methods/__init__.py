@@ -12,15 +12,19 @@ if TYPE_CHECKING:
     from wholebody.methods.damped_least_squares import DampedLeastSquares
     from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
     from wholebody.methods.newton.assembly_solution import AssemblySolution
+    from wholebody.methods.newton.method import Newton
     from wholebody.methods.placo.method import Placo
+    from wholebody.methods.qp.method import QP
 
 __all__ = [
     "CCD",
     "EXTRAS",
     "METHODS",
+    "QP",
     "AssemblyConstraint",
     "AssemblySolution",
     "DampedLeastSquares",
+    "Newton",
     "Placo",
     "installed_methods",
 ]
@@ -44,6 +48,8 @@ __getattr__, _ = exported(
         "wholebody.methods.damped_least_squares": "DampedLeastSquares",
         "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
         "wholebody.methods.newton.assembly_solution": "AssemblySolution",
+        "wholebody.methods.newton.method": "Newton",
         "wholebody.methods.placo.method": "Placo",
+        "wholebody.methods.qp.method": "QP",
     },
 )

@@ -7,8 +7,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-import wholebody
-from wholebody import tasks
+from wholebody import methods, tasks
 from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TOLERANCE, Range
 from wholebody.taskfile import kinds
 from wholebody.taskfile.kinds import DIRECTION, FRAME, PLACEMENT, POSITION, QUATERNION, WEIGHT, Number
@@ -240,8 +239,8 @@ MEASURES = {
 
 
 def _later(name: str) -> Callable[..., Any]:
-    """A method by its public name, imported only when it is made."""
-    return lambda **settings: getattr(wholebody, name)(**settings)
+    """A method by its name in `wb.methods`, imported only when it is made."""
+    return lambda **settings: getattr(methods, name)(**settings)
 
 
 METHODS = {
