@@ -16,7 +16,7 @@ from wholebody.bench.report import TEMPLATES, formatted, groups, quantile, rende
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
 def test_every_template_can_be_read(path: Path) -> None:
-    assert report._environment().get_template(path.name).name == path.name
+    assert report._environment(TEMPLATES).get_template(path.name).name == path.name
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.glob("*.md.jinja")), ids=lambda path: path.name)
@@ -29,21 +29,20 @@ def test_a_table_has_a_rule_for_every_column(path: Path) -> None:
 
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr(report, "TEMPLATES", tmp_path)
     monkeypatch.setattr(report, "_environment", report._environment.__wrapped__)
     return tmp_path
 
 
 def test_empty_lines_beside_each_other_become_one(folder: Path) -> None:
     (folder / "some.md.jinja").write_text("\n\n{% for k in counts %}\n- {{ k }}\n{% endfor %}\n\n\n\n{{ text }}  \n\n")
-    assert render("some.md", counts=[1, 2], text="end") == "- 1\n- 2\n\nend"
+    assert render("some.md", folder, counts=[1, 2], text="end") == "- 1\n- 2\n\nend"
 
 
 def test_a_name_without_a_value_is_an_error_and_pages_are_escaped(folder: Path) -> None:
     (folder / "some.html.jinja").write_text("<p>{{ text }}</p>")
-    assert render("some.html", text="<goals>") == "<p>&lt;goals&gt;</p>"
+    assert render("some.html", folder, text="<goals>") == "<p>&lt;goals&gt;</p>"
     with pytest.raises(jinja2.UndefinedError, match="text"):
-        render("some.html")
+        render("some.html", folder)
 
 
 def test_numbers_that_are_not_finite_are_left_out() -> None:

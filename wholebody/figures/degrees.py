@@ -24,7 +24,8 @@ class Turning:
 
     def __init__(self, model: Any) -> None:
         """Look them up; a joint without a limit has two turns as its limit here."""
-        joints = [(j, n) for j, n in zip(model.joints, model.names, strict=True) if j.id and j.nq == j.nv == 1]
+        every = list(zip(model.joints, model.names, strict=True))[1:]  # but the world's, whose numbers are not set
+        joints = [(j, n) for j, n in every if j.nq == j.nv == 1]
         found = [(j.idx_q, str(name)) for j, name in joints if not j.shortname().startswith(SLIDING)]
         self._places = np.array([place for place, _ in found], dtype=np.intp)
         self._names = [name for _, name in found]
