@@ -13,7 +13,7 @@ from wholebody import InputError
 
 METHODS = (wb.QP, wb.methods.CCD, wb.Newton, wb.methods.Placo, wb.methods.DampedLeastSquares)
 NO_NUMBER = (None, "x", "1", math.nan, math.inf, -math.inf, True, 1j, [], [1], {}, object(), 10**400, 10**5000, -1)
-WHOLE = ("iterations", "budget", "restarts", "seed")
+WHOLE = ("iterations", "budget", "restarts", "restarts_for_measure", "seed")
 REAL = ("tolerance", "damping")
 
 

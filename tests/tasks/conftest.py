@@ -32,6 +32,9 @@ class StandInFigure:
         )
         self.cones: dict[str, Any] = {}
 
+    def warn_of_angles(self, q: Any, what: str) -> bool:
+        return False
+
     def frame_id(self, name: str) -> int:
         if not self.model.existFrame(name):
             raise UnknownNameError("frame", name, [frame.name for frame in self.model.frames])

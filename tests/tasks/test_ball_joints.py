@@ -170,11 +170,11 @@ def test_another_order_of_axes_would_be_farther_from_singular(scene: wb.Scene, a
     assert abs(raised[1, 0]) == pytest.approx(0.0, abs=1e-9)
 
 
-def test_in_everyday_tasks_the_sum_differs_by_a_twentieth(scene: wb.Scene) -> None:
+def test_in_everyday_tasks_the_sum_differs_by_an_eighth(scene: wb.Scene) -> None:
     figure = scene.figure
     for name, made in human_tasks.tasks(figure).items():
         problem = made()
         q = wb.solve(problem).q
         pairs = np.array([both(figure, q, problem.start, ball) for ball in BALLS])
         effort = wb.Effort().resolve(problem.scene, problem.start).value(State(problem.scene.model).update(q))
-        assert abs(pairs[:, 0].sum() - pairs[:, 1].sum()) < 0.05 * effort, name
+        assert abs(pairs[:, 0].sum() - pairs[:, 1].sum()) < 0.125 * effort, name

@@ -15,6 +15,7 @@ from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a, flag, instance, listed, shown
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
 from wholebody.motion.checking import ClipCheck, check
@@ -24,7 +25,6 @@ from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.load_change import LoadChange, load_change
 from wholebody.motion.motion_bounds import MotionBounds, excess, resolved
-from wholebody.motion.smoothing import smoothed
 from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
@@ -238,11 +238,13 @@ def avoid(
     report = _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
     # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
     if report.rough and result.times is None and strong is None and not watch.ended:
+        from wholebody.motion.smoothing import smoothed  # it loads scipy.sparse
+
         began = time.perf_counter()
         with ctrl_c_ends_all():
             found = smoothed(clip, result.q, asked, terms, chosen.clearance, watch)
         seconds += time.perf_counter() - began
-        smooth = result._replace(q=found.q, programs=result.programs + found.programs)
+        smooth = with_values(result, q=found.q, programs=result.programs + found.programs)
         other = _report(was, clip.with_q(smooth.q), terms, smooth, chosen.name, asked, None)
         if found.windows and (other.solved or other.rough):
             result, report = smooth, replace(other, smoothed=found.windows)

@@ -13,6 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
@@ -106,7 +107,7 @@ class Gap(NamedTuple):
         found = [*faces_met(self.first, self.second, near.pieces, state)]
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
         joints = [(near.against, near.joint)] * len(found)
-        found += [plane._replace(key=plane.key + MOST_FACES) for plane in back]
+        found += [with_values(plane, key=plane.key + MOST_FACES) for plane in back]
         joints += [(near.joint, near.against)] * (len(found) - len(joints))
         wrench = np.vstack([np.zeros((0, 6)), *(through(plane.point, plane.normal[None]) for plane in found)])
         of, against = np.array(joints, dtype=np.intp).reshape(-1, 2).T
@@ -310,7 +311,7 @@ def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
     """Planes of values (k,) that are to be at most zero, with their derivative (k, nv); without those far beyond."""
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
     none = no_planes(jacobian.shape[1])
-    return none._replace(value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))
+    return with_values(none, value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))
 
 
 def no_planes(nv: int) -> SupportingPlanes:
@@ -326,7 +327,7 @@ def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
     for number, part in enumerate(parts):
         if isinstance(part, Bounded):
             planes = part.planes(state)
-            found.append(planes._replace(key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
+            found.append(with_values(planes, key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
         row += len(part.in_radians)
     return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 

@@ -222,7 +222,7 @@ def test_a_wrong_derivative_is_named() -> None:
         made.constrain(Rope("post", "cat", 0.5))
     with pytest.raises(InputError, match="name at least one body, and each once"):
         made.constrain(Rope("dog", "dog", 0.5))
-    with pytest.raises(InputError, match=r"wb\.AssemblyConstraint"):
+    with pytest.raises(InputError, match=r"wb\.methods\.AssemblyConstraint"):
         made.constrain("rope")  # type: ignore[arg-type]
 
 

@@ -70,8 +70,9 @@ class QuadraticProgram:
         with np.errstate(all="ignore"):
             curvature = self.diagonal + self.weight @ self.rows**2 + self.elastic_weight @ self.elastic**2
             targets = self.weight @ self.target**2 + self.elastic_weight @ self.least**2
-            sizes = curvature.sum() + targets + self.linear @ self.linear + self.lower @ self.lower
-            largest = sizes + self.upper @ self.upper
+            bounds = np.concatenate([self.lower, self.upper])
+            bounds = bounds[~np.isinf(bounds)]  # one of these may be missing
+            largest = curvature.sum() + targets + self.linear @ self.linear + bounds @ bounds
             least = min(part.min(initial=np.inf) for part in (self.diagonal, self.weight, self.elastic_weight))
             return bool(largest < MOST and least > 0.0 and (self.lower <= self.upper).all())
 

@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import NamedTuple
 
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import LocalSolution
 
@@ -44,4 +45,4 @@ def least_measures(
         if local.violation.worst <= tolerance:
             found.append(local)
     best = sorted(found, key=lambda each: each.measure)[:count]
-    return [local._replace(iterations=spent if place == 0 else 0) for place, local in enumerate(best)]
+    return [with_values(local, iterations=spent if place == 0 else 0) for place, local in enumerate(best)]

@@ -182,7 +182,7 @@ class SQP:
         if planes is None or self._tension is None or not len(planes.bend) or not self._measures:
             return here.at
         pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
-        return here.at._replace(squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
+        return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     @property
     def _pull(self) -> float:

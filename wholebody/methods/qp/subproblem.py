@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.problem import Problem
@@ -103,7 +104,8 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     """
     count = len(planes.value)
     weights = np.append(rows.soft_weight[: rows.goals], HOLD_WEIGHT)
-    return rows._replace(
+    return with_values(
+        rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
         elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
         contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),

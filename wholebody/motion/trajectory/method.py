@@ -11,6 +11,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import listed
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
 from wholebody.motion.clip import Clip
@@ -107,7 +108,7 @@ class Trajectory:
             if new is None:
 
                 def again_with(loads: ClipLoads, time: float) -> ClipRun:
-                    smoother = settings._replace(time=time)
+                    smoother = with_values(settings, time=time)
                     return ClipRun(smoother, terms, workspace, solve, clip.q, self.stretch, loads)
 
                 q, used = self._measured(again_with, terms, workspace, clip.q, q, loads, watch)
@@ -121,7 +122,7 @@ class Trajectory:
             q, left = self._freed(again, slower, workspace, passed, watch, beyond)
 
             def slower_with(loads: ClipLoads, time: float) -> ClipRun:
-                smoother = settings._replace(time=time)
+                smoother = with_values(settings, time=time)
                 return ClipRun(smoother, slower, workspace, solve, passed, 1.0, loads)
 
             q, used = self._measured(slower_with, slower, workspace, passed, q, loads, watch)
