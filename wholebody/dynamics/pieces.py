@@ -100,7 +100,7 @@ class Pieces:
 
     @staticmethod
     def _segment(scene: Scene, piece: int) -> str:
-        return str(scene.model.frames[scene.figure.geometry.geometryObjects[piece].parentFrame].name)
+        return str(scene.model.frames[scene.built.geometry.geometryObjects[piece].parentFrame].name)
 
     def _weigh(self, number: int, known: MassProperties) -> None:
         self.mass[number], self.centre[number], self.inertia[number] = known.mass, known.centre, known.inertia
@@ -139,6 +139,8 @@ class Pieces:
         pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         a, b = self.body[pairs].T
         kept = a != b
+        if scene.figure.outer:
+            kept &= (pairs >= scene.figure.geometry.ngeoms).all(axis=1)  # its own pieces do not meet things
         for names in held_together(scene):
             one, other = (self.index[name] for name in names)
             kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))
