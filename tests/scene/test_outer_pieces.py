@@ -66,3 +66,72 @@ def test_solved_reaches_are_free_by_the_hulls(spheres, hulls, method):
     ]
     assert len(inside) >= len(problems) // 2, [answer.message for answer in answers]
     assert max(inside) < INSIDE
+
+
+def test_a_tracker_keeps_the_hulls_out(spheres, hulls):
+    problem = shelf(spheres, 2)
+    tracker, q, inside = wb.QP().tracker(problem, 0.02), problem.start.copy(), 0.0
+    for _ in range(40):
+        q = tracker.step(q).q
+        inside = max(inside, deepest(hulls, problem.scene.objects.values(), q))
+    assert inside < INSIDE
+
+
+def test_the_assessment_sees_the_hulls(spheres, hulls):
+    """A board is put into the tip of the index finger, which no sphere reaches."""
+    q = spheres.posture(spheres.postures[0])
+    tip = spheres.placement(q, "right_index_tip").translation
+    scene = wb.Scene(spheres).add(wb.Box((0.04, 0.04, 0.02)), name="board", at=tip + [0.0, 0.0, 0.005])
+    judged = wb.assess(wb.Problem(scene), q)
+    assert judged.penetration == pytest.approx(deepest(hulls, scene.objects.values(), q), abs=1e-6)
+    assert judged.penetration > 0.01
+    assert str(judged.blockers[0]) == "right_hand against board"
+    assert scene.penetration(q)[0].depth > 0.01
+
+
+def test_a_body_meets_itself_and_what_it_carries_with_its_spheres(spheres, hulls):
+    scene = wb.Scene(spheres).add(wb.Box((0.1, 0.1, 0.1)), name="box", at=(2.0, 0.0, 0.0))
+    scene.attach(wb.Box((0.1, 0.1, 0.1)), to="right_hand", name="held", at=(0.0, 0.0, -0.2))
+    count, names = spheres.geometry.ngeoms, scene.piece_owner
+    for first, second in scene.pair_table.pairs.tolist():
+        owners = {names[first], names[second]}
+        outer = [piece for piece in (first, second) if count <= piece < count + len(spheres.outer)]
+        assert bool(outer) == ("box" in owners and "held" not in owners)
+    met = {names[first] for first, second in scene.pair_table.pairs.tolist() if names[second] == "box"}
+    assert met == {piece.name.partition(":")[0] for piece in hulls.geometry.geometryObjects} | {"held"}
+
+
+def test_copies_and_smaller_figures_have_outer_pieces(spheres, hulls):
+    problem = shelf(spheres, 3)
+    small = wb.simplify(problem)
+    q = small.posture(wb.solve(small.problem).q)
+    assert deepest(hulls, problem.scene.objects.values(), q) < INSIDE
+    count = len(problem.scene.pair_table.pairs)
+    for copied in (copy.copy(problem.scene), pickle.loads(pickle.dumps(problem.scene))):
+        assert len(copied.pair_table.pairs) == count
+    reduced = spheres.reduced(["right_arm", "spine"])
+    q = reduced.posture(reduced.postures[0])
+    data, geometry = reduced.model.createData(), pin.GeometryModel()
+    for piece in reduced.outer:
+        geometry.addGeometryObject(piece)
+    placed = geometry.createData()
+    pin.updateGeometryPlacements(reduced.model, data, geometry, placed, q)
+    others = hulls.geometry.createData()
+    pin.updateGeometryPlacements(
+        hulls.model, hulls.model.createData(), hulls.geometry, others, hulls.posture(hulls.postures[0])
+    )
+    lift = placed.oMg[0].translation - others.oMg[0].translation  # a fixed root stays where the model has it
+    for one, other in zip(placed.oMg, others.oMg, strict=True):
+        np.testing.assert_allclose(one.translation - lift, other.translation, atol=1e-9)
+
+
+def test_a_falling_body_meets_the_hulls(spheres, hulls):
+    ends = []
+    for figure in (spheres, hulls):
+        scene = wb.Scene(figure).add(wb.HalfSpace(), name="floor")
+        scene.add(wb.Box((0.1, 0.1, 0.1)), name="cube", at=(0.02, 0.15, 1.9), body=wb.Body(density=300.0))
+        world = wb.World(scene)
+        for _ in range(30):
+            frame = world.step()
+        ends.append(frame.placements["cube"].translation)
+    np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)

@@ -93,7 +93,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         },
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
         person=spec.person,
-        outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" else None,
+        outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
         root_effort=(0.0, 0.0) if sex is None else ROOT_EFFORT,
     )
