@@ -45,13 +45,12 @@ def deepest(hulls, things, q):
     data, placed = hulls.model.createData(), hulls.geometry.createData()
     pin.updateGeometryPlacements(hulls.model, data, hulls.geometry, placed, q)
     found = 0.0
-    for (number, piece), thing in product(enumerate(hulls.geometry.geometryObjects), things):
+    parts = [(part.geometry, thing.placement * part.placement) for thing in things for part in thing.shape.pieces()]
+    for (number, piece), (shape, place) in product(enumerate(hulls.geometry.geometryObjects), parts):
         at = coal.Transform3s(placed.oMg[number].rotation, placed.oMg[number].translation)
-        for part in thing.shape.pieces():
-            place = thing.placement * part.placement
-            there = coal.Transform3s(place.rotation, place.translation)
-            request, result = coal.DistanceRequest(), coal.DistanceResult()
-            found = max(found, -coal.distance(piece.geometry, at, part.geometry, there, request, result))
+        there = coal.Transform3s(place.rotation, place.translation)
+        request, result = coal.DistanceRequest(), coal.DistanceResult()
+        found = max(found, -coal.distance(piece.geometry, at, shape, there, request, result))
     return found
 
 
@@ -86,7 +85,7 @@ def test_the_assessment_sees_the_hulls(spheres, hulls):
     assert judged.penetration == pytest.approx(deepest(hulls, scene.objects.values(), q), abs=1e-6)
     assert judged.penetration > 0.01
     assert str(judged.blockers[0]) == "right_hand against board"
-    assert scene.penetration(q)[0].depth > 0.01
+    assert {(one.a, one.b) for one in scene.penetration(q)} == {("right_hand", "board")}
 
 
 def test_a_body_meets_itself_and_what_it_carries_with_its_spheres(spheres, hulls):
