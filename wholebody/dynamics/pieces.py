@@ -74,10 +74,10 @@ class Pieces:
             InputError: two materials can meet of which neither knows the other, or a thing has a joint to itself.
             UnknownNameError: a joint names a thing that is not there.
         """
-        figure, objects = scene.figure, scene.objects
+        objects = scene.objects
         free = [thing for thing in objects.values() if thing.body is not None]
         fixed = [thing for thing in objects.values() if thing.body is None and thing.segment is None]
-        segments = list(dict.fromkeys(self._segment(scene, k) for k in range(figure.geometry.ngeoms)))
+        segments = [name for name in dict.fromkeys(scene.piece_owner) if name not in objects]
         for thing in objects.values():
             if thing.segment is not None and thing.segment not in segments:
                 segments.append(thing.segment)
@@ -97,10 +97,6 @@ class Pieces:
         for name in segments:
             self._weigh_segment(scene, name)
         self._add_pieces(scene)
-
-    @staticmethod
-    def _segment(scene: Scene, piece: int) -> str:
-        return str(scene.model.frames[scene.figure.geometry.geometryObjects[piece].parentFrame].name)
 
     def _weigh(self, number: int, known: MassProperties) -> None:
         self.mass[number], self.centre[number], self.inertia[number] = known.mass, known.centre, known.inertia
@@ -125,7 +121,7 @@ class Pieces:
                 at = at if thing.segment is None else thing.placement * at
                 made_of.append(thing.material)
             else:
-                owner = self._segment(scene, number)
+                owner = built.owners[number]
                 at = scene.model.frames[scene.frame_id(owner)].placement.actInv(piece.placement)
                 made_of.append(HUMAN)
             pieces.append(pin.GeometryObject(piece.name, 0, 0, pin.SE3.Identity(), piece.geometry))
@@ -139,6 +135,8 @@ class Pieces:
         pairs = pairs[np.lexsort((pairs[:, 1], pairs[:, 0]))]
         a, b = self.body[pairs].T
         kept = a != b
+        if scene.figure.outer:
+            kept &= (pairs >= scene.figure.geometry.ngeoms).all(axis=1)  # its own pieces do not meet things
         for names in held_together(scene):
             one, other = (self.index[name] for name in names)
             kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))

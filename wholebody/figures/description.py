@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.anthropometry import Person
+from wholebody.figures.body_spec import Solid
 from wholebody.figures.motion_ranges import MotionRange
 from wholebody.figures.reach_cones import ReachCone
 
@@ -148,6 +149,8 @@ class Description(NamedTuple):
         root_effort: weight of the root's position [rad^2/m^2] and of its rotation in the effort.
         notes: sentences on what had to be changed about the geometry of a file.
         person: sex, stature and mass of the figure or of the hand's owner; None for a figure of a file.
+        outer: makes the pieces that meet things in the world, on frames of the model, for a figure whose own are too
+            coarse for it; None if its own do.
     """
 
     groups: Mapping[str, tuple[str, ...]]
@@ -163,6 +166,7 @@ class Description(NamedTuple):
     root_effort: tuple[float, float] = (0.0, 0.0)
     notes: tuple[str, ...] = ()
     person: Person | None = None
+    outer: Callable[[], tuple[Solid, ...]] | None = None
 
 
 def limits_of(model: pin.Model) -> Limits:

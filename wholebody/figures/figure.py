@@ -14,6 +14,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.base.records import as_dict
+from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.degrees import Turning, warn_of_turns
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
@@ -82,7 +83,8 @@ class Figure(checks.FixedAttributes):
             "<segment>:<k>".
         visual: the geometry that is drawn: the visuals of a URDF, whose meshes are named by `meshPath` and read when
             they are drawn; otherwise the pieces.
-        detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF.
+        detail: "spheres", "capsules", "hulls", or "own" for the geometry of a URDF. Spheres are too coarse to meet
+            things: `outer` does.
         root: "free" (a floating base) or "fixed".
         groups: group to joint names, without the root.
         chains: limb to its joints from the root outwards, and the frame at its tip.
@@ -133,6 +135,7 @@ class Figure(checks.FixedAttributes):
         )  # 6.5 MB for 55 freedoms, 27 MB for 95: to make one takes milliseconds
         self._description = description
         self._made: dict[str, Array] = {}
+        self._outer: tuple[pin.GeometryObject, ...] | None = None
         first = model.joints[1] if model.njoints > 1 else None
         self.root = "free" if first is not None and first.nq == 7 else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
@@ -168,6 +171,20 @@ class Figure(checks.FixedAttributes):
         for name, values in limits.items():
             setattr(made_from[1], name, np.nan_to_num(values))
         return _with_limits, (made_from, limits), {"loaded_as": self.loaded_as}
+
+    @property
+    def outer(self) -> tuple[pin.GeometryObject, ...]:
+        """The pieces that meet things in the world in place of those of `geometry`; empty if its own pieces do.
+
+        They are not drawn: the fourth number of `meshColor` is 0.
+        """
+        if self._outer is None:
+            solids = () if self._description.outer is None else self._description.outer()
+            made = geometry_of(self.model, solids, ())
+            for piece in made.geometryObjects:
+                piece.name, piece.meshColor = f"{piece.name} (outer)", np.zeros(4)
+            self._outer = tuple(made.geometryObjects)
+        return self._outer
 
     @property
     def joints(self) -> tuple[str, ...]:

@@ -70,6 +70,7 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         root_effort=old.root_effort,
         notes=old.notes,
         person=old.person,
+        outer=old.outer,
     )
     return ReducedParts(small, geometry, visual, description)
 

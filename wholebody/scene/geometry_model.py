@@ -185,14 +185,20 @@ class SceneGeometry:
 
 
 def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tuple[str, str], str]) -> SceneGeometry:
-    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's."""
+    """Geometry model of a figure with things: the figure's pieces first, then carried ones, then the world's.
+
+    A figure with outer pieces has them after its own: they meet what stands in the world, and its own meet the rest.
+    """
     model = figure.model
     pieces = [pin.GeometryObject(piece) for piece in figure.geometry.geometryObjects]
     owners = [model.frames[piece.parentFrame].name for piece in pieces]
     pieces_of: dict[str, list[tuple[int, pin.SE3]]] = {}
-    body = len(pieces)
-
+    own = len(pieces)
     things = sorted(objects, key=lambda item: item.segment is None)
+    for piece in figure.outer if things and things[-1].segment is None else ():
+        pieces.append(pin.GeometryObject(piece))
+        owners.append(model.frames[piece.parentFrame].name)
+    body = len(pieces)
     for thing in things:
         frame = model.frames[figure.frame_id(thing.segment)] if thing.segment is not None else None
         base = frame.placement * thing.placement if frame is not None else thing.placement
@@ -208,7 +214,11 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
     joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
     excluded.update(_leaning(figure, pieces, body, joints, owners, carried))
-    pairs = np.concatenate([_own_pairs(figure), _pairs_of_things(body, joints, owners, excluded)])
+    met = _pairs_of_things(body, joints, owners, excluded)
+    if body > own:
+        outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0
+        met = met[(met[:, 0] >= body) | (outer == standing)]
+    pairs = np.concatenate([_own_pairs(figure), met])
     return SceneGeometry(model, geometry_model(pieces, pairs), tuple(owners), pieces_of, pairs)
 
 
@@ -257,7 +267,7 @@ def _leaning(
     held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
     probe = geometry_model(pieces[: held[-1] + 1])
     for second in held:
-        for first in range(body):
+        for first in range(count):
             if joints[first] != joints[second]:
                 probe.addCollisionPair(pin.CollisionPair(first, second))
     rest = figure.posture(figure.postures[0])

@@ -175,8 +175,9 @@ class Bodies:
         graph.place("/Grid", grid)
 
     def _hidden(self, index: int) -> bool:
-        """Whether a piece is not drawn, because the surface of its body is."""
-        return self.scene.piece_owner[index] in self._owned
+        """Whether a piece is not drawn: the surface of its body is, or it is an outer piece, which has no opacity."""
+        body = self.all[index]
+        return self.scene.piece_owner[index] in self._owned or (body.thing is None and body.color[3] == 0.0)
 
     def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
         """Give a piece the colour of a state, or the patches of the surface on its segment."""
@@ -266,7 +267,7 @@ class Bodies:
 
 def _own_color(piece: Any) -> Color:
     """The colour that a robot's file gives the link of a piece, and otherwise that of figures."""
-    if not piece.overrideMaterial:
+    if not piece.overrideMaterial and piece.meshColor[3] > 0.0:
         return style.FIGURE
     red, green, blue, alpha = (float(part) for part in piece.meshColor)
     return red, green, blue, alpha

@@ -27,6 +27,8 @@ def posture_glb(scene: ViewedScene, q: Array) -> bytes:
     data = State(scene.model).update(q).data
     tree, joints = joint_tree(scene.model, list(data.liMi))
     for piece, body in zip(scene.geometry.geometryObjects, Bodies(scene, (), True).all, strict=True):
+        if body.thing is None and body.color[3] == 0.0:
+            continue  # outer pieces are not drawn
         add_piece(tree, joints, piece, drawn_triangles(piece.geometry), [round(255 * part) for part in body.color])
     return bytes(export_glb(tree))
 

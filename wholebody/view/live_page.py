@@ -100,6 +100,7 @@ class LivePage:
                 self.server.scene.add_mesh_simple(
                     f"/pieces/{number}", np.asarray(mesh.vertices), np.asarray(mesh.faces),
                     color=color, opacity=opacity, cast_shadow=False, receive_shadow=False,
+                    visible=thing is not None or piece.meshColor[3] > 0.0,
                 )
             )  # fmt: skip
         return pieces

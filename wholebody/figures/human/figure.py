@@ -17,7 +17,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees
 from wholebody.figures.human.fingers import EFFORT, finger_angles
 from wholebody.figures.human.pairs import body_pairs, collision_group, sphere_pairs
-from wholebody.figures.human.spec import human_spec
+from wholebody.figures.human.spec import human_solids, human_spec
 from wholebody.figures.motion_ranges import human_ranges
 from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
@@ -44,7 +44,8 @@ def human_figure(
         sex: "male" or "female".
         stature: metres; the median of the sex if left out.
         mass: kilograms; the median, or what is expected at the stature that was given.
-        detail: "spheres" (39, for whole motions), "capsules" (and boxes), "hulls" (convex polyhedra).
+        detail: "spheres" (39, for whole motions; things in the world meet the hulls), "capsules" (and boxes), "hulls"
+            (convex polyhedra).
         percentile: 1 to 99, of the sex in ANSUR II, for stature and mass where they are left out.
         proportions: metres by name of a dimension; the other dimensions follow as they go together in people.
         age: years, 20 to 69: from 45 on some ranges of motion are smaller.
@@ -92,6 +93,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         },
         excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
         person=spec.person,
+        outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
         root_effort=(0.0, 0.0) if sex is None else ROOT_EFFORT,
     )

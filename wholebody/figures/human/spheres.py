@@ -2,8 +2,9 @@
 
 Places and radii leave the least volume of the median man's and woman's capsules and boxes uncovered, and put the least
 outside of them; for other builds the radius grows with the square root of mass per stature. The detail is coarse: the
-hulls of hands come up to 5 cm out of it, of feet 6 cm, of forearms and shanks 3.5 cm, so use another one for reaching.
-To hold the hulls to 5 mm, 39 spheres would have to stand 4 to 10 cm out of them.
+hulls of hands come up to 5 cm out of it, of feet 6 cm, of forearms and shanks 3.5 cm, so things in the world
+meet the hulls instead (`Figure.outer`). To hold the hulls to 5 mm, 39 spheres would have to come 4 to 10 cm out of
+them.
 """
 
 from __future__ import annotations

@@ -114,6 +114,7 @@ class LooseBodies:
     detail = "own"
     postures = ()
     visual = None
+    outer = ()
     name = "assembly"
 
     def __init__(
