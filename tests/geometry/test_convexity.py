@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import trimesh
@@ -79,7 +81,7 @@ def test_a_mesh_that_passes_through_itself_is_told() -> None:
     assert passes_through_itself(*both)
 
 
-def test_little_that_passes_through_itself_gets_little_time(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_little_that_passes_through_itself_gets_little_time(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     asked: list[float] = []
 
     class Waiting:
@@ -92,6 +94,6 @@ def test_little_that_passes_through_itself_gets_little_time(monkeypatch: pytest.
 
     box = trimesh.creation.box((1.0, 2.0, 3.1))
     monkeypatch.setattr("wholebody.base.runner.Child", Waiting)
-    monkeypatch.setenv("WHOLEBODY_CACHE", "/nowhere")
+    monkeypatch.setenv("WHOLEBODY_CACHE", str(tmp_path))
     convex_pieces(np.array(box.vertices)[[0, 1, 2, 3, 4, 5, 7, 6]], box.faces)
     assert asked == [pytest.approx(1.0)]

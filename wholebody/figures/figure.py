@@ -18,13 +18,8 @@ from wholebody.figures.body_spec import geometry_of
 from wholebody.figures.degrees import Turning, warn_of_turns
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
+from wholebody.figures.model_check import LARGEST, check_model
 from wholebody.figures.reduction import reduced_parts
-
-LARGEST = 1e6
-"""Largest value of a joint, radians or metres, and largest tolerance; larger ones are refused as mistakes."""
-
-HEAVIEST = 1e9
-"""Kilograms: greatest mass carried by one joint."""
 
 _LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
 """Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it."""
@@ -35,40 +30,6 @@ def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Fig
     for name, values in limits.items():
         setattr(made_from[1], name, values)
     return Figure(*made_from)
-
-
-def check_model(model: pin.Model, name: str) -> None:
-    """Refuse a model with impossible numbers, which would lead to postures with NaN.
-
-    Args:
-        model: Pinocchio's model.
-        name: of the figure, for the message.
-
-    Raises:
-        InputError: a mass is negative or beyond `HEAVIEST`, a position, an inertia or a limit is not a number, or a
-            lower limit is above the upper one.
-    """
-    for joint in range(1, model.njoints):
-        inertia, at = model.inertias[joint], model.jointPlacements[joint]
-        where = f"{name}, joint {model.names[joint]!r}"
-        if not 0.0 <= inertia.mass <= HEAVIEST:
-            raise InputError(f"{where}: what it carries has a mass of {inertia.mass:g} kg; give 0 to {HEAVIEST:g} kg")
-        for what, values in (("centre of mass", inertia.lever), ("inertia", inertia.inertia)):
-            if not np.isfinite(values).all():
-                raise InputError(f"{where}: the {what} of what it carries is not finite; give finite numbers")
-        if not (np.isfinite(at.rotation).all() and (np.abs(at.translation) <= LARGEST).all()):
-            raise InputError(f"{where}: its origin is not finite or beyond {LARGEST:g} m; give metres")
-    low, high = model.lowerPositionLimit, model.upperPositionLimit
-    wrong = np.flatnonzero(~(low <= high))
-    if len(wrong):
-        joint = next(j for j in model.joints if j.idx_q <= wrong[0] < j.idx_q + j.nq)
-        ends = f"{low[wrong[0]]:g} and {high[wrong[0]]:g}"
-        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its limits are {ends}; give the lower one first")
-    if not (model.velocityLimit >= 0.0).all():
-        wrong = np.flatnonzero(~(model.velocityLimit >= 0.0))
-        joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
-        speed = model.velocityLimit[wrong[0]]
-        raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
 
 
 class Figure(checks.FixedAttributes):
@@ -162,8 +123,9 @@ class Figure(checks.FixedAttributes):
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Return the arguments that it is made from; read-only mappings cannot be pickled."""
+        parts = as_dict(self._description)
         known: dict[str, Any] = {
-            name: dict(part) if isinstance(part, Mapping) else part for name, part in as_dict(self._description).items()
+            name: dict(part) if isinstance(part, Mapping) else part for name, part in parts.items()
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, pin.Model(self.model), self.geometry, self.detail, Description(**known), visual)
