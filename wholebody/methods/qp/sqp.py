@@ -197,7 +197,9 @@ class SQP:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
             multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
-            self._multipliers, self._tension = multipliers, multipliers.net(here.rows)
+            self._multipliers = multipliers
+            if here.at.planes is not None:
+                self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
