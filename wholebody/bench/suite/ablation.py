@@ -208,7 +208,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
-        "Lagrangian in the choice of the best posture": (descent, "_lagrangian", lambda self, here: here.at.measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
         "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
