@@ -22,7 +22,7 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
-from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
+from wholebody.methods.qp.multipliers import multipliers_of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
