@@ -11,7 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
 from wholebody.methods.control import Control
-from wholebody.methods.qp.before_contact import IN_FRONT, before_contact
+from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
 from wholebody.methods.qp.comparison import better, held
 from wholebody.methods.qp.curved_reach import CurvedReach
@@ -132,8 +132,7 @@ class Search:
             self.problem, self.subproblem, self.lineariser, self.solver, self.settings.seed, self.trace, self.control
         ):
             self.spent += local.iterations
-            if local.violation.worst <= IN_FRONT:  # from one that is not in front of its faces little leads to them
-                yield self._feasibility_first(local.q), "from before contact"
+            yield self._feasibility_first(local.q), "from before contact"
             if self.control.spent > FOR_WAYS:
                 return
 
