@@ -13,6 +13,7 @@ import coal
 import numpy as np
 
 from wholebody.base.records import with_values
+from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks.base import filled
 from wholebody.tasks.contact_parts import Gap, Near
 from wholebody.tasks.surfaces import Face, Surface
@@ -47,4 +48,7 @@ def _plane(face: Face, distance: float) -> Surface:
     """The half-space behind a face, moved outwards by a distance; it goes where the thing goes."""
     whole, normal = face.surface, face.axes[2]
     space = coal.Halfspace(normal, float(normal @ face.center) + distance)
-    return with_values(whole, pieces=whole.pieces[:1], joints=whole.joints[:1], shapes=(space,), reach=(np.inf,))
+    return with_values(
+        whole, pieces=whole.pieces[:1], joints=whole.joints[:1], shapes=(space,), reach=(np.inf,),
+        swept=(swept_points(space),),
+    )  # fmt: skip

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
@@ -98,6 +99,13 @@ class Term:
             InputError: a value does not fit the figure.
         """
         return self
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Wrench | Array]:
+        """What `value`, which is the `error` or `value` of this term, and `jacobian` answer.
+
+        A term whose values and derivatives come from one computation overrides this.
+        """
+        return value(state), self.jacobian(state)  # type: ignore[attr-defined]
 
 
 class Goal(Term, ABC):

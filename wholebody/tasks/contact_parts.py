@@ -6,7 +6,7 @@ constraint: the list of a problem in which it stands decides whether it is met i
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
@@ -301,6 +301,11 @@ class ContactTerm(Goal, Constraint):
     def jacobian(self, state: State) -> Array:
         """(m, nv) the derivative."""
         return np.vstack([part.rows(state)[1] for part in self.parts])
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
+        """Both from one search for the nearest points."""
+        values, rows = zip(*(part.rows(state) for part in self.parts), strict=True)
+        return np.concatenate(values), np.vstack(rows)
 
     def supporting_planes(self, state: State) -> SupportingPlanes:
         """Planes of the faces about every gap: past an edge there is no surface left to slide on."""

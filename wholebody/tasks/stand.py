@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import NamedTuple
 
@@ -138,6 +138,12 @@ class Stand(Constraint):
         """(m, nv)."""
         rows = [part.rows(state)[1] for part in self.parts]
         return np.vstack(rows if self.polygon is None else [*rows, self.polygon.rows(state)[1]])
+
+    def value_and_jacobian(self, state: State, value: Callable[[State], Array]) -> tuple[Array, Array]:
+        """Both from one search for the nearest points."""
+        found = [part.rows(state) for part in (*self.parts, *(() if self.polygon is None else (self.polygon,)))]
+        values, rows = zip(*found, strict=True)
+        return np.concatenate(values), np.vstack(rows)
 
     def supporting_planes(self, state: State) -> SupportingPlanes:
         """Planes of the faces about the soles, and the ends of the face that they stand on."""

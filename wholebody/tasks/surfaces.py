@@ -18,7 +18,7 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.figures.link_pieces import drawn_pieces
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.swept_points import SweptPoints, swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings
 
@@ -42,6 +42,7 @@ class Surface(NamedTuple):
         joints: (k,) joint that carries each.
         shapes: (k,) coal's shapes.
         reach: (k,) radius of each about its origin, metres.
+        swept: (k,) their points and flat faces, which take longer to find than what they are asked for.
         fixed: placement of a point in its joint; None for pieces.
     """
 
@@ -52,6 +53,7 @@ class Surface(NamedTuple):
     joints: tuple[int, ...]
     shapes: tuple[Any, ...]
     reach: tuple[float, ...]
+    swept: tuple[SweptPoints, ...]
     fixed: Any = None
 
     def placed(self, number: int, state: State) -> Any:
@@ -130,7 +132,8 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
         rigid = carried_by(scene, name, joint)
         if rigid.pieces:
             return rigid
-    return Surface(name, (), None, (), (joint,), (coal.Sphere(POINT),), (POINT,), frame.placement)
+    ball = coal.Sphere(POINT)
+    return Surface(name, (), None, (), (joint,), (ball,), (POINT,), (swept_points(ball),), frame.placement)
 
 
 def joined(scene: Surroundings, name: str, owners: Iterable[str]) -> Surface:
@@ -154,13 +157,15 @@ def _of_drawn(name: str, joint: int, drawn: Iterable[pin.GeometryObject]) -> Sur
         for solid, placement in drawn_pieces(visual, name):
             made.addGeometryObject(pin.GeometryObject(f"{name}:{made.ngeoms}", joint, placement, solid))
     shapes = tuple(piece.geometry for piece in made.geometryObjects)
-    reach = tuple(float(swept_points(shape).reach) for shape in shapes)
-    return Surface(name, (), made, tuple(range(made.ngeoms)), (joint,) * made.ngeoms, shapes, reach)
+    swept = tuple(swept_points(shape) for shape in shapes)
+    reach = tuple(float(each.reach) for each in swept)
+    return Surface(name, (), made, tuple(range(made.ngeoms)), (joint,) * made.ngeoms, shapes, reach, swept)
 
 
 def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
     pieces = [scene.geometry.geometryObjects[index] for index in indices]
     owners = tuple(dict.fromkeys(scene.piece_owner[index] for index in indices))
+    swept = tuple(swept_points(piece.geometry) for piece in pieces)
     return Surface(
         name,
         owners,
@@ -168,7 +173,8 @@ def _of_pieces(scene: Surroundings, name: str, indices: list[int]) -> Surface:
         tuple(indices),
         tuple(int(piece.parentJoint) for piece in pieces),
         tuple(piece.geometry for piece in pieces),
-        tuple(float(swept_points(piece.geometry).reach) for piece in pieces),
+        tuple(float(each.reach) for each in swept),
+        swept,
     )
 
 
@@ -228,13 +234,13 @@ def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: S
     Faces that another piece of the second surface goes on beyond are no end of it, and are left out.
     """
     i, j = pieces
-    swept = swept_points(second.shapes[j])
+    swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
         return []
     ours, theirs = first.placed(i, state), second.placed(j, state)
     normals = swept.faces[:, :3] @ theirs.rotation.T
     offsets = swept.faces[:, 3] + normals @ theirs.translation
-    points = np.array([_behind(first.shapes[i], ours, normal) for normal in normals])
+    points = np.array([_behind(first, i, ours, normal) for normal in normals])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     found = []
     for key in np.argsort(-values)[:FACES].tolist():
@@ -270,13 +276,13 @@ def _roundness(surface: Surface, number: int) -> float:
     """Radius by which a piece is round [m]; 0 for a point and what has flat faces, the least of an ellipsoid."""
     if surface.fixed is not None:
         return 0.0
-    swept = swept_points(surface.shapes[number])
+    swept = surface.swept[number]
     return float(swept.radius) if len(swept.points) or not np.isfinite(swept.reach) else 0.5 * float(swept.width)
 
 
-def _behind(shape: Any, placement: pin.SE3, normal: Array) -> Array:
+def _behind(surface: Surface, number: int, placement: pin.SE3, normal: Array) -> Array:
     """The point (3,) of a piece that is farthest against a direction (3,)."""
-    points = outermost(shape, placement, -normal)
+    points = outermost(surface.shapes[number], placement, -normal, surface.swept[number])
     return np.asarray(points[int(np.argmin(points @ normal))])
 
 
@@ -288,7 +294,7 @@ def _goes_on(thing: Surface, number: int, normal: Array, offset: float, point: A
             if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + GOES_ON:
                 if not np.isfinite(thing.reach[other]):
                     return True
-                if float((outermost(shape, place, normal) @ normal).max()) > offset + ACCURACY:
+                if float((outermost(shape, place, normal, thing.swept[other]) @ normal).max()) > offset + ACCURACY:
                     return True
     return False
 
@@ -367,9 +373,12 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
     return Face(found, place.actInv(center), axes @ place.rotation, 0.5 * (high - low))
 
 
-def outermost(shape: Any, placement: pin.SE3, direction: Array) -> Array:
-    """Candidates (n, 3) for the points of a piece farthest along a unit direction (3,), in the world."""
-    swept = swept_points(shape)
+def outermost(shape: Any, placement: pin.SE3, direction: Array, swept: SweptPoints | None = None) -> Array:
+    """Candidates (n, 3) for the points of a piece farthest along a unit direction (3,), in the world.
+
+    `swept` are the shape's points, where they are known.
+    """
+    swept = swept_points(shape) if swept is None else swept
     if len(swept.points) == 0:  # an ellipsoid: the image of the ball's point whose normal is the direction
         radii = np.asarray(shape.radii)
         pull = radii * (placement.rotation.T @ direction)

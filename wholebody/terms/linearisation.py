@@ -323,7 +323,7 @@ class Lineariser:
         """Write values and rows of terms of other classes."""
         state = self.state
         for term, evaluate, row, rows in others:
-            part, derivative = evaluate(state), term.jacobian(state)
+            part, derivative = term.value_and_jacobian(state, evaluate)
             if np.ndim(part) != 1:
                 part = np.atleast_1d(part)
             checked_rows(term, part, derivative, rows)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.problem_sets.registry import problem_set
 
 
 def pitched(degrees: float) -> tuple[float, float, float, float]:
@@ -38,3 +39,10 @@ def test_feet_get_onto_a_board_that_they_begin_under() -> None:
     solution = wb.solve(problem, wb.QP(measures=False))
     assert solution.solved, solution
     assert scene.figure.placement(solution.q, "left_sole").translation[2] == pytest.approx(0.30, abs=1e-3)
+
+
+@pytest.mark.parametrize("number", [15, 25])
+def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
+    """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False))
+    assert solution.solved, solution

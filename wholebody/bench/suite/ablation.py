@@ -199,6 +199,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp.funnel import Funnel
     from wholebody.methods.qp.multipliers import Multipliers
     from wholebody.methods.qp.working_set import WorkingSet
+    from wholebody.terms import linearisation
 
     search, descent = multistart.Search, sqp.SQP
     return {
@@ -207,9 +208,12 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
+        "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
+        "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
         "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
         "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
         "arms without contacts first": (qp, "unobstructed", lambda *given: None),
+        "before contact": (multistart, "before_contact", lambda *given: iter(())),
         "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),

@@ -180,7 +180,7 @@ class Feasibility:
             return None
 
     def _iterate_at(self, q: Array) -> Iterate:
-        at = self.lineariser.at(q, WITHIN)
+        at = self.lineariser.at(q, WITHIN, planes=True)
         rows = self.subproblem.rows(at)
         return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, WITHIN))
 

@@ -22,7 +22,7 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
-from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
+from wholebody.methods.qp.multipliers import multipliers_of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
@@ -93,7 +93,6 @@ class SQP:
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0
-        self._multipliers: Multipliers | None = None
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
@@ -160,18 +159,14 @@ class SQP:
         if here.violation.worst > self.tolerance or not self._measures:
             return
         worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
-        clearly = self._kept is None or self._lagrangian(self._kept) - self._lagrangian(here) > worth
+        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
         self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
 
     def _better_than_kept(self, here: Iterate) -> bool:
         fits = here.violation.worst <= self.tolerance
-        return fits and (self._kept is None or self._lagrangian(here) < self._lagrangian(self._kept))
-
-    def _lagrangian(self, here: Iterate) -> float:
-        y = self._multipliers
-        return here.at.measure if y is None else y.lagrangian(here.at.measure, here.rows)
+        return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
 
     def _bent(self, here: Iterate) -> Linearisation:
         """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
@@ -197,7 +192,8 @@ class SQP:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
             multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
-            self._multipliers, self._tension = multipliers, multipliers.net(here.rows)
+            if here.at.planes is not None:
+                self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
