@@ -112,6 +112,7 @@ class Goal(Term, ABC):
                 "error": ("error", answers.values),
                 "jacobian": ("jacobian", answers.rows),
                 "weight": ("weight", answers.weight),
+                "angular": ("angular", answers.mask),
             },
         )
 
@@ -155,6 +156,7 @@ class Constraint(Term, ABC):
                 "jacobian": ("jacobian", answers.rows),
                 "lower": ("lower", answers.limit),
                 "upper": ("upper", answers.limit),
+                "angular": ("angular", answers.mask),
             },
         )
 
