@@ -191,8 +191,6 @@ class Viewer:
         given = checks.listed(postures, "postures", "[q], each of shape (nq,)")
         painted = checks.color(color, "color")
         self._ghosts = [self._composition.checked(q) for q in given]
-        if self._ghosts and self._composition.scene.figure is not None:
-            self._composition.scene.figure.warn_of_angles(np.array(self._ghosts), "ghosts")
         self._composition.ghosts(self._ghosts, painted)
         self._graph.flush()
 
