@@ -27,6 +27,10 @@ def wrong(scene: wb.Scene) -> np.ndarray:
     return q
 
 
+def shown(scene: wb.Scene) -> wb.Viewer:
+    return wb.Viewer(scene, title="degrees")
+
+
 @pytest.mark.parametrize(
     "enter",
     [
@@ -40,8 +44,33 @@ def wrong(scene: wb.Scene) -> np.ndarray:
         lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
         lambda scene, q: scene.figure.reduced("left_arm", q),
         lambda scene, q: wb.ergonomics.body_angles(scene.figure, q),
+        lambda scene, q: scene.contacts(q),
+        lambda scene, q: scene.overlapping(q),
+        lambda scene, q: scene.penetration(q),
+        lambda scene, q: scene.sweep(scene.figure.neutral, q),
+        lambda scene, q: shown(scene).show(q),
+        lambda scene, q: shown(scene).play([scene.figure.neutral, q]),
+        lambda scene, q: shown(scene).ghosts([q]),
     ],
-    ids=["with_joints", "start", "with_start", "goal", "assess", "clip", "track", "frame", "reduced", "body_angles"],
+    ids=[
+        "with_joints",
+        "start",
+        "with_start",
+        "goal",
+        "assess",
+        "clip",
+        "track",
+        "frame",
+        "reduced",
+        "body_angles",
+        "contacts",
+        "overlapping",
+        "penetration",
+        "sweep",
+        "show",
+        "play",
+        "ghosts",
+    ],
 )
 def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
     with pytest.warns(UserWarning, match=SAID):

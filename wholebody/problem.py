@@ -256,6 +256,7 @@ class Problem(checks.FixedAttributes):
         if dt is None:
             terms, plan = self._plan
             known = all(map(is_, terms, (self.constraints, self.bounds, self.measures)))
+        workspace.state.update(self.start)  # where terms of one's own tell how many rows they have
         return Lineariser(
             workspace,
             self.scene.figure.limits,

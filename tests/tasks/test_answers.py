@@ -234,3 +234,58 @@ def test_fractions_are_numbers(scene):
 def test_a_figure_is_no_scene_to_stand_on(scene):
     with pytest.raises(wb.InputError, match="give a scene of this figure"):
         scene.figure.grounded(scene.figure.neutral, scene.figure)
+
+
+class Near(_Own, wb.Constraint):
+    """Not defined beyond `FAR` of the start in any direction, such as in the neutral configuration of the model."""
+
+    def value(self, state):
+        return np.full(1, np.nan if np.linalg.norm(self.tip.moved(state)) > FAR else 1.0)
+
+    def jacobian(self, state):
+        return np.zeros((1, state.model.nv))
+
+
+def bent(scene: wb.Scene) -> np.ndarray:
+    return scene.figure.with_joints(scene.figure.neutral, {"right_elbow_flexion": 1.5})
+
+
+@pytest.mark.parametrize("method", ["qp", "newton"])
+def test_terms_are_counted_at_the_start(scene, method):
+    """Not where the last run left its state, and not in the neutral configuration."""
+    start = bent(scene)
+    place = scene.state(start).frame(scene.figure.frame_id("right_index_tip")).translation + (0.1, 0.0, 0.0)
+    problem = wb.Problem(scene, start, goals=[wb.Point("right_index_tip", place)], constraints=[Near("", 0)])
+    with problem.borrow() as workspace:
+        workspace.state.update(scene.figure.neutral)
+        assert problem.lineariser(workspace, 0.05).undefined(start) is None
+    assert wb.solve(problem, method).solved
+
+
+class Angle(Reach):
+    turned: object = False
+
+    @property
+    def angular(self):
+        return self.turned
+
+
+@pytest.mark.parametrize("bad", [np.nan, "yes", None, 2, [[True, True, True]], [1, 0, 0], [[True], [True, False]]])
+def test_which_rows_are_angles_is_true_or_false(scene, bad):
+    kind = type("Turned", (Angle,), {"turned": bad})
+    with pytest.raises(wb.InputError, match=r"goals\[0\] \(Turned\): its angular"):
+        wb.Problem(scene, goals=[kind("", 0)])
+
+
+def test_a_list_tells_which_rows_are_angles(scene):
+    kind = type("Turned", (Angle,), {"turned": [True, False, False]})
+    judged = wb.assess(wb.Problem(scene, goals=[kind("", 0)]), scene.figure.neutral)
+    assert judged.goal_angle == pytest.approx(0.3)
+    assert judged.goal_error == pytest.approx(0.2)
+
+
+def test_what_is_masked_is_no_number(scene):
+    with pytest.raises(wb.InputError, match="its error has nan"):
+        wb.assess(
+            stated(scene, Reach("error", np.ma.masked_array([0.0, 0.0, 0.0], [False, True, False]))), reached(scene)
+        )

@@ -159,3 +159,12 @@ def test_a_wheel_has_no_ends_to_be_along() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Torus(0.18, 0.015), name="wheel", at=(0.45, 0.0, 1.1))
     with pytest.raises(wb.InputError, match="is a ring"):
         wb.Problem(scene, goals=[wb.Grasp("left", "wheel", "power", along=0.5)])
+
+
+@pytest.mark.parametrize("kind", ["pinch", "fingertips"])
+def test_a_crate_that_no_hand_spans_is_not_grasped(kind):
+    """Its edges count as rounded for the normals alone: where fingers touch, opposition counts in full."""
+    scene = wb.Scene(wb.load("human", hands="fingers"))
+    scene.add(wb.Box((0.3, 0.3, 0.3)), name="crate", at=(0.45, -0.25, 1.1))
+    problem = wb.Problem(scene, goals=[wb.Grasp("right", "crate", kind)])
+    assert not wb.solve(problem, wb.QP(restarts=1, budget=80)).solved

@@ -286,6 +286,8 @@ def array(value: object, what: str, wanted: str) -> Array:
     """
     if type(value) is np.ndarray and value.dtype == np.float64:
         return value
+    if isinstance(value, np.ma.MaskedArray) and value.dtype.kind in NUMERIC:
+        value = np.where(value.mask, np.nan, value.data)  # what is masked is no number
     try:
         found = np.asarray(value)
     except (TypeError, ValueError, OverflowError, RecursionError):

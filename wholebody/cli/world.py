@@ -76,12 +76,13 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
     """The scene of a name, or that of a task file, whose figure stands as the file starts."""
+    from wholebody.base.files import title_of
     from wholebody.dynamics.scenes import build_world_scene, standing_scene
     from wholebody.taskfile import read_task
 
     if name.endswith(".toml"):
         problem = read_task(name).problem
-        return standing_scene(Path(name).stem, problem.scene, problem.start, frames=arguments.frames or STANDING)
+        return standing_scene(title_of(name), problem.scene, problem.start, frames=arguments.frames or STANDING)
     return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from importlib import import_module
 from itertools import pairwise
@@ -14,7 +15,7 @@ import numpy as np
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a, flag, instance, listed, shown
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.base.records import with_values
 from wholebody.methods.control import ctrl_c_ends_all
 from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
@@ -228,26 +229,33 @@ def avoid(
     watch = Watch(progress)
     told = None if progress is None else lambda now: watch.tell(now.share, now.note)
     began = time.perf_counter()
-    with ctrl_c_ends_all():
-        result = chosen.avoid(clip, scene, given, told)
-    seconds = time.perf_counter() - began
-    change = None
-    if strong is not None and loads is not None:
-        places = None if result.times is None else result.times / clip.dt
-        change = load_change(loads, _carried(clip.with_q(result.q), scene), places, strong, feet)
-    report = _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
+
+    def reported(result: MethodResult) -> AvoidanceReport:
+        change = None
+        if strong is not None and loads is not None:
+            places = None if result.times is None else result.times / clip.dt
+            change = load_change(loads, _carried(clip.with_q(result.q), scene), places, strong, feet)
+        return _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
+
+    try:
+        with ctrl_c_ends_all():
+            result = chosen.avoid(clip, scene, given, told)
+        seconds, report = time.perf_counter() - began, reported(result)
+    except UndefinedTermError as error:  # terms of one's own are finite at the original postures, if nowhere else
+        result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {error}")
+        seconds, report = time.perf_counter() - began, replace(reported(result), solved=False)
     # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
     if report.rough and result.times is None and strong is None and not watch.ended:
         from wholebody.motion.smoothing import smoothed  # it loads scipy.sparse
 
         began = time.perf_counter()
-        with ctrl_c_ends_all():
+        with ctrl_c_ends_all(), suppress(UndefinedTermError):  # what it was before stays
             found = smoothed(clip, result.q, asked, terms, chosen.clearance, watch)
+            smooth = with_values(result, q=found.q, programs=result.programs + found.programs)
+            other = reported(smooth)
+            if found.windows and (other.solved or other.rough):
+                result, report = smooth, replace(other, smoothed=found.windows)
         seconds += time.perf_counter() - began
-        smooth = with_values(result, q=found.q, programs=result.programs + found.programs)
-        other = _report(was, clip.with_q(smooth.q), terms, smooth, chosen.name, asked, None)
-        if found.windows and (other.solved or other.rough):
-            result, report = smooth, replace(other, smoothed=found.windows)
     return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
 
 

@@ -7,6 +7,7 @@ from contextlib import AbstractContextManager
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import pinocchio as pin
 
 from wholebody.base import checks
@@ -62,6 +63,7 @@ class Scene(SceneContents):
             InputError: q has the wrong shape or is not finite, or `within` is not a finite number.
         """
         within = checks.number(within, "within", -FARTHEST, FARTHEST, "m")
+        self._warn_of_angles(q, "contacts: q")
         with self.borrow() as workspace:
             return workspace.near(q, within).nearest_first()
 
@@ -76,6 +78,7 @@ class Scene(SceneContents):
         """
         from wholebody.geometry.penetration import object_penetrations
 
+        self._warn_of_angles(q, "penetration: q")
         with self.borrow() as workspace:
             near = self.overlapping(q, workspace)
             return object_penetrations(
@@ -97,12 +100,16 @@ class Scene(SceneContents):
             InputError: q has the wrong shape or is not finite.
         """
         if workspace is None:
+            self._warn_of_angles(q, "overlapping: q")
             with self.borrow() as borrowed_one:
                 return self.overlapping(q, borrowed_one)
         near = workspace.near(q, 0.0)
         pieces, group = self.built.standing
         standing = near_among(self.built.table, near.placements, pieces, group, 0.0, self._held())
         return near.joined(standing).nearest_first()
+
+    def _warn_of_angles(self, q: Array, what: str) -> None:
+        self.figure.warn_of_angles(checks.posture(q, self.model.nq), what)
 
     def _held(self) -> list[tuple[int, int]]:
         """Pairs of things that joints hold together, as numbers of `SceneGeometry.standing`."""
@@ -137,6 +144,7 @@ class Scene(SceneContents):
         """
         nq = self.model.nq
         begin, end = checks.posture(q0, nq, "q0"), checks.posture(q1, nq, "q1")
+        self.figure.warn_of_angles(np.array([begin, end]), "sweep")
         tolerance = checks.number(tolerance, "tolerance", 1e-5, FARTHEST, "m")
         with self.borrow() as workspace:
             if moves is None:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import InputError, UnknownNameError, WholebodyError
-from wholebody.base.files import is_file, is_folder
+from wholebody.base.files import is_file, is_folder, title_of
 from wholebody.base.records import with_values
 from wholebody.figures import Figure, load
 from wholebody.geometry.placement import placement
@@ -118,7 +118,7 @@ def task_from(contents: Contents, file: Path) -> Task:
     method = contents.one("method")
     return Task(
         path=file,
-        title=top.values.get("title", file.stem),
+        title=top.values.get("title", title_of(file)),
         problem=problem,
         method=method.make() if method else method_named("qp"),
         goal_names=tuple(_goal_name(entry) for entry in contents.tables.get("goal", ())),

@@ -15,6 +15,7 @@ from wholebody import tasks
 from wholebody.base import files
 from wholebody.base.checks import instance, shown
 from wholebody.base.errors import InputError
+from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
 from wholebody.problem import Problem
@@ -53,7 +54,7 @@ def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: st
     if title is not None and (not isinstance(title, str) or not title.strip()):
         raise InputError(f"write_task: title is {shown(title)}; give one line of text")
     scene, beside = problem.scene, dict[Path, str]()
-    top: dict[str, Any] = {"title": title or target.stem}
+    top: dict[str, Any] = {"title": title or title_of(target)}
     if problem.clearance:
         top["clearance"] = problem.clearance
     if problem.touching:

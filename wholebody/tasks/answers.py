@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError, TermError, UndefinedTermError
 from wholebody.figures.state import State, Wrench
 
@@ -197,6 +197,21 @@ def limit(term: object, what: str, given: Any, _: object = ()) -> Array:
     found = _known(term, what, _numbers(term, what, given, "shape (m,), or one number for all rows"))
     if found.ndim > 1:
         raise _wrong(term, f"its {what} has shape {found.shape}; give shape (m,), or one number for all rows")
+    return found
+
+
+def mask(term: object, what: str, given: Any, _: object = ()) -> Mask:
+    """Which rows are angles, (m,) or one for all.
+
+    Raises:
+        TermError: something other than true and false.
+    """
+    try:
+        found = np.asarray(given)
+    except ValueError:
+        found = np.empty(0, dtype=object)
+    if found.dtype.kind != "b" or found.ndim > 1:
+        raise _wrong(term, f"its {what} is {checks.shown(given)}; give True or False for each row, or one for all")
     return found
 
 

@@ -120,6 +120,7 @@ class Goal(Term, ABC):
                 "error": ("error", answers.values),
                 "jacobian": ("jacobian", answers.rows),
                 "weight": ("weight", answers.weight),
+                "angular": ("angular", answers.mask),
             },
         )
 
@@ -163,6 +164,7 @@ class Constraint(Term, ABC):
                 "jacobian": ("jacobian", answers.rows),
                 "lower": ("lower", answers.limit),
                 "upper": ("upper", answers.limit),
+                "angular": ("angular", answers.mask),
             },
         )
 

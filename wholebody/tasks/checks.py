@@ -52,7 +52,7 @@ def check_rows(where: str, term: Any, evaluate: Callable[[State], Array], state:
                     raise TermError(term, answers.in_words(term), told)
             if not (low <= high).all():
                 raise TermError(term, answers.in_words(term), "its lower is above its upper; give the lower one first")
-        if np.shape(term.angular) not in ((), (1,), values.shape):
+        if answers.mask(term, "angular", term.angular).shape not in ((), (1,), values.shape):
             told = f"it has {len(values)} values, and its angular has shape {np.shape(term.angular)}; give as many"
             raise TermError(term, answers.in_words(term), told)
 

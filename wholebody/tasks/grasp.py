@@ -178,7 +178,7 @@ class Grasp(ContactTerm):
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
         if others:
-            parts.append(Opposing(hand, others, rounded(thing), float(self.opposed), CLOSED))
+            parts.append(Opposing(hand, others, thing, rounded(thing), float(self.opposed), CLOSED))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
@@ -203,7 +203,12 @@ class Grasp(ContactTerm):
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
         parts.append(
             Opposing(
-                thumb, tuple(others), rounded(thing), float(self.opposed), CLOSED if self.kind == "pinch" else CLOSING
+                thumb,
+                tuple(others),
+                thing,
+                rounded(thing),
+                float(self.opposed),
+                CLOSED if self.kind == "pinch" else CLOSING,
             )
         )
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None

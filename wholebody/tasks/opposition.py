@@ -37,7 +37,8 @@ class Opposing(NamedTuple):
     Attributes:
         first: surface on one side, such as a thumb.
         others: surfaces on the other, such as fingers.
-        thing: what is between them; the edges of its boxes count as `rounded`.
+        thing: what is between them.
+        smooth: the same with the edges of its boxes `rounded`, whose normals count.
         most: largest angle from opposite [rad].
         far: distance of the farthest contact from which the angle does not count; nearer, it counts more and more [m].
             Far away the normals say where the thing is, not how it is held.
@@ -46,6 +47,7 @@ class Opposing(NamedTuple):
     first: Surface
     others: tuple[Surface, ...]
     thing: Surface
+    smooth: Surface
     most: float
     far: float
 
@@ -57,11 +59,12 @@ class Opposing(NamedTuple):
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and wrenches on every finger."""
         surfaces, thing = (self.first, *self.others), self.thing
-        nears = [nearest(surface, thing, state) for surface in surfaces]
-        farthest = int(np.argmax([near.distance for near in nears]))
-        share, fall = _share(nears[farthest].distance, self.far)
+        distances = [nearest(surface, thing, state).distance for surface in surfaces]
+        farthest = int(np.argmax(distances))
+        share, fall = _share(distances[farthest], self.far)
         if share == 0.0:
             return np.zeros(1), np.zeros((1, state.model.nv))
+        nears = [nearest(surface, self.smooth, state) for surface in surfaces]
         normals = np.array([near.normal for near in nears])
         total = normals[1:].sum(axis=0)
         length = max(float(np.linalg.norm(total)), SHORTEST)
@@ -78,7 +81,7 @@ class Opposing(NamedTuple):
         row = fall * beyond * Gap(surfaces[farthest], thing).rows(state)[1]
         for number, (surface, near) in enumerate(zip(surfaces, nears, strict=True)):
             force = share * (toward if number == 0 else other / length)
-            wrench = _by_twist(surface, thing, state, near.pieces) @ force
+            wrench = _by_twist(surface, self.smooth, state, near.pieces) @ force
             row += state.rows(wrench[None], np.array([near.against]), np.array([near.joint]))
         return np.array([share * beyond]), row
 

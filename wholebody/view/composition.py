@@ -112,8 +112,10 @@ class Composition:
                 keyframe.markers[path] = (label, drawing.point_placement(top))
         return keyframe
 
-    def ghosts(self, postures: Iterable[Array], color: style.Color) -> None:
+    def ghosts(self, postures: Sequence[Array], color: style.Color) -> None:
         """Draw the figure, transparent, at these postures, in place of earlier ghosts."""
+        if postures and self.scene.figure is not None:
+            self.scene.figure.warn_of_angles(np.array(postures), "ghosts")
         self._graph.remove(style.GHOST_NODE)
         for number, q in enumerate(postures):
             self.bodies.ghost(self._graph, number, self._state.update(q).data, color)

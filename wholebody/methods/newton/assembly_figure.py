@@ -35,7 +35,7 @@ class AssemblyFigure:
             UnsupportedTermError: a joint or a constraint has no equations.
         """
         self.name, self.problem, self.first = name, problem, first
-        self.bodies = FigureBodies(problem.scene.figure)
+        self.bodies = FigureBodies(problem.scene.figure, problem.start)
         self._limits = self.bodies.limits()
         self._q = problem.start
         self._equations = [

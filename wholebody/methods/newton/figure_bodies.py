@@ -30,8 +30,12 @@ class FigureBodies:
         equations: the joints.
     """
 
-    def __init__(self, figure: Figure) -> None:
+    def __init__(self, figure: Figure, start: Array | None = None) -> None:
         """Read the joints.
+
+        Args:
+            figure: the figure.
+            start: (nq,) where terms of one's own tell how many rows they have; None for the neutral configuration.
 
         Raises:
             UnsupportedTermError: a joint of a type that has no equations here.
@@ -64,6 +68,7 @@ class FigureBodies:
         self.weight = self._weight()
         self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         self._step: tuple[Array, Array, Array] | None = None
+        self._start = pin.neutral(self.model) if start is None else start
         self._state: State | None = None
         self._state_of: Array | None = None
 
@@ -79,7 +84,12 @@ class FigureBodies:
 
     @property
     def start_state(self) -> State:
-        """The state that `state_at` moves, at its present posture."""
+        """The state that `state_at` and `state_of` move, at the start."""
+        return self.state_of(self._start)
+
+    @property
+    def _present(self) -> State:
+        """The state that `state_at` and `state_of` move."""
         if self._state is None:
             self._state = State(self.model)
         return self._state
@@ -87,14 +97,14 @@ class FigureBodies:
     def state_at(self, x: Array) -> State:
         """The kinematic state at the bodies x (count + 1, 7)."""
         if self._state_of is not x:
-            self.start_state.update(self.posture(x[:-1].ravel()))
+            self._present.update(self.posture(x[:-1].ravel()))
             self._state_of = x
-        return self.start_state
+        return self._present
 
     def state_of(self, q: Array) -> State:
         """The same at the posture q (nq,)."""
         self._state_of = None
-        return self.start_state.update(q)
+        return self._present.update(q)
 
     def tangent_rows(self, x: Array) -> Array:
         """Derivative (nv, 7 count) of the tangent displacement of postures by the bodies x (count + 1, 7)."""

@@ -44,7 +44,7 @@ class FigureSystem(ActiveSystem):
             InputError: a term or a joint that has no equations here.
         """
         self.problem, self.workspace, self.algebra_name = problem, workspace, algebra
-        self.bodies = FigureBodies(problem.scene.figure)
+        self.bodies = FigureBodies(problem.scene.figure, problem.start)
         self.contacts = ContactSet(problem.clearances, workspace) if len(workspace.table.pairs) else None
         self.longest = LONGEST if self.contacts else np.inf
         count = self.bodies.count

@@ -48,7 +48,7 @@ def state_equations(problem: Problem, state: State) -> None:
     Raises:
         UnsupportedTermError: a term or a joint has no equations here.
     """
-    bodies = FigureBodies(problem.scene.figure)
+    bodies = FigureBodies(problem.scene.figure, problem.start)
     goal_equations(problem, bodies, problem.goals)
     constraint_equations(problem, bodies)
     bound_equations(problem, state)

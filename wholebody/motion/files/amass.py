@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import FileFormatError, InputError, one_line
+from wholebody.base.files import title_of
 from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
@@ -86,7 +87,7 @@ def read_motion(path: Path) -> SkeletonMotion:
     parents = np.array([names.index(parent) if parent else -1 for parent, _ in JOINTS.values()], dtype=np.intp)
     try:
         return SkeletonMotion.moved(
-            names, parents, offsets @ TEMPLATE.T, local, places, 1.0 / float(frequency.ravel()[0]), path.stem,
+            names, parents, offsets @ TEMPLATE.T, local, places, 1.0 / float(frequency.ravel()[0]), title_of(path),
             ("lengths of bones are those of an average body",),
         )  # fmt: skip
     except InputError as error:

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
-from wholebody.base.files import LARGEST, read_bytes
+from wholebody.base.files import LARGEST, read_bytes, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
@@ -75,7 +75,7 @@ def read(path: Path, figure: Figure) -> Frames:
             "the clip was made with"
         )
     name = str(arrays["name"])
-    name = name if name.strip() and name.isprintable() else path.stem
+    name = name if name.strip() and name.isprintable() else title_of(path)
     return Frames(q.astype(np.float64, copy=False), float(dt), name)
 
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import read_text
+from wholebody.base.files import read_text, title_of
 from wholebody.motion.files.bvh_text import BvhText, parsed
 from wholebody.motion.files.text import LARGEST_FILE
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit
@@ -86,7 +86,7 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
             local,
             scale * root[first:] @ turn.T,
             made.frame_time,
-            path.stem,
+            title_of(path),
             tuple(notes),
         )
     except InputError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import title_of
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.tracking.track_files import read_track, write_track
@@ -38,4 +39,4 @@ def read(path: Path, figure: Figure) -> Frames:
         raise
     except InputError as error:
         raise FileFormatError(f"{error}" if path.name in str(error) else f"{path.name}: {error}") from None
-    return Frames(track.q, track.dt, path.stem)
+    return Frames(track.q, track.dt, title_of(path))

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, InputError, one_line
-from wholebody.base.files import read_text
+from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
@@ -76,7 +76,7 @@ def read(path: Path, figure: Figure) -> Frames:
         line = frames[-1][0] if len(frames) < count else frames[count][0]
         raise FileFormatError(f"{name}, line {line}: {len(frames)} rows and not {count}; the file is cut off or wrong")
     values = table(name, frames, GLOBAL + figure.model.nq - ROOT_SIZE)
-    return Frames(_postures(values), dt, path.stem)
+    return Frames(_postures(values), dt, title_of(path))
 
 
 def sampled(times: Array, curves: Array, figure: Figure, dt: float, name: str = "splines") -> Frames:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +14,7 @@ from published_helpers import answers
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import TIMEOUT, as_json, judge
+from wholebody.bench.suite.published.rebuilt import Score, worst_of
 from wholebody.bench.suite.published.words import left_out
 from wholebody.cli import main
 
@@ -142,3 +145,11 @@ def test_the_command_prints_a_table_and_writes_every_figure(
     path.write_text("{}")
     assert main(["bench", "judge", str(path), "--problems", str(folder)]) != 0
     assert "format is None" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("name", [name for name in Score.__dataclass_fields__ if name != "effort"])
+@pytest.mark.parametrize("frame", [0, 1, 2])
+def test_a_score_with_nan_is_not_solved(name: str, frame: int) -> None:
+    scores = [Score(*[0.0] * 7) for _ in range(3)]
+    scores[frame] = replace(scores[frame], **{name: math.nan})
+    assert math.isnan(worst_of(scores).worst)

@@ -49,7 +49,8 @@ class Score:
     @property
     def worst(self) -> float:
         """The one figure of accuracy: the worst of goals and of all that must hold [m or rad]."""
-        return max(self.goal_error, self.goal_angle, self.overlap, self.clearance, self.limits, self.holds)
+        errors = (self.goal_error, self.goal_angle, self.overlap, self.clearance, self.limits, self.holds)
+        return float(np.max(errors))  # NaN if one is: it is not solved
 
 
 @dataclass(frozen=True)
@@ -269,5 +270,5 @@ def _convex(path: Path) -> Any:
 
 def worst_of(scores: Sequence[Score]) -> Score:
     """The worst of several frames, figure by figure; the effort is the last one's."""
-    worst = {name: max(getattr(score, name) for score in scores) for name in Score.__dataclass_fields__}
+    worst = {name: float(np.max([getattr(score, name) for score in scores])) for name in Score.__dataclass_fields__}
     return Score(**{**worst, "effort": scores[-1].effort})
