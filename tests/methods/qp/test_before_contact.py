@@ -29,14 +29,14 @@ def driver(sex: str, percentile: float) -> wb.Problem:
 
 @pytest.mark.parametrize(("sex", "percentile"), [("male", 80), ("female", 5)])
 def test_a_driver_sits_in_the_seat_of_the_guide(sex: str, percentile: float) -> None:
-    solution = wb.solve(driver(sex, percentile), wb.QP(measures=False))
+    solution = wb.solve(driver(sex, percentile), wb.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
 
 
 def test_feet_get_onto_a_board_that_they_begin_under() -> None:
     scene = wb.Scene(wb.load("human")).add(wb.Box((0.8, 0.8, 0.02)), name="board", at=(0.0, 0.0, 0.29))
     problem = wb.Problem(scene, "standing", constraints=[wb.Stand("board")])
-    solution = wb.solve(problem, wb.QP(measures=False))
+    solution = wb.solve(problem, wb.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
     assert scene.figure.placement(solution.q, "left_sole").translation[2] == pytest.approx(0.30, abs=1e-3)
 
@@ -44,5 +44,5 @@ def test_feet_get_onto_a_board_that_they_begin_under() -> None:
 @pytest.mark.parametrize("number", [15, 25])
 def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
     """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
-    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False))
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
