@@ -872,6 +872,7 @@ DERIVATIVES = (
     "dense_jacobian",
     "wrench_jacobian",
     "supporting_planes",
+    "value_and_jacobian",
     "nearest_points",
     "placed",
     "bounded",

@@ -8,7 +8,9 @@ from typing import Any, NamedTuple
 import pinocchio as pin
 
 from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.figures.degrees import Turning
 from wholebody.figures.figure import Figure
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.placement import PlacementLike, placement
@@ -155,6 +157,11 @@ class LooseBodies:
         index_of = {piece.name: index for index, piece in enumerate(pieces)}
         for pair in pairs:
             self.geometry.addCollisionPair(pin.CollisionPair(*sorted(index_of[name] for name in pair)))
+        self._turning = Turning(self.model)
+
+    def warn_of_angles(self, q: Array, what: str) -> bool:
+        """Warn of the angle farthest out of limits in q, as `Figure.warn_of_angles` does."""
+        return self._turning.warn(q, what)
 
     def _append(self, name: str, figure: Figure) -> None:
         """Add the joints of a figure."""
