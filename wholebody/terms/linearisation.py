@@ -22,7 +22,8 @@ from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks.base import Bound, Constraint, Goal, Measure
+from wholebody.tasks.answers import is_own
+from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
 from wholebody.terms.plan import OtherTerm, TermPlan, checked_rows, make_plan
@@ -152,6 +153,7 @@ class Lineariser:
         self._no_squares = np.zeros((0, self.state.model.nv))
         self.goals: Sequence[Goal] = goals
         self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
+        self._own = self._own_terms()
         self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
         self._packed: PackedLinearisation | None = None
         self._grow(64)
@@ -172,6 +174,7 @@ class Lineariser:
         if goals is not self.goals or others is not None:
             self.constraints = self.constraints if others is None else others
             before, self._plan = self._plan, self._again(self._plan, goals, others)
+            self._own = self._own_terms()
             if (before.goal_rows, before.value_rows) != (self._plan.goal_rows, self._plan.value_rows):
                 self._term_wrench, self._packed = np.empty((self._plan.goal_rows + self._plan.value_rows, 6)), None
         self.goals, self.clearances = goals, clearances
@@ -282,11 +285,13 @@ class Lineariser:
 
     def undefined(self, q: Array) -> UndefinedTermError | None:
         """Why a term of one's own is not finite at a posture (nq,); None where all are, or where there are none."""
+        return undefined(self._own, self.state.update(q), self.dt) if self._own else None
+
+    def _own_terms(self) -> list[Term]:
+        """Terms of one's own: built-in ones are finite everywhere."""
         plan = self._plan
-        if not (plan.others or plan.other_bounds or plan.other_measures):
-            return None
-        own = [*(other.term for other in plan.others), *plan.other_bounds, *plan.other_measures]
-        return undefined(own, self.state.update(q), self.dt)
+        asked = [*(other.term for other in plan.others), *plan.other_bounds, *plan.other_measures]
+        return [term for term in asked if is_own(term)]
 
     def defined(self, postures: Iterable[Array]) -> Iterator[Array]:
         """Those of some postures (nq,) where all terms of one's own are finite."""
