@@ -166,7 +166,7 @@ class LiveDrag:
         if isinstance(self.problem, Assembly) and method != "newton":
             raise InputError(f"an assembly is dragged by Newton steps, not by {shown(method)}; leave method out")
         self.method: Method = method_for_motions(method)
-        self.chosen = method if isinstance(method, str) else self.method.name
+        self.chosen = str(getattr(method, "name", method))
         self.methods.setdefault(self.chosen, method)
         if self.taken:
             self._restart()
