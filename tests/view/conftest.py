@@ -24,7 +24,7 @@ class Exhibit:
         """Build it."""
         self.model = pin.buildSampleModelHumanoid()
         self.geometry = pin.buildSampleGeometryModelHumanoid(self.model)
-        self.figure = SimpleNamespace(frame_id=self.model.getFrameId)
+        self.figure = SimpleNamespace(frame_id=self.model.getFrameId, warn_of_angles=lambda q, what: False)
         self.piece_owner = [piece.name for piece in self.geometry.geometryObjects]
         self.objects: dict[str, Any] = {}
         self.revision = 0
