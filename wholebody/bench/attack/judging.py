@@ -2,8 +2,8 @@
 
 It shares nothing with the package's own assessment but what the user wrote: the terms as they were given, the shapes of
 the things and where they stand. Pairs are the figure's own, and every piece of the figure that can move with every
-piece of every thing. Balance, reach cones and ranges of motion, which are constructions of the package's own, are read
-from their terms; a person has them without being told.
+piece of every thing; the outer pieces of a figure that has some. Balance, reach cones and ranges of motion, which are
+constructions of the package's own, are read from their terms; a person has them without being told.
 """
 
 from __future__ import annotations
@@ -67,10 +67,12 @@ class Pairs:
         self._request = coal.DistanceRequest()
         self._pieces: list[tuple[str, int, pin.SE3, Any]] = [
             (self._model.frames[piece.parentFrame].name, int(piece.parentJoint), piece.placement, piece.geometry)
-            for piece in figure.geometry.geometryObjects
+            for piece in (*figure.geometry.geometryObjects, *figure.outer)
         ]
         pairs = [(int(pair.first), int(pair.second)) for pair in figure.geometry.collisionPairs]
-        moving = [number for number, piece in enumerate(self._pieces) if piece[1] > 0]
+        own = figure.geometry.ngeoms if figure.outer else 0  # which are too coarse to meet things
+        meeting = range(own, len(self._pieces))
+        moving = [number for number in meeting if self._pieces[number][1] > 0]
         for name, thing in scene.objects.items():
             for piece in thing.shape.pieces():
                 pairs += [(k, len(self._pieces)) for k in moving]
