@@ -10,7 +10,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import color as checked_color
-from wholebody.base.checks import instance, known, number, numbers, shown, text
+from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
@@ -31,7 +31,7 @@ from wholebody.methods.newton.assembly_geometry import (
     solids,
 )  # fmt: skip
 from wholebody.methods.newton.system import unit
-from wholebody.problem import LARGEST_CLEARANCE, Problem
+from wholebody.problem import CLEARANCE, Problem
 from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint
@@ -50,7 +50,7 @@ class AssemblyBodies:
     """Bodies, figures and things of an assembly; `wholebody.Assembly` adds joints, goals and solving."""
 
     def __init__(self, clearance: float = 0.0) -> None:
-        self.clearance = number(clearance, "Assembly: clearance", 0.0, LARGEST_CLEARANCE, "m")
+        self.clearance = CLEARANCE(clearance, "Assembly: clearance")
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[Array] = []  # (7,) weights of each body's variables in the least motion

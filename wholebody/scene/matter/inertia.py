@@ -21,7 +21,7 @@ from wholebody.geometry.shapes import (
     Sphere,
     Torus,
 )
-from wholebody.scene.matter.body import HEAVIEST, LIGHTEST, Body
+from wholebody.scene.matter.body import MASS, Body
 
 
 class MassProperties(NamedTuple):
@@ -52,8 +52,7 @@ def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassPrope
     unit, note = _of_density_one(shape, name)
     density = body.density if body.mass is None else body.mass / unit.mass
     mass = float(unit.mass * density)
-    if not LIGHTEST <= mass <= HEAVIEST:
-        raise InputError(f"{name!r} has a mass of {mass:.3g} kg; give {LIGHTEST:g} to {HEAVIEST:g} kg")
+    MASS(mass, f"{name!r}: mass")
     return MassProperties(mass, np.array(unit.lever), np.array(unit.inertia) * (mass / unit.mass), note)
 
 
