@@ -131,8 +131,9 @@ class Checked:
         Raises:
             InputError: a value that its field does not accept.
         """
+        kind: Any = type(self)
         where = called(self)
-        for field in _checked(type(self)):
+        for field in _checked(kind):
             value = getattr(self, field.name)
             if value is not None or not field.optional:
                 checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
@@ -140,8 +141,9 @@ class Checked:
 
 def called(record: object) -> str:
     """A record in messages: its class, and the names that it must be given."""
-    names = ", ".join(checks.shown(getattr(record, name)) for name in _names(type(record)))
-    return type(record).__name__ + (f"({names})" if names else "")
+    kind: Any = type(record)
+    names = ", ".join(checks.shown(getattr(record, name)) for name in _names(kind))
+    return kind.__name__ + (f"({names})" if names else "")
 
 
 def check_of(kind: Any, name: str) -> Check:

@@ -18,7 +18,7 @@ from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Bound, Surroundings, filled
 
-SPEED = Range(1e-9, 1e9, "or inf for no bound", endless=True)  # rad/s, m/s
+SPEED = Range(1e-9, 1e9, endless=True)  # rad/s, m/s
 Speed: TypeAlias = Annotated[float, SPEED]
 BRAKING = 0.05  # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
 

@@ -57,7 +57,7 @@ class ScenePlan:
         """
         if frames is not None:
             frames = whole(frames, "frames", 1, MOST_FRAMES)
-        SEED.check(seed, "seed")
+        SEED(seed, "seed")
         dt = number(dt, "dt", *TIME_STEPS, "s")
         figure = load(self.figure)
         track = script(figure, self.keys(figure), dt=dt, seed=seed, name=name)

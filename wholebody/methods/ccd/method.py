@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
+from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
@@ -50,7 +51,7 @@ class _Trial:
 
 
 @dataclass(frozen=True)
-class CCD:
+class CCD(Checked):
     """Cyclic coordinate descent: one joint at a time, each to its best value, from the tip inwards.
 
     Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its

@@ -14,9 +14,8 @@ from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.geometry.shapes import Shape
+from wholebody.geometry.shapes import LENGTH, Shape
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.assembly_geometry import (
     LooseBodies,
@@ -97,7 +96,7 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a body"), "body")
         where = f"body {name!r}"
         given = solids(shape, where)
-        length = rim(given, SIZE) if size is None else check_length(size, f"{where}: size")
+        length = rim(given, SIZE) if size is None else LENGTH(size, f"{where}: size")
         placed = pin.SE3ToXYZQUAT(target_placement(at, where))
         painted = None if color is None else checked_color(color, f"{where}: color")
         self._parts.append(name)

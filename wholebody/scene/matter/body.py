@@ -52,4 +52,4 @@ class Body(Checked):
     @property
     def resolved_material(self) -> Material:
         """The material itself, where it was given by name."""
-        return material(self.material, "Body material")
+        return material(self.material, "Body: material")
