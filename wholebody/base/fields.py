@@ -189,6 +189,6 @@ def _hints(kind: Any) -> Iterator[tuple[Field[Any], Any]]:
     for field in fields(kind):
         if field.init:
             one = SimpleNamespace(__annotations__={field.name: field.type})
-            scope = vars(sys.modules[owners[field.name].__module__])
+            scope = getattr(sys.modules.get(owners[field.name].__module__), "__dict__", {})
             with suppress(NameError):  # what only a type checker resolves asks for nothing
                 yield field, get_type_hints(one, scope, include_extras=True)[field.name]

@@ -27,7 +27,7 @@ STATURE = Range(1.3, 2.2, "m")
 """The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
 
 MASS = Range(25.0, 250.0, "kg")
-PERCENTILE = Range(1.0, 99.0, "percent")
+PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
 
 BODY_MASS_INDEX_RANGE = (13.0, 50.0)
 """kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
