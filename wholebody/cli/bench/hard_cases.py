@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
-from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, seed
+from wholebody.cli.arguments import folders
+from wholebody.cli.bench.command import listed, measuring, seed
+from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -166,7 +168,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
     listed("--kinds", "of cases: solve, stream, sweep, contact, file, argument", "KIND"),
     count("--jobs", 1, "processes at a time"),
     listed("--also", "attack.csv of other runs, counted too", "CSV", type=Path, default=[]),
-    folders("out/attack"),
+    *folders("out/attack"),
 )
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""

@@ -11,7 +11,8 @@ from wholebody.base.checks import number
 from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows
-from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
+from wholebody.cli.command import count, option
 
 CLIPS = (
     option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),

@@ -7,7 +7,8 @@ from pathlib import Path
 
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import write_text
-from wholebody.cli.bench.command import command, count, listed, option, seed
+from wholebody.cli.bench.command import listed, seed
+from wholebody.cli.command import command, count, option
 
 WIDTH = 230  # columns of the judge's table, also where the terminal has fewer
 PROBLEMS = option("--problems", type=Path, required=True, metavar="DIR", help="folder of the exported problems")

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, clip_of
+from wholebody.cli.clip.arguments import ONE_MOTION, clip_of
+from wholebody.cli.command import command
 
-DESCRIPTION = """\
-Say what a file of motion holds: figure, frames, time step, duration, and of the joints that move most their range and
-greatest speed."""
 MOST = 12
 
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "info", "what a file of motion holds", DESCRIPTION)
-    parser.set_defaults(run=run)
-
-
+@command(
+    "info",
+    "what a file of motion holds",
+    """\
+Say what a file of motion holds: figure, frames, time step, duration, and of the joints that move most their range and
+greatest speed.""",
+    *ONE_MOTION,
+)
 def run(arguments: argparse.Namespace) -> int:
     """Describe the clip."""
     import numpy as np
