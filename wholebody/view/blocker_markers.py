@@ -13,8 +13,6 @@ from wholebody.view import drawing, style
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
-MOST = 4  # most blockers that are marked, the strongest; more labels hide each other
-
 _BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
 
 
@@ -30,7 +28,8 @@ def mark_blockers(
         contacts: near pairs at that posture.
         blockers: `Blocker`s of an assessment, the strongest first.
     """
-    for number, blocker in enumerate(blockers[:MOST]):
+    # most blockers that are marked, the strongest; more labels hide each other
+    for number, blocker in enumerate(blockers[:4]):
         place = _place(scene, state, contacts, blocker)
         if place is None:
             continue

@@ -14,12 +14,6 @@ from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.viewed_scene import ViewedContacts
 
-MOST = 60
-"""Number of the nearest contacts with markers; a page with thousands of nodes is slow."""
-
-LABELLED = 3
-"""Number of the deepest penetrations that are labelled with their depth."""
-
 _NORMAL = Marker("arrow", style.NORMAL, 0.8)
 _WITNESS = Marker("ball", style.WITNESS, style.WITNESS_RADIUS)
 _DEPTH = Marker("arrow", style.DEPTH, 1.3)
@@ -41,7 +35,8 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
     A normal starts at the first piece's witness point and points to the second piece. A penetration vector is as long
     as the depth, but at least `style.SHORTEST_DEPTH`; the deepest ones are labelled with their depth.
     """
-    for row in range(min(len(contacts.distance), MOST)):
+    # number of the nearest contacts with markers; a page with thousands of nodes is slow
+    for row in range(min(len(contacts.distance), 60)):
         root = f"{style.CONTACT_NODE}/{row}"
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
@@ -57,7 +52,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
             out, origin = normal, end
         length = max(-distance, style.SHORTEST_DEPTH)
         keyframe.markers[f"{root}/depth"] = (_DEPTH, drawing.arrow_placement(origin, out, length))
-        if row < LABELLED:
+        if row < 3:  # number of the deepest penetrations that are labelled with their depth
             text = Marker("label", style.DEPTH_LABEL, style.LABEL_SIZE, f"{-1000 * distance:.1f} mm")
             keyframe.markers[f"{root}/text"] = (text, drawing.point_placement(origin + out * length))
 
@@ -72,9 +67,6 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
 
-LEAST = 1e-9  # m: shorter moves are none
-
-
 def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
     """Draw PD_g of every two objects: an arrow for each of them that may move, and its length in words.
 
@@ -84,7 +76,7 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
         root = f"{style.CONTACT_NODE}/overlap {number}"
         for name, move in (("first", one.moves_first), ("second", one.moves_second)):
             length = float(np.linalg.norm(move))
-            if length > LEAST:
+            if length > 1e-9:  # m: shorter moves are none
                 shown = max(length, style.SHORTEST_DEPTH)
                 place = drawing.arrow_placement(one.point, move / length, shown)
                 keyframe.markers[f"{root}/{name}"] = (_DEPTH, place)

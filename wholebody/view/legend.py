@@ -13,12 +13,6 @@ from wholebody.view.commands import pack
 from wholebody.view.scene_graph import Keyframe
 from wholebody.view.server import OBJECT, Command
 
-NODE = "/panel"
-"""Node under which the page keeps it; nothing is drawn there."""
-
-SMALLEST_ANGLE = 1e-3
-"""Radians: smaller angles are not told."""
-
 _MARKED = (
     ("/normal", style.CONTACT_NODE, style.NORMAL, "normal of a contact"),
     ("/depth", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
@@ -56,7 +50,8 @@ def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessme
     """
     said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:
-        angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > SMALLEST_ANGLE else ""
+        # radians: smaller angles are not told
+        angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > 1e-3 else ""
         said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
     if not all(keyframe.contacts_shown for keyframe in keyframes):
         return "; ".join(said)
@@ -71,4 +66,4 @@ def panel(title: str, keyframes: Sequence[Keyframe], count: int, dt: float, foun
     """The command that puts the panel on the page; the arguments are those of `status`, and the page's title."""
     rows = [[meaning, *(round(255 * float(part)) for part in color)] for meaning, color in legend(keyframes)]
     message = {"type": "panel", "title": title, "status": status(keyframes, count, dt, found), "legend": rows}
-    return Command(OBJECT, NODE, "", pack(message))
+    return Command(OBJECT, "/panel", "", pack(message))  # node under which the page keeps it; nothing is drawn there

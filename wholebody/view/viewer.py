@@ -40,7 +40,6 @@ from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
-CAMERA_POSTURES = 24  # number of postures of a motion that the camera takes into account
 
 
 class Viewer:
@@ -172,7 +171,8 @@ class Viewer:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
             self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST, played)
         self._motion, self._shown = (len(postures), step), None
-        chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
+        # number of postures of a motion that the camera takes into account
+        chosen = np.unique(np.linspace(0, len(postures) - 1, 24).astype(int))
         self._seen = [postures[index] for index in chosen]
         self._graph.do(self._camera_command())
         self._graph.do(panel(self.title, keyframes, len(postures), step))

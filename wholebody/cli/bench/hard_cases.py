@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 PAGE = "where-methods-fail.md"
 ASSETS = "assets/stability"
 ATTACKED = "reliability.md"
-INTERRUPTED = 130  # exit code after Ctrl-C
 
 
 @measuring(
@@ -200,7 +199,7 @@ def attack(arguments: argparse.Namespace) -> int:
     if arguments.update_docs is not None:
         replace_section(arguments.update_docs / ATTACKED, "attack", text)
         print(f"wrote {arguments.update_docs / ATTACKED}")
-    return INTERRUPTED if interrupted else int(any(one.outcome == "wrong" for one in rows))
+    return 130 if interrupted else int(any(one.outcome == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from wholebody.motion.batch_table import AvoidedCase
 
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
-WIDE = 120  # letters that a line of a batch's table needs
 
 
 @command(
@@ -160,7 +159,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.motion_bounds import MotionBounds
 
-    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
+    # letters that a line of a batch's table needs
+    console, folder = Console(width=max(120, Console().width)), arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:

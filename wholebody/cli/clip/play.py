@@ -14,8 +14,6 @@ if TYPE_CHECKING:
 
 NOTHING = "nothing"
 PICTURES = 8
-VIEW = (1.6, 1.0, 0.5)
-"""Direction from the figure to the camera: from in front, from the left and from above."""
 
 
 @command(
@@ -71,7 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
         if clip.figure.root == "free":
             middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
             away = 1.3 + 0.9 * float(np.ptp(clip.q[:, :2], axis=0).max())
-            viewer.look(tuple(middle + away * np.array(VIEW)), tuple(middle))
+            # direction from the figure to the camera: from in front, from the left and from above
+            viewer.look(tuple(middle + away * np.array((1.6, 1.0, 0.5))), tuple(middle))
         if out is not None and out.suffix.lower() == ".png":
             frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
             beside = None if ghost is None else list(ghost.q[frames])
