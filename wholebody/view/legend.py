@@ -8,19 +8,19 @@ from typing import Any
 
 from wholebody.assessment.posture import Assessment
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.view import style
 from wholebody.view.commands import pack
 from wholebody.view.scene_graph import Keyframe
 from wholebody.view.server import OBJECT, Command
+from wholebody.view.style import LOOK
 
 _MARKED = (
-    ("/normal", style.CONTACT_NODE, style.NORMAL, "normal of a contact"),
-    ("/depth", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/first", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/second", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/target", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
-    ("/wanted", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
-    ("/ball", style.BLOCKER_NODE, style.BLOCKER, "in the way"),
+    ("/normal", LOOK.contact_node, LOOK.normal, "normal of a contact"),
+    ("/depth", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/first", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/second", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+    ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+    ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),
 )
 """End of a marker's node, its folder, its colour and its meaning."""
 
@@ -29,9 +29,9 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
     """Meanings and colours (red, green, blue) of what occurs in any of the keyframes."""
     found: dict[str, Any] = {}
     if any(keyframe.touching for keyframe in keyframes):
-        found["touches"] = style.CONTACT[:3]
+        found["touches"] = LOOK.contact[:3]
     if any(keyframe.overlapping for keyframe in keyframes):
-        found["overlaps"] = style.PENETRATION[:3]
+        found["overlaps"] = LOOK.penetration[:3]
     paths = {path for keyframe in keyframes for path in keyframe.markers}
     for end, folder, shade, meaning in _MARKED:
         if any(path.startswith(folder) and path.endswith(end) for path in paths):
