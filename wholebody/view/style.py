@@ -24,6 +24,9 @@ OBJECTS: tuple[Color, ...] = (
 )
 """Muted colours of different hues, none near the two colours of state."""
 
+SHADES = 4
+"""How often the colours are used before they begin anew, each time darker."""
+
 SEE_THROUGH = 0.22
 """Opacity of transparent things."""
 
@@ -68,9 +71,9 @@ MARGIN = 1.08
 
 
 def object_color(number: int) -> Color:
-    """Colour of the thing with this number: the palette, then the palette darker."""
+    """Colour of the thing with this number: the palette, then the palette in darker shades, then from the beginning."""
     red, green, blue, alpha = OBJECTS[number % len(OBJECTS)]
-    shade = 0.78 ** (number // len(OBJECTS))
+    shade = 0.78 ** (number // len(OBJECTS) % SHADES)
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     return (*colorsys.hls_to_rgb(hue, max(lightness * shade, 0.15), saturation), alpha)
 
