@@ -14,9 +14,10 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import shown
+from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import Scratch, write
+from wholebody.figures.degrees import SLIDING
 from wholebody.figures.description import ROOT_JOINT
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
@@ -119,10 +120,14 @@ def _read(path: Path, file: Path, root: str | None) -> tuple[pin.Model, pin.Geom
             )
     limits = [np.array(limit) for limit in (model.lowerPositionLimit, model.upperPositionLimit)]
     for joint in list(model.joints)[1:]:
-        if joint.nq == joint.nv == 1 and limits[0][joint.idx_q] > limits[1][joint.idx_q]:
-            raise FileFormatError(
-                f"{path}: joint {shown(model.names[joint.id])} has a lower limit above the upper; correct it"
-            )
+        if joint.nq != 1 or joint.nv != 1:
+            continue
+        place, ends = f"{path}: joint {shown(model.names[joint.id])}", [limit[joint.idx_q] for limit in limits]
+        if ends[0] > ends[1]:
+            raise FileFormatError(f"{place} has a lower limit above the upper; correct it")
+        for end, value in zip(("lower", "upper"), ends, strict=True):
+            if not joint.shortname().startswith(SLIDING):
+                warn_of_degrees(value, f"{place}: the {end} limit")
     model.lowerPositionLimit, model.upperPositionLimit = limits[0] + 0.0, limits[1] + 0.0  # no negative zeros
     return model, meshes
 

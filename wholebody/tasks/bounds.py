@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance, number, shown
+from wholebody.base.checks import FASTEST_TURN, instance, number, shown, warn_of_degrees
 from wholebody.base.errors import InputError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
@@ -85,6 +85,9 @@ class StepLimit(Bound):
             object.__setattr__(self, name, _speed(getattr(self, name), f"StepLimit: {name}"))
         instance(self.joints, Mapping, "StepLimit: joints", "give velocities by name, such as {'left_arm': 1.0}")
         speeds = {name: _speed(speed, f"StepLimit: joints[{shown(name)}]") for name, speed in self.joints.items()}
+        turns = {"velocity": self.velocity, "root_turn": self.root_turn, **speeds}
+        for name, speed in turns.items():
+            warn_of_degrees(speed, f"StepLimit: {name}", FASTEST_TURN, "rad/s")
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
