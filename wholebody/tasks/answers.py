@@ -45,23 +45,23 @@ def _is_ours(kind: type) -> bool:
     return kind.__module__.partition(".")[0] == _OURS
 
 
-def check_answers(kind: type, table: Mapping[str, tuple[str, Check]]) -> None:
+def check_answers(kind: type, table: Mapping[str, Check]) -> None:
     """Have the answers of a class of terms checked.
 
     Args:
         kind: the class; methods and properties that this package wrote, or that are checked already, stay as they are.
-        table: method or property to what it answers in words, and its check.
+        table: method or property to the check of its answer.
     """
-    for name, (what, check) in table.items():
+    for name, check in table.items():
         owner = next((base for base in kind.__mro__ if name in vars(base)), None)
         if owner is None or _is_ours(owner):
             continue
         found = vars(owner)[name]
         if isinstance(found, property):
             if found.fget is not None and not hasattr(found.fget, _MARK):
-                setattr(kind, name, property(_checked(found.fget, what, check), doc=found.__doc__))
+                setattr(kind, name, property(_checked(found.fget, name, check), doc=found.__doc__))
         elif hasattr(found, "__get__") and not hasattr(found, _MARK):
-            setattr(kind, name, _checked(found, what, check))
+            setattr(kind, name, _checked(found, name, check))
 
 
 def _checked(found: Any, what: str, check: Check) -> Any:
@@ -71,6 +71,19 @@ def _checked(found: Any, what: str, check: Check) -> Any:
 
     setattr(answer, _MARK, True)
     return wraps(found)(answer) if hasattr(found, "__name__") else answer
+
+
+class Checked:
+    """A method that was set on a term, its answers checked."""
+
+    def __init__(self, term: object, what: str, found: Callable[..., Any], check: Check) -> None:
+        """Store the term, the method and its check."""
+        self._term, self._what, self._found, self._check = term, what, found, check
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """The checked answer."""
+        given = self._found(*arguments, **named)
+        return self._check(self._term, self._what, given, arguments or tuple(named.values()))
 
 
 def values(term: object, what: str, given: Any, _: object = ()) -> Array:
