@@ -11,6 +11,7 @@ import pytest
 
 from wholebody.view import Viewer, crowds, style
 from wholebody.view.browser import Browser
+from wholebody.view.style import LOOK
 
 pytestmark = pytest.mark.browser
 
@@ -46,6 +47,6 @@ def test_each_is_where_it_stands_in_its_size_and_colour(
     np.testing.assert_allclose(sides, (0.2, 0.4, 0.6), atol=1e-6)
     shades = np.array(balls[2]).reshape(4, 3)
     np.testing.assert_allclose(shades[1:3], [(0.2, 0.4, 0.0), (0.2, 0.4, 0.1)], atol=1e-6)
-    overlapping = style.tinted((0.2, 0.4, 0.2, 1.0), style.PENETRATION, style.TINT)[:3]
+    overlapping = style.tinted((0.2, 0.4, 0.2, 1.0), LOOK.penetration, LOOK.tint)[:3]
     np.testing.assert_allclose(shades[3], overlapping, atol=1e-6)
     assert nodes(["/objects/ball 0"]) == [None]
