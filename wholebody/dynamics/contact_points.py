@@ -13,8 +13,6 @@ from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.proximity import Contacts
 
 POINTS = 6  # of one contact beside its witness points: a box on a box has four, two crossed planks have six
-CORNERS = 3  # of a face, at least
-SAME_GAP = 1e-6  # m: by which coal's distances are off
 SAME_NORMAL = 0.995  # cosine of 0.1 rad: where pieces are 50 um apart, coal's normal is off by some 0.02 rad
 
 
@@ -71,28 +69,10 @@ class ContactFinder:
     def points(self, contacts: Contacts) -> ContactPoints:
         """Contact points of near pairs; the normals in `contacts` become those of faces where they are meant."""
         rows = self._rows.rows(contacts)
-        kept = _bearing(rows.contact, rows.gap)
-        owner, gap, wrench = rows.contact[kept], rows.gap[kept], rows.wrench[kept]
-        normal = wrench[:, :3].copy()
+        owner = rows.contact
+        normal = rows.wrench[:, :3].copy()
         middle = 0.5 * (contacts.point_a + contacts.point_b)
         height = (normal * middle[owner]).sum(axis=1)
-        point = np.cross(normal, wrench[:, 3:]) + height[:, None] * normal
+        point = np.cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
-        return ContactPoints(contacts.number[owner], bodies, normal, point, gap)
-
-
-def _bearing(owner: Indices, gap: Array) -> Mask:
-    """Which rows bear: all but a witness point among the corners of a face.
-
-    A face is borne by its corners or by a point among them alike. Friction at one point resists no turn, so the corners
-    bear.
-
-    Args:
-        owner: (m,) the contact of each row, ascending; the first of a contact is that of its witness points.
-        gap: (m,) metres.
-    """
-    witness = np.diff(owner, prepend=-1) != 0
-    count = np.bincount(owner)
-    lowest = np.full(len(count), np.inf)
-    np.minimum.at(lowest, owner[~witness], gap[~witness])
-    return np.asarray(~witness | (count[owner] <= CORNERS) | (lowest[owner] > gap + SAME_GAP))
+        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap)
