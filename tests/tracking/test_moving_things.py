@@ -52,7 +52,7 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
 
 @pytest.mark.parametrize(
     ("kind", "speed", "turn"),
-    [("plate", 1.0, 0.0), ("plate", 2.5, 3.0), ("board", 2.5, 3.0), ("ball", 2.5, 3.0), ("rod", 1.0, 0.0)],
+    [("plate", 2.5, 3.0), ("ball", 2.5, 3.0), ("rod", 1.0, 0.0)],
 )
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
@@ -106,10 +106,7 @@ def hash_of(kind: str, speed: float) -> int:
     return 10 * list(KINDS).index(kind) + int(speed)
 
 
-@pytest.mark.parametrize(
-    ("method", "kind"),
-    [*(("qp", kind) for kind in ("plate", "ball", "rod")), *((name, "plate") for name in ("newton", "ccd", "dls"))],
-)
+@pytest.mark.parametrize(("method", "kind"), [("qp", "plate"), ("qp", "rod"), ("ccd", "plate")])
 def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -> None:
     named = free = through = 0
     for seed, speed in enumerate((4.0, 20.0, 45.0)):
