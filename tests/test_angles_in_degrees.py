@@ -134,6 +134,7 @@ def test_degrees_in_the_description_of_a_robot_are_said(tmp_path, rpy, kind, low
 
 
 def test_degrees_in_the_limits_of_an_mjcf_are_said(tmp_path):
+    pytest.importorskip("mujoco")
     (tmp_path / "arm.xml").write_text(
         '<mujoco><compiler angle="radian"/><worldbody><body name="tip"><joint name="turn" range="-90 1"/>'
         '<geom type="sphere" size="0.1"/></body></worldbody></mujoco>'
