@@ -66,15 +66,14 @@ def check_answers(kind: type, table: Mapping[str, Check]) -> None:
 
 def _checked(found: Any, what: str, check: Check) -> Any:
     def answer(self: object, *arguments: Any, **named: Any) -> Any:
-        given = found.__get__(self, type(self))(*arguments, **named)
-        return check(self, what, given, arguments or tuple(named.values()))
+        return Checked(self, what, found.__get__(self, type(self)), check)(*arguments, **named)
 
     setattr(answer, _MARK, True)
     return wraps(found)(answer) if hasattr(found, "__name__") else answer
 
 
 class Checked:
-    """A method that was set on a term, its answers checked."""
+    """A method of a term whose answers are checked."""
 
     def __init__(self, term: object, what: str, found: Callable[..., Any], check: Check) -> None:
         """Store the term, the method and its check."""
@@ -82,8 +81,12 @@ class Checked:
 
     def __call__(self, *arguments: Any, **named: Any) -> Any:
         """The checked answer."""
-        given = self._found(*arguments, **named)
-        return self._check(self._term, self._what, given, arguments or tuple(named.values()))
+        given, asked = self._found(*arguments, **named), arguments or tuple(named.values())
+        try:
+            return self._check(self._term, self._what, given, asked)
+        except UndefinedTermError as error:
+            error.q = next((np.array(one.q) for one in asked if isinstance(one, State)), None)
+            raise
 
 
 def values(term: object, what: str, given: Any, _: object = ()) -> Array:
