@@ -48,7 +48,7 @@ class WindowSettings:
     rougher: float = 0.4
     smoother: float = 1.5
     jerk: float = 1.2
-    share: float = 0.03
+    share: float = 0.1
     rounds: int = 12
 
 
