@@ -138,7 +138,7 @@ def test_a_wrong_joint_profile_names_its_line(
 
 @pytest.mark.parametrize("ending", CLOSE)
 @given(data=st.data())
-@settings(max_examples=40)
+@settings(max_examples=20)
 def test_a_damaged_file_is_one_sentence_or_a_clip(
     ending: str, data: st.DataObject, human: Figure, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
