@@ -183,14 +183,13 @@ class SolvingTracker(NotCopyable):
     unswept = 0.0
     leaves_overlap = False
 
-    def __init__(self, method: Method, problem: Problem, dt: float, rough: Method | None = None) -> None:
+    def __init__(self, method: Method, problem: Problem, dt: float) -> None:
         """Set up.
 
         Args:
             method: solves the steps.
             problem: the problem.
             dt: seconds a step.
-            rough: solves frames during a motion; None for the method itself.
 
         Raises:
             InputError: dt is not a positive finite number, the scene changed after the problem was made, or the
@@ -198,7 +197,7 @@ class SolvingTracker(NotCopyable):
         """
         self.problem, self.dt = check_problem(problem, "tracker: problem"), time_step(dt, "dt")
         self.workspace = problem.workspace()
-        self._method, self._rough = method, method if rough is None else rough
+        self._method = method
         self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
     def step(self, q: Array) -> SolvedStep:
@@ -210,15 +209,15 @@ class SolvingTracker(NotCopyable):
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
-        """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
+        """A whole solve from the posture q (nq,)."""
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")
-        solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
+        solution = self._method.solve(self.begun(q))
         return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, from the start q (nq,)."""
-        return self._method.solve(self._begun(q))
+        return self._method.solve(self.begun(q))
 
     def nearest(self, q: Array) -> Solution:
         """The same with measures relative to q."""
@@ -234,7 +233,7 @@ class SolvingTracker(NotCopyable):
         most = at_speeds(self.problem.bounds, self.workspace.state.update(q), self.dt)
         return shortened(self.workspace.model, q, np.asarray(end, dtype=float), most)
 
-    def _begun(self, q: Array) -> Problem:
+    def begun(self, q: Array) -> Problem:
         """The present problem with the start q (nq,)."""
         now, asked = self.problem, self._asked
         asked.start = posture(q, now.scene.model.nq)
