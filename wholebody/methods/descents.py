@@ -8,7 +8,6 @@ from dataclasses import replace
 from typing import Any
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import number
 from wholebody.methods.base import SolvedStep, SolvingTracker
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.control import Control, Progress
@@ -82,9 +81,9 @@ class DescentTracker(SolvingTracker):
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """The end of a search from the posture q (nq,); without a tolerance to that of frames on the way."""
         if tolerance is not None:
-            number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+            TOLERANCE(tolerance, "tolerance")
         method = self._rough if tolerance is None else self._exact
-        problem = self.begun(q)
+        problem = self.from_here(q)
         problem.check_fresh()
         self.workspace.refresh()
         with Control(method.time_limit) as control:

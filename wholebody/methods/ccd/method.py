@@ -137,7 +137,7 @@ class CCDTracker(DescentTracker):
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """The result of overlap resolution at the posture q (nq,), as far as bounds on velocities allow."""
-        search = _Search(self._method, self.begun(q), self._shared, Control(np.inf))
+        search = _Search(self._method, self.from_here(q), self._shared, Control(np.inf))
         return (self.bounded(q, search.pushed_out(posture(q, self.workspace.model.nq))),)
 
 
