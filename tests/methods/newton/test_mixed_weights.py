@@ -1,4 +1,4 @@
-"""Goals of very different weights that can be met together: a tracker meets both, about as soon as with equal weights."""
+"""Goals of very different weights that can be met together: a tracker meets both as soon as with equal weights."""
 
 from __future__ import annotations
 
