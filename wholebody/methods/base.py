@@ -213,12 +213,12 @@ class SolvingTracker(NotCopyable):
         """A whole solve from the posture q (nq,)."""
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")
-        solution = self._method.solve(self.from_here(q))
+        solution = self._method.solve(self._begun(q))
         return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:
         """The method's answer for the present goals, from the start q (nq,)."""
-        return self._method.solve(self.from_here(q))
+        return self._method.solve(self._begun(q))
 
     def nearest(self, q: Array) -> Solution:
         """The same with measures relative to q."""
@@ -234,7 +234,7 @@ class SolvingTracker(NotCopyable):
         most = at_speeds(self.problem.bounds, self.workspace.state.update(q), self.dt)
         return shortened(self.workspace.model, q, np.asarray(end, dtype=float), most)
 
-    def from_here(self, q: Array) -> Problem:
+    def _begun(self, q: Array) -> Problem:
         """The present problem with the start q (nq,)."""
         now, asked = self.problem, self._asked
         asked.start = posture(q, now.scene.model.nq)

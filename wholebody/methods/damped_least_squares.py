@@ -75,8 +75,8 @@ class DampedLeastSquares(Checked, Descends):
         """None if all constraints are equalities; otherwise the sentence that names the others."""
         return refusal(self.name, _unsupported(check_problem(problem, "DampedLeastSquares.accepts: problem")))
 
-    def descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
-        """See `Descends.descend`; contacts are ignored."""
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`; contacts are ignored."""
         descent = _Descent(problem, self, workspace.state, control)
         converged = descent.run()
         return Ending(

@@ -35,7 +35,7 @@ class Descends(ABC):
         """Name for tables."""
 
     @abstractmethod
-    def descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
         """Search from the problem's start in a workspace on its scene.
 
         Raises:
@@ -56,7 +56,7 @@ class Descends(ABC):
         check_problem(problem, f"{type(self).__name__}.solve: problem")
         began = time.perf_counter()
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
-            ending = self.descend(problem, workspace, control)
+            ending = self._descend(problem, workspace, control)
         return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
     def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
@@ -83,7 +83,7 @@ class DescentTracker(SolvingTracker):
         if tolerance is not None:
             TOLERANCE(tolerance, "tolerance")
         method = self._rough if tolerance is None else self._exact
-        problem = self.from_here(q)
+        problem = self._begun(q)
         problem.check_fresh()
         self.workspace.refresh()
         with Control(method.time_limit) as control:
@@ -92,4 +92,4 @@ class DescentTracker(SolvingTracker):
 
     def search(self, method: Descends, problem: Problem, control: Control) -> Ending:
         """The end of the method's search; a tracker may keep what searches share."""
-        return method.descend(problem, self.workspace, control)
+        return method._descend(problem, self.workspace, control)

@@ -95,8 +95,8 @@ class CCD(Checked, Descends):
             return str(error)
         return None
 
-    def descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
-        """See `Descends.descend`."""
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`."""
         return _Search(self, problem, _Shared(problem.scene, workspace), control).end()
 
     def tracker(self, problem: Problem, dt: float) -> CCDTracker:
@@ -137,7 +137,7 @@ class CCDTracker(DescentTracker):
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """The result of overlap resolution at the posture q (nq,), as far as bounds on velocities allow."""
-        search = _Search(self._method, self.from_here(q), self._shared, Control(np.inf))
+        search = _Search(self._method, self._begun(q), self._shared, Control(np.inf))
         return (self.bounded(q, search.pushed_out(posture(q, self.workspace.model.nq))),)
 
 

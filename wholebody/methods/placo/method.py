@@ -82,8 +82,8 @@ class Placo(Checked, Descends):
         check_problem(problem, "Placo.pairs: problem")
         return np.arange(len(problem.clearances))
 
-    def descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
-        """See `Descends.descend`.
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`.
 
         Raises:
             UnsupportedTermError: placo cannot express the problem.
