@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from abc import ABC, abstractmethod
 from dataclasses import replace
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 from wholebody.base.arrays import Array
 from wholebody.methods.base import SolvedStep, SolvingTracker
@@ -68,15 +68,18 @@ class Descends(ABC):
         return DescentTracker(self, problem, dt)
 
 
-class DescentTracker(SolvingTracker):
+Kind = TypeVar("Kind", bound=Descends)
+
+
+class DescentTracker(SolvingTracker, Generic[Kind]):
     """Follows by the searches of a method: a frame takes the end of a search, without an assessment or a message."""
 
-    def __init__(self, method: Descends, problem: Problem, dt: float) -> None:
+    def __init__(self, method: Kind, problem: Problem, dt: float) -> None:
         """Set up; arguments and errors as for `SolvingTracker`."""
         super().__init__(method, problem, dt)  # type: ignore[arg-type] # a method also says what it accepts
         rough: Any = method
         self._exact = method
-        self._rough: Descends = replace(rough, tolerance=max(method.tolerance, method.on_the_way))
+        self._rough: Kind = replace(rough, tolerance=max(method.tolerance, method.on_the_way))
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """The end of a search from the posture q (nq,); without a tolerance to that of frames on the way."""
@@ -90,6 +93,6 @@ class DescentTracker(SolvingTracker):
             ending = self.search(method, problem, control)
         return SolvedStep(self.bounded(q, ending.q), ending.iterations, 0.0)
 
-    def search(self, method: Descends, problem: Problem, control: Control) -> Ending:
+    def search(self, method: Kind, problem: Problem, control: Control) -> Ending:
         """The end of the method's search; a tracker may keep what searches share."""
         return method._descend(problem, self.workspace, control)

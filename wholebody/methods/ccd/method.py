@@ -122,13 +122,12 @@ class CCD(Checked, Descends):
             return _Search(self, problem, _Shared(problem.scene, workspace), Control(np.inf)).pushed_out(q)
 
 
-class CCDTracker(DescentTracker):
+class CCDTracker(DescentTracker[CCD]):
     """Follows by searches; its ways out resolve overlap with things that were moved into the figure."""
 
     def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
         """Set up; arguments and errors as for `DescentTracker`."""
         super().__init__(method, problem, dt)
-        self._method = method
         self._shared = _Shared(problem.scene, self.workspace)
 
     def search(self, method: CCD, problem: Problem, control: Control) -> Ending:
@@ -137,7 +136,7 @@ class CCDTracker(DescentTracker):
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """The result of overlap resolution at the posture q (nq,), as far as bounds on velocities allow."""
-        search = _Search(self._method, self._begun(q), self._shared, Control(np.inf))
+        search = _Search(self._exact, self._begun(q), self._shared, Control(np.inf))
         return (self.bounded(q, search.pushed_out(posture(q, self.workspace.model.nq))),)
 
 

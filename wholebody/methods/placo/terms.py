@@ -142,7 +142,8 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
 
 def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
     figure, dofs = problem.scene.figure, set(np.asarray(goal.dofs).tolist())
-    values = dict(joint for dof, *joint in _joint_values(robot, problem, goal.resolved_target) if dof in dofs)
+    joints = _joint_values(robot, problem, goal.resolved_target)
+    values = {name: value for dof, name, value in joints if dof in dofs}
     if values:
         task = solver.add_joints_task()
         task.set_joints(values)
