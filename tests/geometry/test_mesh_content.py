@@ -44,7 +44,8 @@ def test_ply_is_read_and_gltf_is_y_up(tmp_path: Path) -> None:
     for suffix in ("ply", "glb"):
         (tmp_path / f"box.{suffix}").write_bytes(box.export(file_type=suffix))
     assert np.ptp(wb.Mesh(tmp_path / "box.ply").vertices, axis=0) == pytest.approx([1.0, 2.0, 3.0])
-    assert np.ptp(wb.Mesh(tmp_path / "box.glb").vertices, axis=0) == pytest.approx([1.0, 3.0, 2.0])
+    assert np.ptp(wb.Mesh(tmp_path / "box.glb").vertices, axis=0) == pytest.approx([3.0, 1.0, 2.0])
+    assert np.ptp(wb.Mesh(tmp_path / "box.glb", up="y").vertices, axis=0) == pytest.approx([1.0, 3.0, 2.0])
     assert np.ptp(wb.Mesh(tmp_path / "box.glb", up="z").vertices, axis=0) == pytest.approx([1.0, 2.0, 3.0])
 
 

@@ -71,3 +71,12 @@ def test_what_is_drawn_has_the_size_of_what_is_tested(shape: Any) -> None:
     shape.computeLocalAABB()
     np.testing.assert_allclose(mesh.bounds, (shape.aabb_local.min_, shape.aabb_local.max_), atol=1e-2)
     assert mesh.is_watertight
+
+
+def test_what_is_written_is_read_back_in_place(tmp_path: Path) -> None:
+    scene = wb.Scene(wb.load("hand")).add(wb.Box((0.1, 0.2, 0.3)), name="box", at=(1.0, 2.0, 3.0))
+    with wb.Viewer(scene) as viewer:
+        viewer.show(scene.figure.neutral)
+        mesh = wb.Mesh(viewer.save(tmp_path / "scene.glb"))
+    box = mesh.vertices[mesh.vertices[:, 2] > 2.0]
+    np.testing.assert_allclose([box.min(axis=0), box.max(axis=0)], [[0.95, 1.9, 2.85], [1.05, 2.1, 3.15]], atol=1e-6)

@@ -21,6 +21,10 @@ Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rotation for files whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
 
 
+GLTF: Array = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
+"""Rotation for glTF by its standard, y up and z to the front, into z up and x to the front; `Viewer.save` turns back."""
+
+
 class EmptyMeshError(FileFormatError):
     """A mesh file that is sound, but has no triangles in it."""
 

@@ -20,7 +20,7 @@ from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces
-from wholebody.geometry.meshes import Y_UP, read_mesh
+from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.placement import unit_vector
 
@@ -316,7 +316,7 @@ class Mesh(Shape):
             or an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
         scale: metres for each unit of the file: 0.001 for millimetres.
         up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y. If left out,
-            "y" for glTF and GLB files, as their standard says, and "z" for everything else.
+            glTF and GLB files have y up and z to the front, as their standard says, which become z and x; others "z".
         max_vertices: most vertices of a piece of a decomposition; convex parts keep all of theirs.
         threshold: concavity of the pieces of a decomposition, as a share of the part's size: smaller is closer, with
             more pieces.
@@ -339,9 +339,6 @@ class Mesh(Shape):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.up is None:
-            gltf = isinstance(self.source, (str, PathLike)) and str(self.source).lower().endswith((".gltf", ".glb"))
-            object.__setattr__(self, "up", "y" if gltf else "z")
         if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
             object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):
@@ -360,7 +357,9 @@ class Mesh(Shape):
         with np.errstate(over="ignore"):  # overflowed values are refused as not finite
             vertices = vertices * self.scale
         vertices, faces = check_mesh(vertices, faces, self._name())
-        vertices = vertices @ Y_UP.T if self.up == "y" else vertices.copy()
+        gltf = isinstance(self.source, (str, PathLike)) and str(self.source).lower().endswith((".gltf", ".glb"))
+        turn = Y_UP if self.up == "y" else GLTF if self.up is None and gltf else np.eye(3)
+        vertices = vertices @ turn.T
         faces = faces.copy()
         vertices.setflags(write=False)
         faces.setflags(write=False)
