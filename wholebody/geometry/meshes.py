@@ -22,7 +22,7 @@ Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 
 
 GLTF: Array = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-"""Rotation for glTF by its standard, y up and z to the front, into z up and x to the front; `Viewer.save` turns back."""
+"""Rotation for glTF by its standard, y up and z to the front, into z up and x to the front, as `Viewer.save` has it."""
 
 
 class EmptyMeshError(FileFormatError):
