@@ -46,3 +46,10 @@ def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
     """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
     solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
+
+
+@pytest.mark.parametrize("number", [8, 13])
+def test_contacts_are_met_from_an_end_in_front_of_all_faces(number: int) -> None:
+    """The first descents end 0.2 m away, or in front of the faces, whence feasibility alone stalls at 1 cm."""
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
+    assert solution.solved, solution

@@ -29,8 +29,7 @@ IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by f
 ACCURACY = 1e-3  # m, rad: to which a descent goes; what is exact there is not where surfaces meet
 MET = 0.01  # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
 PROGRAMS = 40  # most programs of one descent
-TRIES = 24  # most descents, of which the first is from the start; of a tenth of drivers one in ten is met
-SPREAD = 0.3  # share of each joint's range by which the others may be away from it
+TRIES = 24  # most descents, of which the first is from the start; of a driver in 30 one in ten is met
 SHARE = 0.5  # of the time limit that the descents may take
 
 
@@ -63,7 +62,7 @@ def before_contact(
     alone = lineariser.relaxed(ENDLESS)
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
-    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), TRIES - 1, (SPREAD,))
+    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), TRIES - 1)
     minima, missed = Minima(), list[LocalSolution]()
     for q in chain([start], others):
         local = _descent(subproblem, alone, solver, trace, control).run(q)
@@ -84,5 +83,13 @@ def _descent(
     subproblem: Subproblem, alone: Lineariser, solver: QPSolver, trace: list[TraceEntry], control: Control
 ) -> SQP:
     return SQP(
-        subproblem, alone, solver, ACCURACY, PROGRAMS, trace=trace, note="before contact", full_step=True, control=control
+        subproblem,
+        alone,
+        solver,
+        ACCURACY,
+        PROGRAMS,
+        trace=trace,
+        note="before contact",
+        full_step=True,
+        control=control,
     )
