@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,6 +148,36 @@ def test_open_and_flat_and_tiny_parts_are_told() -> None:
     assert "thickened" in notes
     assert "left out" in notes
     assert found.added_volume == 0.0
+
+
+def without(mesh: trimesh.Trimesh, gone: Callable[[Array], Array]) -> tuple[Array, Any]:
+    return mesh.vertices, mesh.faces[~gone(mesh.face_normals)]
+
+
+def test_a_surface_that_lacks_faces_is_closed() -> None:
+    tube = trimesh.creation.annulus(0.04, 0.05, 0.5)
+    whole = convex_pieces(tube.vertices, tube.faces)
+    cut = convex_pieces(tube.vertices, tube.faces[1:])
+    assert len(cut.pieces) == len(whole.pieces) > 1
+    assert cut.added_volume == pytest.approx(whole.added_volume, abs=0.01)
+    assert "1 hole closed" in cut.notes[0]
+    leg = convex_pieces(*without(trimesh.creation.cylinder(0.02, 1.0), lambda normal: normal[:, 2] > 0.5))
+    assert [piece.volume for piece in leg.pieces] == pytest.approx([np.pi * 4e-4], rel=0.01)
+    turned = tube.faces.copy()
+    turned[::3] = turned[::3, ::-1]
+    assert not convex_pieces(tube.vertices, turned).notes
+
+
+def test_a_shell_is_what_it_shows() -> None:
+    cylinder = trimesh.creation.cylinder(0.05, 1.0)
+    pipe = convex_pieces(*without(cylinder, lambda normal: abs(normal[:, 2]) > 0.5))
+    assert "encloses nothing" in pipe.notes[0]
+    inside = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.49], [0.03, 0.0, 0.2]])
+    assert outside(inside, pipe.pieces).min() > 0.01
+    on_it = trimesh.sample.sample_surface(cylinder, 400, seed=0)[0]
+    assert outside(on_it[np.abs(on_it[:, 2]) < 0.4999], pipe.pieces).max() < 2e-4
+    bin_ = convex_pieces(*without(trimesh.creation.box((1, 1, 1)), lambda normal: normal[:, 2] > 0.5))
+    assert outside(np.zeros((1, 3)), bin_.pieces).min() > 0.4
 
 
 def test_nothing_solid_is_an_error() -> None:
