@@ -17,6 +17,7 @@ CASES = {
     "frame on an edge": (wb.Touch("right_index_tip", "thing"), 3),
     "frame on a rotated box": (wb.Touch("right_index_tip", "thing"), 25),
     "segment on a box": (wb.Touch("right_hand", "thing"), 3),
+    "segment across an edge": (wb.Touch("right_hand", "thing"), 7),  # no face has the normal of two edges that cross
     "piece on a box": (wb.Touch("right_hand:2", "thing"), 6),
     "palm on a box": (wb.Grasp("right", "thing"), 5),
 }
