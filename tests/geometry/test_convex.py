@@ -22,7 +22,6 @@ from wholebody.geometry import convex
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces
 from wholebody.geometry.mesh_cache import ConvexPieces
-from wholebody.geometry.meshes import read_mesh
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Mesh
 from wholebody.geometry.simplified_hull import simplified_hull
@@ -191,7 +190,7 @@ def test_pieces_are_the_callers_own() -> None:
     assert np.abs(box.pieces()[0].placement.translation).max() < 1e-9
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(st.integers(0, 2**32 - 1), st.integers(20, 200), st.integers(8, 40))
 def test_a_simpler_hull_holds_all_points(seed: int, count: int, most: int) -> None:
     points = np.random.default_rng(seed).normal(size=(count, 3)) * (1.0, 0.5, 0.1)
@@ -240,23 +239,6 @@ def test_bad_files_are_named(tmp_path: Path, name: str, content: bytes | None, r
     with pytest.raises(FileFormatError, match=reason) as error:
         Mesh(path)
     assert name in str(error.value)
-
-
-def test_a_real_chair(shared_data: Path) -> None:
-    path = shared_data / "props" / "chair.obj"
-    if not path.is_file():
-        pytest.skip("no chair among the props")
-    chair = Mesh(path, scale=0.75, up="y")
-    found = chair.convexified()
-    assert chair.vertices[:, 2].max() == pytest.approx(0.92, abs=0.02)
-    assert -0.01 < chair.added_volume < 0.02
-    assert len(found.notes) == 6  # legs and braces without top: their hulls are what they look like
-    vertices, faces = read_mesh(path)
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    points, _ = trimesh.sample.sample_surface(mesh, 2000, seed=0)
-    turned = 0.75 * points @ np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]]).T
-    assert outside(turned, found.pieces).max() < 2e-4
-    assert outside(np.array([[0.0, 0.0, 0.1]]), found.pieces)[0] > 0.02  # between the legs
 
 
 def test_flat_parts_of_a_decomposition_are_thickened(
