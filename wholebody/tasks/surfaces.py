@@ -274,7 +274,7 @@ def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -
     """
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
-    if not sharp or near.distance > STEP:
+    if not sharp or abs(near.distance) > STEP:
         return NO_NORMALS
     a, b, found = first.placed(i, state), second.placed(j, state), []
     for way in across(near.normal)[:2]:
