@@ -94,7 +94,7 @@ def test_derivatives_of_supporting_planes(name: str) -> None:
     assert planes is not None
     assert len(planes.value) > 1
     of_part = planes.key % MOST_OF_PART
-    faces = (of_part < 6) | (of_part >= 6 + 4)  # four directions about an edge of the box are found anew at each posture
+    faces = (of_part < 6) | (of_part >= 6 + 4)  # those of edges are found anew at each posture
     half, rng = 1e-6, np.random.default_rng(1)
     for way in rng.normal(size=(6, model.nv)):
         found = []
