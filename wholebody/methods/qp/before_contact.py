@@ -19,7 +19,7 @@ from wholebody.methods.qp.iterates import LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, restarts
+from wholebody.methods.starts import restarts
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.tasks.approach import approached, has_face
@@ -30,6 +30,8 @@ ACCURACY = 1e-3  # m, rad: to which a descent goes; what is exact there is not w
 MET = 0.01  # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
 PROGRAMS = 40  # most programs of one descent
 TRIES = 24  # most descents, of which the first is from the start; of a driver in 30 one in ten is met
+AGREEING = 3  # ends that are the least and equally far: what is asked is out of reach, and others are no nearer
+AGREE = 1.1  # times the least violation up to which ends count as equally far
 SHARE = 0.5  # of the time limit that the descents may take
 
 
@@ -63,7 +65,7 @@ def before_contact(
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
     others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), TRIES - 1)
-    minima, missed = Minima(), list[LocalSolution]()
+    ends, missed = list[float](), list[LocalSolution]()
     for q in chain([start], others):
         local = _descent(subproblem, alone, solver, trace, control).run(q)
         if local.violation.worst <= MET:
@@ -71,10 +73,11 @@ def before_contact(
             missed = []
         else:
             missed.append(local)
-            minima.add(local.violation.total, local.converged)
-        if minima.complete or control.over or control.spent > SHARE:
+            ends.append(local.violation.total)
+        alike = sum(end <= AGREE * min(ends) for end in ends) >= AGREEING
+        if alike or control.over or control.spent > SHARE:
             break
-    if missed:
+    if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)
         yield with_values(nearest, iterations=sum(each.iterations for each in missed))
 
