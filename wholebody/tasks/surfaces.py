@@ -281,7 +281,7 @@ def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -
         for step in (-EDGE, EDGE):
             slid = pin.SE3(b.rotation, b.translation + step * way)
             found.append(-np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
-    normals = np.array(found)
+    normals: Array = np.array(found)
     return normals[np.linalg.norm(normals, axis=1) > 0.5]
 
 
