@@ -15,7 +15,8 @@ from wholebody.base.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.proximity import Contacts, PairTable, Proximity
+from wholebody.geometry.proximity import PairTable, Proximity
+from wholebody.geometry.records import Contacts
 
 APART = 1e-3
 """Least distance of two pieces in the posture, metres."""

@@ -7,6 +7,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.geometry.memory_views import RESULT_FIRST
+from wholebody.geometry.records import ContactRoom, Memory, PieceArrays
 
 
 @compiled(inner=True)
@@ -63,19 +64,8 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
 
 
 @compiled(inner=True)
-def cull(
-    placement: Array,
-    pairs: Indices,
-    reach: Array,
-    half: Array,
-    travelled: Array,
-    bound: Array,
-    extent: Array,
-    within: float,
-    most: Array,
-    index: Indices,
-) -> int:
-    """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `index`.
+def cull(placement: Array, pieces: PieceArrays, memory: Memory, within: float, most: Array) -> int:
+    """Pairs that may be nearer than `within`, in the order of the pairs: they go to the front of `memory.index`.
 
     A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
     was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
@@ -83,29 +73,24 @@ def cull(
 
     Args:
         placement: (n, 4, 3) where the pieces are.
-        pairs: (pairs, 2) their pieces.
-        reach: (n,) radius of each piece about its origin; may be infinite.
-        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
-        travelled: (n,) see `travel`.
-        bound: (pairs,) lower bound of the distance when the pair was last looked at, plus what both had travelled then;
-            renewed for pairs that the spheres or boxes leave out.
-        extent: (n, 3) room for the sizes of the boxes.
+        pieces: see `PieceArrays`.
+        memory: see `Memory`; its bounds are renewed for pairs that the spheres or boxes leave out.
         within: metres.
-        most: (pairs,) for one pair each, in place of `within` where it is less.
-        index: (pairs,) room for the answer.
+        most: (p,) for one pair each, in place of `within` where it is less.
 
     Returns:
         How many there are.
     """
-    bound_by_boxes(placement, half, extent)
+    travelled, bound, index = memory.travelled, memory.bound, memory.index
+    bound_by_boxes(placement, pieces.half, memory.extent)
     count = 0
-    for p in range(len(pairs)):
-        a, b = pairs[p, 0], pairs[p, 1]
+    for p in range(len(pieces.pairs)):
+        a, b = pieces.pairs[p, 0], pieces.pairs[p, 1]
         way = travelled[a] + travelled[b]
         near = min(within, most[p])
         if bound[p] - way >= near:
             continue
-        gap = outer_gap(placement, reach, extent, a, b)
+        gap = outer_gap(placement, pieces.reach, memory.extent, a, b)
         if gap >= near:
             bound[p] = gap + way
             continue
@@ -118,34 +103,24 @@ def cull(
 def gather(
     results: Array,
     index: Indices,
-    pairs: Indices,
-    points_meet: Array,
-    travelled: Array,
-    bound: Array,
+    pieces: PieceArrays,
+    memory: Memory,
     accuracy: float,
     within: float,
     most: Array,
-    nearest: Array,
-    vectors: Array,
-    number: Indices,
-    pair: Indices,
+    room: ContactRoom,
 ) -> tuple[int, bool]:
     """Copy the results of the pairs nearer than `within`, and remember the distances of all that were asked.
 
     Args:
-        results: (pairs, 20) of coal; see `memory_views.result_view`.
+        results: (p, 20) of coal; see `memory_views.result_view`.
         index: (k,) the pairs that were asked.
-        pairs: (pairs, 2) their pieces.
-        points_meet: (pairs,) distance at and below which coal may have no normal.
-        travelled: (n,) see `travel`.
-        bound: (pairs,) see `cull`; renewed.
+        pieces: see `PieceArrays`.
+        memory: see `Memory`; its bounds are renewed.
         accuracy: metres to which a distance is known, and share of it.
         within: metres.
-        most: (pairs,) see `cull`.
-        nearest: (k,) room for distances.
-        vectors: (3, k, 3) room for normals and the nearest points on first and second pieces.
-        number: (k,) room for the places of the pairs.
-        pair: (k, 2) room for their pieces.
+        most: (p,) see `cull`.
+        room: for the contacts.
 
     Returns:
         How many are near, and whether one of them needs its normal repaired.
@@ -153,16 +128,17 @@ def gather(
     count = 0
     broken = False
     for p in index:
-        a, b = pairs[p, 0], pairs[p, 1]
+        a, b = pieces.pairs[p, 0], pieces.pairs[p, 1]
         distance = results[p, RESULT_FIRST]
-        bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
+        way = memory.travelled[a] + memory.travelled[b]
+        memory.bound[p] = distance - accuracy * (1.0 + abs(distance)) + way
         if not distance < min(within, most[p]):
             continue
-        nearest[count], number[count] = distance, p
+        room.distance[count], room.number[count] = distance, p
         for k in range(9):
-            vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
-        pair[count, 0], pair[count, 1] = a, b
-        broken = broken or distance <= points_meet[p]
+            room.vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
+        room.pair[count, 0], room.pair[count, 1] = a, b
+        broken = broken or distance <= pieces.points_meet[p]
         count += 1
     return count, broken
 
@@ -195,27 +171,14 @@ def renew(marked: Indices, before: int, index: Indices, count: int, changed: Ind
 
 @compiled()
 def look(
-    placement: Array,
-    last: Array,
-    pairs: Indices,
-    reach: Array,
-    half: Array,
-    travelled: Array,
-    bound: Array,
-    extent: Array,
-    within: float,
-    most: Array,
-    index: Indices,
-    marked: Indices,
-    before: int,
-    changed: Indices,
+    placement: Array, pieces: PieceArrays, memory: Memory, before: int, within: float, most: Array
 ) -> tuple[int, int, int]:
-    """`travel`, `cull` and `renew`.
+    """`travel`, `cull` and `renew`; `before` pairs are marked.
 
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
-    travel(placement, last, reach, travelled)
-    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
-    gone, came = renew(marked, before, index, count, changed)
+    travel(placement, memory.last, pieces.reach, memory.travelled)
+    count = cull(placement, pieces, memory, within, most)
+    gone, came = renew(memory.marked, before, memory.index, count, memory.changed)
     return count, gone, came

@@ -20,7 +20,7 @@ from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
-from wholebody.geometry.proximity import Contacts
+from wholebody.geometry.records import Contacts, RowRoom, no_contacts
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
@@ -76,10 +76,7 @@ class Linearisation(NamedTuple):
     planes: TermPlanes | None = None
 
 
-_NO_CONTACTS = Contacts(
-    np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
-    np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
-)  # fmt: skip
+_NO_CONTACTS = no_contacts(np.zeros((0, 4, 3)))
 
 
 NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
@@ -223,12 +220,12 @@ class Lineariser:
             if part is not None:
                 squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
                 squared = squared + term.weight * term.curvature(self.state)
-        goals, contact = self._plan.goal_rows, self._contact[:count].copy()
+        goals, contact = self._plan.goal_rows, self._rows.contact[:count].copy()
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
         found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
-            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
+            self._rows.gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
             measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, found,
         )  # fmt: skip
 
@@ -244,9 +241,10 @@ class Lineariser:
         room = self._packed
         jacobian = room.jacobian[: len(room.value) + count]
         self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
-        contact = self._contact[:count]
+        contact = self._rows.contact[:count]
         return PackedLinearisation(
-            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
+            self.state.q, room.goals, room.value, jacobian, contacts, self._rows.gap[:count], contact,
+            clearance[contact],
             room.measure, room.box,
         )  # fmt: skip
 
@@ -254,7 +252,7 @@ class Lineariser:
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         none = np.zeros(0)
         return PackedLinearisation(
-            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
+            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._rows.gap), nv)), _NO_CONTACTS, none,
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
 
@@ -264,9 +262,9 @@ class Lineariser:
         """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
         contacts = near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
-        if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
+        if len(clearance) * (1 + MOST_ENDS) > len(self._rows.gap):
             self._grow(2 * len(clearance))
-        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
+        count = self.workspace.rows.write(contacts, clearance, self._rows)
         return contacts, clearance, count
 
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
@@ -274,7 +272,7 @@ class Lineariser:
         state, plan = self.state, self._plan
         self._kernel.linearise(
             state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure, squares,
+            self._rows.wrench, self._rows.joints, count, self._term_wrench, value, jacobian, box, measure, squares,
         )  # fmt: skip
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
@@ -320,9 +318,7 @@ class Lineariser:
     def _grow(self, contacts: int) -> None:
         """Make room for the rows of so many contacts."""
         rows = contacts * (1 + MOST_ENDS)
-        self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
-        self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
-        self._packed = None
+        self._rows, self._packed = RowRoom.of(rows), None
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""
