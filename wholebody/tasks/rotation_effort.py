@@ -127,20 +127,15 @@ def ball_joints(model: Any, start: Array, weights: Array) -> tuple[BallJoint, ..
         start: (nq,) posture from which rotations count.
         weights: (nv,) of the degrees of freedom.
     """
-    children = [[k for k in range(1, model.njoints) if model.parents[k] == joint] for joint in range(model.njoints)]
     state = State(model).update(pin.neutral(model))
     jacobian = pin.computeJointJacobians(model, state.data, state.q)
     found: list[BallJoint] = []
     taken: set[int] = set()
     for first in range(1, model.njoints):
-        chain = [first]
-        while len(chain) < 3 and len(children[chain[-1]]) == 1:
-            chain.append(children[chain[-1]][0])
-        joints = [model.joints[joint] for joint in chain]
-        centred = all(np.abs(model.jointPlacements[joint].translation).max() < SAME for joint in chain[1:])
-        hinges = all((joint.nq, joint.nv) == (1, 1) and "JointModelR" in joint.shortname() for joint in joints)
-        if len(chain) < 3 or not (centred and hinges) or taken & set(chain):
+        chain = _hinges_of_one_centre(model, first)
+        if len(chain) < 3 or taken & set(chain):
             continue
+        joints = [model.joints[joint] for joint in chain]
         carrier = state.data.oMi[model.parents[first]].rotation
         axes = np.array([carrier.T @ jacobian[3:, joint.idx_v] for joint in joints])
         if np.abs(axes @ axes.T - np.eye(3)).max() > SAME:
@@ -151,3 +146,17 @@ def ball_joints(model: Any, start: Array, weights: Array) -> tuple[BallJoint, ..
         ball = BallJoint(idx_q, idx_v, axes, weights[list(idx_v)], np.eye(3))
         found.append(with_values(ball, start=ball.turn(start)[0]))
     return tuple(found)
+
+
+def _hinges_of_one_centre(model: Any, first: int) -> list[int]:
+    """A hinge and at most two after it in a row, as long as all have one centre."""
+    chain: list[int] = []
+    after = [first]
+    while len(chain) < 3 and len(after) == 1:
+        joint = model.joints[after[0]]
+        centred = not chain or np.abs(model.jointPlacements[after[0]].translation).max() < SAME
+        if not centred or (joint.nq, joint.nv) != (1, 1) or "JointModelR" not in joint.shortname():
+            break
+        chain += after
+        after = [k for k in range(1, model.njoints) if model.parents[k] == chain[-1]]
+    return chain

@@ -26,6 +26,7 @@ from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
+from wholebody.terms.entries import Pose, TermRoom
 from wholebody.terms.plan import OtherTerm, TermPlan, checked_rows, make_plan
 from wholebody.terms.planes import TermPlanes, term_planes
 
@@ -80,7 +81,7 @@ _NO_CONTACTS = no_contacts(np.zeros((0, 4, 3)))
 
 
 NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
-NO_WRENCHES, NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
+NO_ROWS = RowRoom.of(0)
 
 
 class PackedLinearisation(NamedTuple):
@@ -270,10 +271,9 @@ class Lineariser:
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
         """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
         state, plan = self.state, self._plan
-        self._kernel.linearise(
-            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-            self._rows.wrench, self._rows.joints, count, self._term_wrench, value, jacobian, box, measure, squares,
-        )  # fmt: skip
+        pose = Pose(state.joints, state.columns, state.q)
+        room = TermRoom(self._term_wrench, value, jacobian, box, measure, squares)
+        self._kernel.linearise(pose, plan.tables, self._rows, count, room)
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
         if plan.other_bounds:
@@ -337,9 +337,7 @@ class Lineariser:
     def _write_rows(self, wrench: Wrench, rows: Array) -> None:
         """Write the rows (m, nv) of a wrench."""
         wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
-        self._kernel.wrench_rows(
-            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
-        )
+        self._kernel.wrench_rows(wrenches, joint, against, self.state.columns, self._plan.tables, rows)
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
@@ -363,12 +361,10 @@ def compiled_kernel() -> Any:
     state = State(pin.buildSampleModelManipulator())
     plan = make_plan(NO_LIMITS, (), (), (), (), None, state)
     nv = state.model.nv
-    term_kernel.linearise(
-        state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
-        NO_WRENCHES, NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
-        np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
-    )  # fmt: skip
-    term_kernel.wrench_rows(
-        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
-    )  # fmt: skip
+    pose = Pose(state.joints, state.columns, state.q)
+    room = TermRoom(
+        NO_ROWS.wrench, np.zeros(0), np.zeros((0, nv)), np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv))
+    )
+    term_kernel.linearise(pose, plan.tables, NO_ROWS, 0, room)
+    term_kernel.wrench_rows(NO_ROWS.wrench, 0, 0, state.columns, plan.tables, np.zeros((0, nv)))
     return term_kernel

@@ -80,21 +80,23 @@ def _reason(a: Solid, b: Solid) -> str | None:
         return _NEIGHBOURS
     if side_a == side_b and (is_finger(part_a) or is_finger(part_b)):
         return finger_pair(part_a, part_b)
-    if part_b == "clavicle" and (part_a == "clavicle" or (a.segment in TRUNK and a.segment != "head")):
-        return _SHOULDER
-    if b.name.endswith("_upper_arm:0") and a.segment in TRUNK and a.segment != "head":
-        return _SHOULDER
-    if part_b == "thigh" and a.segment == "pelvis":
-        return _HIP
-    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar"):
-        return _HIP
-    if b.name.endswith("_thigh:2") and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))):
-        return _CORE
-    if (part_b in _FOOT or b.name.endswith("_shank:1")) and a.segment in _UPPER:
-        return _FAR
-    if a.name.endswith("_thigh:0") and b.name.endswith(("_thigh:0", "_thigh:1")):
-        return _THIGHS
-    return None
+    return _resting(a, b, part_a, part_b)
+
+
+def _resting(a: Solid, b: Solid, part_a: str, part_b: str) -> str | None:
+    """Why soft parts of two segments overlap, or cannot meet; None if they can touch."""
+    on_torso = a.segment in TRUNK and a.segment != "head"
+    resting = {
+        _SHOULDER: (part_b == "clavicle" and (part_a == "clavicle" or on_torso))
+        or (b.name.endswith("_upper_arm:0") and on_torso),
+        _HIP: (part_b == "thigh" and a.segment == "pelvis")
+        or (b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar")),
+        _CORE: b.name.endswith("_thigh:2")
+        and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))),
+        _FAR: (part_b in _FOOT or b.name.endswith("_shank:1")) and a.segment in _UPPER,
+        _THIGHS: a.name.endswith("_thigh:0") and b.name.endswith(("_thigh:0", "_thigh:1")),
+    }
+    return next((reason for reason, rests in resting.items() if rests), None)
 
 
 def collision_group(segment: str) -> str:
