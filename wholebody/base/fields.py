@@ -143,7 +143,7 @@ def called(record: object) -> str:
     """A record in messages: its class, and the names that it must be given."""
     kind: Any = type(record)
     names = ", ".join(checks.shown(getattr(record, name)) for name in _names(kind))
-    return kind.__name__ + (f"({names})" if names else "")
+    return f"{kind.__name__}({names})" if names else str(kind.__name__)
 
 
 def check_of(kind: Any, name: str) -> Check:

@@ -181,17 +181,7 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
     for e in range(len(tables)):
         row = entries[e, 0]
         _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
-        distance = np.inf
-        for i in range(3):
-            direction[i] = tables[e, 21 + i]
-        if entries[e, 2]:
-            distance = 0.0
-            for i in range(3):
-                direction[i] -= place[i]
-                distance += direction[i] * direction[i]
-            distance = np.sqrt(distance)
-            for i in range(3):
-                direction[i] /= max(distance, TOUCHING)
+        distance = _target_direction(tables[e, 21:24], entries[e, 2], place, direction)
         if distance < TOUCHING:
             value[row] = value[row + 1] = 0.0
             continue
@@ -215,6 +205,23 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                 for j in range(3):
                     k, m = (j + 1) % 3, (j + 2) % 3
                     wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
+
+
+@compiled(inner=True, error_model="numpy")
+def _target_direction(target: Array, toward: int, place: Array, direction: Array) -> float:
+    """Write the unit vector `target`, or that from a place toward it; the distance, infinite for a direction."""
+    for i in range(3):
+        direction[i] = target[i]
+    if not toward:
+        return np.inf
+    square = 0.0
+    for i in range(3):
+        direction[i] -= place[i]
+        square += direction[i] * direction[i]
+    distance = np.sqrt(square)
+    for i in range(3):
+        direction[i] /= max(distance, TOUCHING)
+    return float(distance)
 
 
 @compiled(inner=True, error_model="numpy")
