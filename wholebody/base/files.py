@@ -23,9 +23,6 @@ from typing import Any
 from wholebody.base import checks
 from wholebody.base.errors import FileFormatError, InputError, one_line
 
-LARGEST_TEXT = 10_000_000
-"""Bytes of a file that people write by hand, such as a task."""
-
 LARGEST = 1_000_000_000
 """Bytes of any other file, such as a mesh or a recorded track."""
 
@@ -35,8 +32,6 @@ LONGEST_NAME = 200
 DEEPEST_KEY = 20
 """Largest number of parts of a dotted key of TOML."""
 
-LONGEST_QUOTE = 300
-"""Largest number of characters of a message of the TOML reader that our message quotes."""
 
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST_KEY}}}""")
 _LONG_NUMBER = re.compile(r"[\d_]{4000}")
@@ -73,7 +68,8 @@ def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LAR
     return data
 
 
-def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
+# Bytes of a file that people write by hand, such as a task.
+def read_text(path: str | PathLike[str], kind: str = "file", largest: int = 10_000_000) -> str:
     """Read a text file in UTF-8, with or without a byte order mark.
 
     Line ends are kept as they are.
@@ -110,7 +106,8 @@ def parsed_toml(text: str, name: str) -> dict[str, Any]:
         data: dict[str, Any] = tomllib.loads(text)
         return data
     except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST_QUOTE)}") from None
+        # Largest number of characters of a message of the TOML reader that our message quotes.
+        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), 300)}") from None
     except RecursionError:
         raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; three are enough") from None
     except ValueError:  # Python reads no whole number of more than 4300 digits

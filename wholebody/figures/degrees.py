@@ -15,9 +15,6 @@ FAR_OUT = 1.0
 MOST_TURNED = 4.0 * np.pi
 """Radians, two turns: a joint without limits that is turned farther was probably meant in degrees."""
 
-SLIDING = "JointModelP"
-"""How the names of Pinocchio's prismatic joints begin."""
-
 
 class Turning:
     """The joints of a model that turn by one number, with their limits."""
@@ -26,7 +23,8 @@ class Turning:
         """Look them up; a joint without a limit has two turns as its limit here."""
         every = list(zip(model.joints, model.names, strict=True))[1:]  # but the world's, whose numbers are not set
         joints = [(j, n) for j, n in every if j.nq == j.nv == 1]
-        found = [(j.idx_q, str(name)) for j, name in joints if not j.shortname().startswith(SLIDING)]
+        # How the names of Pinocchio's prismatic joints begin.
+        found = [(j.idx_q, str(name)) for j, name in joints if not j.shortname().startswith("JointModelP")]
         self._places = np.array([place for place, _ in found], dtype=np.intp)
         self._names = [name for _, name in found]
         low, high = model.lowerPositionLimit[self._places], model.upperPositionLimit[self._places]

@@ -19,9 +19,6 @@ from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import table
 from wholebody.figures.postures import support
 
-CLAVICLE_OVERHEAD = 45.0
-"""Degrees of elevation of the clavicle in the overhead reach: people stretch as far as they can, so its limit."""
-
 
 class Measured(Protocol):
     """The part of a figure that is measured."""
@@ -86,7 +83,8 @@ def measure(figure: Measured) -> dict[str, float]:
     sit = _Pose(figure, {"hip_flexion": 90.0, "knee_flexion": 90.0})
     cross = _Pose(figure, {"shoulder_abduction": 90.0})
     reach = _Pose(figure, {"shoulder_flexion": 90.0})
-    raised = _Pose(figure, {"clavicle_elevation": CLAVICLE_OVERHEAD})
+    # Degrees of elevation of the clavicle in the overhead reach: people stretch as far as they can, so its limit.
+    raised = _Pose(figure, {"clavicle_elevation": 45.0})
     bent = _Pose(figure, {"elbow_flexion": 90.0})
     floor, vertex = stand.frame("left_sole")[2], stand.frame("head_top")[2]
     seat, rest = -sit.extent(DOWN, ("pelvis", *THIGHS)), sit.frame("left_sole")[2]

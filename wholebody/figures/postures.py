@@ -16,8 +16,6 @@ GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
 _DOWN = np.array([0.0, 0.0, -1.0])
-_SPREAD_STEP = math.radians(1.0)
-_SPREAD_STEPS = 45
 
 
 class Attitude(NamedTuple):
@@ -80,12 +78,12 @@ def stand(figure: Articulated, attitude: Attitude) -> Array:
     q = figure.clamp(figure.with_joints(q, values))
     spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
     free = q
-    for _ in range(_SPREAD_STEPS):
+    for _ in range(45):
         close = _close_segments(figure, free)
         if not close:
             break
         moved = {
-            name: figure.joint_values(free)[name] + _SPREAD_STEP
+            name: figure.joint_values(free)[name] + math.radians(1.0)
             for name in spread
             if any(_moves(name, segment) for segment in close)
         }

@@ -25,19 +25,12 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 if TYPE_CHECKING:
     from wholebody.base.runner import Child
 
-CONVEX_VOLUME = 1e-4
-"""A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller."""
 
 HULL_VERTICES = (64, 48)
 """A hull of a whole mesh with more vertices than the first number gets as many as the second. With 32 the hulls of real
 robots have 12 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
 have more rows with more vertices."""
 
-TOLD_VOLUME = 0.01
-"""Share of added volume from which a note reports it."""
-
-DECOMPOSED_AT_MOST = 64
-"""Decompositions kept in memory: the same chair ten times in a scene is decomposed once."""
 
 _log = logging.getLogger(__name__)
 
@@ -103,7 +96,7 @@ def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> Conv
         notes.append(f"{what}: its surface is not closed, so what its convex hull adds is not known")
         return ConvexPieces((piece,), 0.0, tuple(notes))
     added = max(piece.volume / solid - 1.0, 0.0)
-    if added > TOLD_VOLUME:
+    if added > 0.01:  # Share of added volume from which a note reports it.
         notes.append(f"{what}: its convex hull has {added:.0%} more volume")
     return ConvexPieces((piece,), added, tuple(notes))
 
@@ -136,7 +129,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array,
     return cloud, np.ascontiguousarray(whole)
 
 
-@lru_cache(maxsize=DECOMPOSED_AT_MOST)
+@lru_cache(maxsize=64)  # Decompositions kept in memory: the same chair ten times in a scene is decomposed once.
 def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: float, what: str) -> ConvexPieces:
     settings = f"decomposed {max_vertices} {threshold!r} {coacd_version()}"
     return cached((vertices, faces), settings, what, lambda: _decompose(vertices, faces, max_vertices, threshold, what))
@@ -190,7 +183,8 @@ def _part_pieces(
     if not part.closed:
         notes.append(f"{name}: its surface is not closed ({len(part.faces)} triangles), so its convex hull is taken")
         return [whole]
-    if whole.volume - part.volume <= CONVEX_VOLUME * part.volume:
+    # A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller.
+    if whole.volume - part.volume <= 1e-4 * part.volume:
         return [whole]
     pieces: list[Piece] = []
     for corners in _coacd(part, threshold, name, child):

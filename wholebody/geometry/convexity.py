@@ -9,9 +9,6 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.broad_phase import box_pairs
 
 FLAT = 1e-6  # share of a mesh's size: triangles nearer to the hull's surface are on it; float32 rounds by 1e-7
-COVERED = 1e-3  # share of the hull's area that rounding may leave uncovered
-MOST_COMPARED = 20_000_000  # triangles times faces of the hull; larger meshes are not asked, as that takes seconds
-LOOKED_AT_FIRST = 64  # triangles, which show of almost all meshes that they are not convex
 
 
 def is_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
@@ -36,12 +33,15 @@ def is_convex(vertices: Array, faces: NDArray[np.int64]) -> bool:
         hull = ConvexHull(vertices[np.unique(faces)])
     except QhullError:
         return False
-    if len(middle) * len(hull.equations) > MOST_COMPARED:
+    # triangles times faces of the hull; larger meshes are not asked, as that takes seconds
+    if len(middle) * len(hull.equations) > 20_000_000:
         return False
-    for some in (middle[:: max(1, len(middle) // LOOKED_AT_FIRST)], middle):
+    # triangles, which show of almost all meshes that they are not convex
+    for some in (middle[:: max(1, len(middle) // 64)], middle):
         if not (_below(hull.equations, some) <= FLAT * size).all():
             return False
-    return _covered(corners, area) >= (1.0 - COVERED) * float(hull.area)
+    # share of the hull's area that rounding may leave uncovered
+    return _covered(corners, area) >= (1.0 - 1e-3) * float(hull.area)
 
 
 def _below(equations: Array, points: Array) -> Array:

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from wholebody.geometry.memory_views import address
 
 REQUEST_STRIDE = 128  # bytes of a coal.DistanceRequest
-SUPPORT_OFFSET = 24  # bytes from the guessed direction to the guessed vertices of the two shapes
 FIRST_DIRECTION = (1.0, 0.0, 0.0)  # coal's own guess for a pair it has not seen
 
 
@@ -65,7 +64,8 @@ def _views(requests: Any) -> tuple[NDArray[np.float64], NDArray[np.int32]] | Non
     for k in {0, count // 2, count - 1}:
         if address(requests[k].cached_gjk_guess) != base + REQUEST_STRIDE * k:
             return None
-        if address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + SUPPORT_OFFSET:
+        # bytes from the guessed direction to the guessed vertices of the two shapes
+        if address(requests[k].cached_support_func_guess) != base + REQUEST_STRIDE * k + 24:
             return None
     return (
         np.lib.stride_tricks.as_strided(direction, (count, 3), (REQUEST_STRIDE, 8)),

@@ -24,12 +24,6 @@ MOST_NEIGHBOURS = 255
 FEW = 1000
 """Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
 
-MOST_LOOKED_AT = 1000
-"""Number of faces, those nearest to the middle, along whose normals the width of a hull is measured."""
-
-MANY_EDGES = 128
-"""Vertices of the hull that replaces one with too many edges at a vertex."""
-
 
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
     """Convex hull of points, with its origin at the centre of the smallest sphere around it.
@@ -52,7 +46,8 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
     if vertices is not None and len(hull.vertices) > vertices[0]:
         hull = _solid_hull(simplified_hull(cloud[hull.vertices], vertices[1]), what)
     if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBOURS:
-        hull = _solid_hull(simplified_hull(cloud[hull.vertices], MANY_EDGES), what)
+        # Vertices of the hull that replaces one with too many edges at a vertex.
+        hull = _solid_hull(simplified_hull(cloud[hull.vertices], 128), what)
     used = hull.vertices
     corners = hull.points[used]
     centre, _ = enclosing_ball(corners)
@@ -131,7 +126,8 @@ def _solid_hull(cloud: Array, what: str) -> Any:
     corners = cloud[hull.vertices]
     inside = -(hull.equations[:, :3] @ corners.mean(axis=0) + hull.equations[:, 3])
     if inside.min() < SMALLEST:  # no ball of that size is known to be inside: compute the width itself
-        thin = np.argsort(inside)[:MOST_LOOKED_AT]
+        # Number of faces, those nearest to the middle, along whose normals the width of a hull is measured.
+        thin = np.argsort(inside)[:1000]
         width = -(corners @ hull.equations[thin, :3].T + hull.equations[thin, 3]).min(axis=0)
         if width.min() < SMALLEST:
             raise InputError(f"{what}: the points are {width.min():.2g} m thick; give at least {SMALLEST} m")

@@ -10,9 +10,6 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.geometry.pieces import SMALLEST
 
-MANY_FACES = 1000
-"""Number of faces above which only some are tried."""
-
 SAME_NORMAL = 0.02
 """Radians: of faces whose normals differ by less, only one is tried."""
 
@@ -60,7 +57,7 @@ def simplified_hull(points: Array, max_vertices: int) -> Array:
 
 def _apart(equations: Array) -> Array:
     """Of thousands of faces, those whose normals differ: a rounded edge of a part in CAD has hundreds."""
-    if len(equations) <= MANY_FACES:
+    if len(equations) <= 1000:  # Number of faces above which only some are tried.
         return equations
     _, first = np.unique(np.round(equations[:, :3] / SAME_NORMAL), axis=0, return_index=True)
     return np.asarray(equations[np.sort(first)])

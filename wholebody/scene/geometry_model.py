@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-RESTING = 1e-3  # m: a carried thing nearer than this to a segment in the first posture rests on it
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -297,6 +295,5 @@ def _touching_at_rest(
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
-    return {
-        (owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), RESTING).pair
-    }
+    # m: a carried thing nearer than this to a segment in the first posture rests on it
+    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), 1e-3).pair}

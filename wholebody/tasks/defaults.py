@@ -24,8 +24,6 @@ from wholebody.tasks.support import convex_polygon, least_width, standing_points
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
-AS_AT_START = 1e-3
-"""m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
 
 STEADY = 0.15
 """Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width:
@@ -122,7 +120,8 @@ def stands(
         if not isinstance(term, Hold) or term.residual.base.frame:
             continue
         joint = term.residual.place.joint
-        if joint not in feet or np.abs(term.value(state)).max() > AS_AT_START:
+        # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
+        if joint not in feet or np.abs(term.value(state)).max() > 1e-3:
             return False
         held.add(joint)
     return held == feet

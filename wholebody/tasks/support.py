@@ -19,14 +19,10 @@ from wholebody.tasks.surfaces import outermost
 STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
 
-FLATTEST = 1e-6
-"""Height [m] of a corner over the line through its neighbours below which it is no corner."""
 
 NEAREST = 1e-5
 """Distance [m] below which two points count as one corner."""
 
-THINNEST = 1e-4
-"""Width [m] below which a polygon counts as a line."""
 
 DOWN = np.array((0.0, 0.0, -1.0))
 
@@ -72,7 +68,7 @@ def convex_polygon(points: Array) -> Array:
     """
     flat = np.round(points[:, :2], 6)
     corners = flat[hull_corners(flat)].reshape(-1, 2)
-    if len(corners) < 3 or least_width(corners) < THINNEST:
+    if len(corners) < 3 or least_width(corners) < 1e-4:  # Width [m] below which a polygon counts as a line.
         raise InputError(
             "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
         )
@@ -92,7 +88,8 @@ def hull_corners(points: Array) -> list[int]:
         for k in indices:
             while len(chain) > 1:
                 (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
-                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > FLATTEST * hypot(x - ax, y - ay):
+                # Height [m] of a corner over the line through its neighbours below which it is no corner.
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
                     break
                 chain.pop()
             if not chain or hypot(*(points[k] - points[chain[-1]])) > NEAREST:

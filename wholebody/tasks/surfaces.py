@@ -24,10 +24,8 @@ from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
-FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
 MOST_FACES = 256  # more than a piece ever has
 SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
-GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
 TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
 
 
@@ -243,7 +241,8 @@ def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: S
     points = np.array([_behind(first, i, ours, normal) for normal in normals])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     found = []
-    for key in np.argsort(-values)[:FACES].tolist():
+    # most faces of a piece that are looked at, those first that are nearest or passed
+    for key in np.argsort(-values)[:8].tolist():
         if not _goes_on(second, j, normals[key], offsets[key], points[key], state):
             found.append(FacePlane(float(values[key]), normals[key], points[key], key))
     return found
@@ -291,7 +290,8 @@ def _goes_on(thing: Surface, number: int, normal: Array, offset: float, point: A
     for other, shape in enumerate(thing.shapes):
         if other != number:
             place = thing.placed(other, state)
-            if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + GOES_ON:
+            # m: pieces of one thing that are farther away do not continue its surface
+            if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + 0.05:
                 if not np.isfinite(thing.reach[other]):
                     return True
                 if float((outermost(shape, place, normal, thing.swept[other]) @ normal).max()) > offset + ACCURACY:

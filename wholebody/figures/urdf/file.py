@@ -208,9 +208,6 @@ def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ..
     return LinkShape(link, placement(element, place, LARGEST), kind, size, file, name=element.get("name", ""))
 
 
-SCHEMES = ("package://", "model://")
-
-
 def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path:
     """Find a mesh.
 
@@ -230,7 +227,7 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
     if not name.strip():
         raise FileFormatError(f"{place} has a mesh without filename; add it")
     folder = Path(os.path.abspath(path)).parent
-    if name.startswith(SCHEMES):
+    if name.startswith(("package://", "model://")):
         parts = [part for part in name.split("://", 1)[1].split("/") if part not in ("", ".")]
         if not parts or ".." in parts[:1]:
             raise FileFormatError(f"{place}: the mesh {shown(name)} names no package; write package://<package>/<path>")

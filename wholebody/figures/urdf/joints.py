@@ -18,7 +18,6 @@ from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, uniq
 from wholebody.geometry.pieces import LARGEST
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-FOLLOWING = ("revolute", "continuous", "prismatic")
 
 TWO_TURNS = 4.0 * pi
 """Limits beyond this were probably meant in degrees."""
@@ -185,7 +184,8 @@ def _most(limit: Element, what: str, place: str) -> float:
 
 def _mimic(element: Element, kind: str, place: str) -> Mimic | None:
     mimic = element.find("mimic")
-    if mimic is None or kind not in FOLLOWING:  # it has no effect on a fixed joint, which robots with locked hands have
+    # it has no effect on a fixed joint, which robots with locked hands have
+    if mimic is None or kind not in ("revolute", "continuous", "prismatic"):
         return None
     multiplier = bounded(mimic, "multiplier", place, 1, "1")[0]
     return Mimic(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])

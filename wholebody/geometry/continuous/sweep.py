@@ -35,9 +35,6 @@ MOST_QUERIES = 4000
 TOGETHER = 0.05
 """Pairs due within this share of the motion are queried together: a query costs more than the pairs in it."""
 
-SLOW = 3
-"""Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide."""
-
 
 @dataclass(frozen=True)
 class FirstContact:
@@ -154,7 +151,8 @@ class Sweep:
                 return self._found(now, q, int(index[due[worst]]), float(rows[worst, 0]), True)
             safe = room / speed[due]
             asked[due] += 1
-            for k in np.flatnonzero((asked[due] > SLOW) & (safe < TOGETHER)):
+            # Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide.
+            for k in np.flatnonzero((asked[due] > 3) & (safe < TOGETHER)):
                 safe[k] = max(safe[k], self._second_order(int(index[due[k]]), rows[k], float(level[due[k]])))
             free[due] = np.maximum(free[due], now + safe)
         worst = int(np.argmin(free))

@@ -21,10 +21,6 @@ from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
 from wholebody.geometry.records import Parts
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 
-FINEST = 2.0**-12
-"""Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
-depth that it may have."""
-
 SHARP = 0.1
 """Share of the tolerance that decides: a pair found to be less deep than the tolerance by this much is looked at until
 it is proved to be less deep than the tolerance. A smaller share makes more queries of coal."""
@@ -138,7 +134,9 @@ class SweptDepth:
             allowed, least, numbers = self._allowed(deepest)[which], np.empty(len(which)), doubtful[which]
             parts = Parts(numbers, first, last, rows0, rows1, speed[numbers], -allowed)
             self._kernel.lower_bounds(parts, stack.places, table.arrays, self._bounds.speeds, share, ACCURACY, least)
-            kept = least >= -allowed if share > FINEST else np.ones(len(which), dtype=bool)
+            # Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets
+            # the depth that it may have.
+            kept = least >= -allowed if share > 2.0**-12 else np.ones(len(which), dtype=bool)
             np.maximum.at(bound, which[kept], -least[kept])
             going = np.flatnonzero(~kept)
             if not len(going):
