@@ -16,8 +16,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.base.pool import Pool
 from wholebody.figures.state import State
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import RESULT_FIELDS, distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import RESULT_FIELDS, Guesses, distance_view, placement_view, read_result
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.scene.geometry_model import SceneGeometry
 

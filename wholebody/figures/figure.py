@@ -15,10 +15,9 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.degrees import Turning, warn_of_turns
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
-from wholebody.figures.model_check import LARGEST, check_model
+from wholebody.figures.model_check import LARGEST, Turning, check_model, warn_of_turns
 from wholebody.figures.reduction import reduced_parts
 
 _LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")

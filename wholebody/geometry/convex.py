@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.base.records import with_values
-from wholebody.geometry.components import Component, enclosed_volume, split_components
-from wholebody.geometry.convexity import is_convex, passes_through_itself
+from wholebody.geometry.components import Component, enclosed_volume, is_convex, passes_through_itself, split_components
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece

@@ -20,8 +20,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, read_result
+from wholebody.geometry.memory_views import Guesses, distance_view, read_result
 from wholebody.geometry.proximity import SINGLY
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points

@@ -15,8 +15,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.motion_bounds import MotionBounds, Speeds
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import Guesses, distance_view, placement_view, read_result
 from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
 from wholebody.geometry.records import Parts
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
