@@ -21,7 +21,7 @@ from wholebody.base.fields import Range
 from wholebody.figures.anthropometry import Person, table
 from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
 
-DIMENSION = Range(1e-4, 3.0, "m")
+DIMENSION = Range(0.0, 3.0, "m")
 
 FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
