@@ -37,6 +37,7 @@ Lengths: TypeAlias = Annotated[tuple[float, float, float], Vector(3, LENGTH)]
 __all__ = [
     "Box",
     "Capsule",
+    "Compound",
     "Cylinder",
     "Ellipsoid",
     "HalfSpace",
@@ -254,6 +255,25 @@ class Hull(Shape):
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
         return (hull_piece(self.points, "Hull"),)
+
+
+@dataclass(frozen=True, eq=False)
+class Compound(Shape):
+    """Shapes that are one thing.
+
+    Attributes:
+        parts: each shape, and its placement.
+    """
+
+    parts: tuple[tuple[Shape, pin.SE3], ...]
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """The pieces of all shapes."""
+        return tuple(
+            Piece(piece.geometry, at * piece.placement, piece.volume)
+            for shape, at in self.parts
+            for piece in shape.pieces()
+        )
 
 
 @runtime_checkable

@@ -12,6 +12,7 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.shapes import (
     Box,
     Capsule,
+    Compound,
     Cylinder,
     Ellipsoid,
     HalfSpace,
@@ -74,6 +75,9 @@ def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
         return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
     if isinstance(shape, Torus):
         return _of_torus(shape), ""
+    if isinstance(shape, Compound):
+        made = [(at.act(found), note) for part, at in shape.parts for found, note in (_of_density_one(part, name),)]
+        return sum((found for found, _ in made), pin.Inertia.Zero()), next((note for _, note in made if note), "")
     import trimesh
 
     if isinstance(shape, Mesh):
