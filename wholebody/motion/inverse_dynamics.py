@@ -18,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.ground_forces import GroundForces, ground_forces
 from wholebody.motion.soles import Soles
-from wholebody.tasks.support import convex_polygon, edges
+from wholebody.tasks.balance import convex_polygon, edges
 
 ROOT = 6  # degrees of freedom of a free root
 LIGHT = 0.2

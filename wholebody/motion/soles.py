@@ -13,7 +13,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import FEET, StanceFeet, foot_points, standing
-from wholebody.tasks.support import low_points
+from wholebody.tasks.balance import low_points
 
 SOLE = 0.02
 """Metres above a sole's lowest point up to which its corners bear force: soles are rounded, recordings uneven."""

@@ -14,8 +14,7 @@ from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
-from wholebody.tasks.range_of_motion import RangeOfMotion
-from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand

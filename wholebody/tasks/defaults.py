@@ -10,17 +10,15 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import Balance
+from wholebody.tasks.balance import Balance, convex_polygon, least_width, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.hold import Hold
-from wholebody.tasks.range_of_motion import RangeOfMotion
-from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
-from wholebody.tasks.support import convex_polygon, least_width, standing_points
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")

@@ -129,7 +129,7 @@ def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> l
 
 def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
     """How far the pelvis reaches below its origin when it is upright, metres."""
-    from wholebody.tasks.support import low_points
+    from wholebody.tasks.balance import low_points
 
     figure = scene.figure
     state = State(scene.model).update(figure.posture(figure.postures[0]))
