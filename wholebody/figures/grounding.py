@@ -12,7 +12,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
-DOWN = np.array((0.0, 0.0, -1.0))
 DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
 STEPS = 2000  # most steps; each goes down by the least distance, so none goes through anything
 
@@ -46,7 +45,11 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Scene
     own = set(segments)
     pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
     placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
-    body = [(shape, place, -support(shape, place, DOWN)) for shape, place, owner in placed if owner in own]
+    body = [
+        (shape, place, -support(shape, place, np.array((0.0, 0.0, -1.0))))
+        for shape, place, owner in placed
+        if owner in own
+    ]
     things = [
         (shape, coal.Transform3s(place.rotation, place.translation))
         for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)

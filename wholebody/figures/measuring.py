@@ -67,7 +67,6 @@ class _Pose:
 
 
 UP, DOWN, FRONT, BACK, LEFT = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
 THIGHS = ("left_thigh", "right_thigh")
 
 
@@ -96,7 +95,8 @@ def measure(figure: Measured) -> dict[str, float]:
         "acromial_height": stand.extent(UP, ("left_clavicle", "left_upper_arm")) - floor,
         "bideltoid_breadth": 2.0 * stand.extent(LEFT, ("left_clavicle", "left_upper_arm")),
         "span": 2.0 * cross.frame("left_middle_tip")[1],
-        "thumb_tip_reach": reach.frame("left_thumb_tip")[0] + reach.extent(BACK, TRUNK),
+        "thumb_tip_reach": reach.frame("left_thumb_tip")[0]
+        + reach.extent(BACK, ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")),
         "overhead_reach_sitting": raised.frame("left_shoulder")[2] + float(arm) - seat,
         "sitting_height": vertex - seat,
         "eye_height_sitting": sit.frame("gaze")[2] - seat,

@@ -15,8 +15,6 @@ from wholebody.figures.description import Articulated
 GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
-_DOWN = np.array([0.0, 0.0, -1.0])
-
 
 class Attitude(NamedTuple):
     """Joint angles in degrees and the pitch of the pelvis; the lowest piece is then put on the ground.
@@ -120,7 +118,7 @@ def lowest(figure: Articulated, q: Array) -> float:
     geometry_data = pin.GeometryData(figure.geometry)
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
     return min(
-        -support(piece.geometry, placement, _DOWN)
+        -support(piece.geometry, placement, np.array([0.0, 0.0, -1.0]))
         for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True)
     )
 

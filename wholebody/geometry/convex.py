@@ -213,12 +213,6 @@ _MEND = "repair the mesh where it passes through itself, or place its hull with 
 MOST_SECONDS = 40.0
 """Limit of CoACD for one part, seconds of the processor; the largest of real robots took a fraction of it."""
 
-CROSSING_SECONDS = 1.0
-"""The same for a part that passes through itself, of which CoACD often finds no end: for each ..."""
-
-CROSSING_TRIANGLES = 100
-"""... so many triangles that it has, or a part of them."""
-
 
 def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
@@ -229,7 +223,8 @@ def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[A
     faces = part.faces.astype(np.int32)
     seconds = MOST_SECONDS
     if passes_through_itself(part.vertices, part.faces):
-        seconds = min(seconds, CROSSING_SECONDS * math.ceil(len(faces) / CROSSING_TRIANGLES))
+        # CoACD often finds no end of such a part: a second for each hundred triangles
+        seconds = min(seconds, float(math.ceil(len(faces) / 100)))
     try:
         asked = (run_coacd, seconds, np.asarray(part.vertices), faces, threshold)
         parts = child.call(limited, *asked, seconds=BY_THE_CLOCK * seconds)

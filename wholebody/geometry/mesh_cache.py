@@ -39,7 +39,6 @@ LOOKED_AT_EVERY = 64
 """Number of writes of a process between checks of the cache's size; the first write checks it too."""
 
 
-_FORMAT = "1"
 _SUFFIX = ".pieces"
 _OTHER = ".made"
 _PART = ".part"
@@ -98,7 +97,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
         what: name of the mesh, with which all notes begin; the cache does not depend on it.
         make: makes the pieces.
     """
-    digest = hashlib.sha256("\0".join((_FORMAT, __version__, settings)).encode())
+    digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
     path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"

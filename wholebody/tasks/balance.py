@@ -26,9 +26,6 @@ NEAREST = 1e-5
 """Distance [m] below which two points count as one corner."""
 
 
-DOWN = np.array((0.0, 0.0, -1.0))
-
-
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
     """Points (n, 3) on which the feet stand at the posture q: the lowest corners of their pieces.
 
@@ -59,7 +56,7 @@ def low_points(geometry: Any, placement: pin.SE3) -> Array:
         geometry: a coal shape.
         placement: of its origin in the world.
     """
-    return outermost(geometry, placement, DOWN)
+    return outermost(geometry, placement, np.array((0.0, 0.0, -1.0)))
 
 
 def convex_polygon(points: Array) -> Array:

@@ -104,7 +104,10 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     groups = {"spine": tuple(name for name in names if name.startswith("spine"))}
     groups["neck"] = tuple(name for name in names if name.startswith("neck"))
     for side in ("left", "right"):
-        for limb, parts in _LIMBS.items():
+        for limb, parts in {
+            "arm": ("clavicle", "shoulder", "elbow", "wrist"),
+            "leg": ("hip", "knee", "ankle", "toe"),
+        }.items():
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
         for finger in FINGERS:
@@ -118,9 +121,6 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     groups["upper_body"] = groups["spine"] + groups["arms"]
     groups["lower_body"] = groups["legs"]
     return {name: members for name, members in groups.items() if members}
-
-
-_LIMBS = {"arm": ("clavicle", "shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle", "toe")}
 
 
 def human_chains(joints: set[str]) -> dict[str, Chain]:

@@ -15,8 +15,6 @@ Pairs = tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str, str], ...]]
 """Pairs that are tested, and (a, b, reason) of those that are not."""
 
 
-_UPPER = ("thorax", "neck", "head", "left_clavicle", "right_clavicle")
-
 _NEXT = {
     frozenset(pair)
     for pair in (
@@ -85,7 +83,7 @@ def _resting(a: Solid, b: Solid, part_a: str, part_b: str) -> str | None:
         "the core of the thigh is there for the belly and the other thigh": b.name.endswith("_thigh:2")
         and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))),
         "feet do not reach head and shoulders": (part_b in ("foot", "toes") or b.name.endswith("_shank:1"))
-        and a.segment in _UPPER,
+        and a.segment in ("thorax", "neck", "head", "left_clavicle", "right_clavicle"),
         "the upper thighs press on each other; their cores are tested": a.name.endswith("_thigh:0")
         and b.name.endswith(("_thigh:0", "_thigh:1")),
     }

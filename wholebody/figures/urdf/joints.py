@@ -19,8 +19,6 @@ from wholebody.geometry.pieces import LARGEST
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
-TWO_TURNS = 4.0 * pi
-"""Limits beyond this were probably meant in degrees."""
 
 UNLIMITED = 1e4
 """Limits beyond this, radians or metres, count as no limits: some files write 1e16 for no limit."""
@@ -162,7 +160,8 @@ def _range(limit: Element, kind: str, place: str, name: str, notes: list[str]) -
     lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
     if lower > upper:
         raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
-    if kind == "revolute" and TWO_TURNS < max(abs(lower), abs(upper)) <= UNLIMITED:
+    # Limits beyond this were probably meant in degrees.
+    if kind == "revolute" and 4.0 * pi < max(abs(lower), abs(upper)) <= UNLIMITED:
         told = f"{place} has the limits {lower:g} and {upper:g} rad, more than two turns"
         warn(f"{told}; {lower:g} and {upper:g} degrees are {radians(lower):.4g} and {radians(upper):.4g}")
     if limit.get("lower") is None and limit.get("upper") is None:
