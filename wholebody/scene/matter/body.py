@@ -1,4 +1,4 @@
-"""What makes a thing in a scene a rigid body that moves by itself, and the joints that hold it: hinges and ball joints."""
+"""What makes a thing in a scene a rigid body that moves by itself, and the joints that hold it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.placement import FARTHEST, unit_vector
 from wholebody.scene.matter.materials import DEFAULT, Material, material
 
-Place = tuple[float, float, float]
+Three: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -30,7 +30,7 @@ class BallJoint(Checked):
         InputError: `at` is not three finite numbers below 1,000 km, or `to` is no name.
     """
 
-    at: Annotated[Place, Vector(3, Range(-FARTHEST, FARTHEST, "m"))] = (0.0, 0.0, 0.0)
+    at: Annotated[Three, Vector(3, Range(-FARTHEST, FARTHEST, "m"))] = (0.0, 0.0, 0.0)
     to: Annotated[str, checks.text] | None = None
 
 
@@ -47,7 +47,7 @@ class Hinge(BallJoint):
         InputError: also if the axis has no direction.
     """
 
-    axis: Annotated[Place, unit_vector] = (0.0, 0.0, 1.0)
+    axis: Annotated[Three, unit_vector] = (0.0, 0.0, 1.0)
 
 
 def joints(value: object, what: str) -> tuple[BallJoint, ...]:
@@ -64,8 +64,6 @@ def joints(value: object, what: str) -> tuple[BallJoint, ...]:
 
 MASS = Range(1e-9, 1e9, "kg")
 DENSITY = 700.0  # kg/m3: of oak
-
-Three: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
