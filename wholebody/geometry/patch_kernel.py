@@ -22,18 +22,20 @@ def snap_normals(wide: Indices, contacts: Contacts, pieces: PieceArrays, near: f
         near: least cosine of the angle to a face's normal.
         accuracy: metres by which a face's normal may part the pieces by less than coal's does.
     """
-    placement, points, faces, normal = contacts.placements, pieces.points, pieces.faces, contacts.normal
+    placement, normal, distance, pair = contacts.placements, contacts.normal, contacts.distance, contacts.pair
+    points, first_point, radius = pieces.points, pieces.first_point, pieces.radius
+    faces, first_face = pieces.faces, pieces.first_face
     direction, turned = np.empty(3), np.empty(3)
     for c in wide:
         found = False
         for side in range(2):
-            own, other = contacts.pair[c, side], contacts.pair[c, 1 - side]
-            first, last = pieces.first_point[other], pieces.first_point[other + 1]
-            if found or pieces.radius[own] > 0.0 or first == last:
+            own, other = pair[c, side], pair[c, 1 - side]
+            first, last = first_point[other], first_point[other + 1]
+            if found or radius[own] > 0.0 or first == last:
                 continue
             sign = 1.0 if side == 0 else -1.0
             _to_frame(placement[own], normal[c], sign, turned)
-            for f in range(pieces.first_face[own], pieces.first_face[own + 1]):
+            for f in range(first_face[own], first_face[own + 1]):
                 if faces[f, 0] * turned[0] + faces[f, 1] * turned[1] + faces[f, 2] * turned[2] < near:
                     continue
                 base = faces[f, 3]
@@ -49,7 +51,7 @@ def snap_normals(wide: Indices, contacts: Contacts, pieces: PieceArrays, near: f
                 for p in range(first, last):
                     height = points[p, 0] * turned[0] + points[p, 1] * turned[1] + points[p, 2] * turned[2]
                     least = min(least, height)
-                if least - base - pieces.radius[other] >= contacts.distance[c] - accuracy:
+                if least - base - radius[other] >= distance[c] - accuracy:
                     for k in range(3):
                         normal[c, k] = sign * direction[k]
                     found = True
@@ -95,11 +97,11 @@ class Ends(NamedTuple):
 @compiled(inner=True)
 def patch_ends(wide: Indices, contacts: Contacts, pieces: PieceArrays, settings: RowSettings) -> tuple[Ends, int]:
     """Ends of the patches of the contacts `wide`, and how many there are; at most `settings.most_ends` of each."""
-    most, most_points = 0, 0
+    pair, first_point, most, most_points = contacts.pair, pieces.first_point, 0, 0
     for c in wide:
         for side in range(2):
-            piece = contacts.pair[c, side]
-            count = pieces.first_point[piece + 1] - pieces.first_point[piece]
+            piece = pair[c, side]
+            count = first_point[piece + 1] - first_point[piece]
             most += count
             most_points = max(most_points, count)
     ends = Ends(np.empty(most, dtype=np.intp), np.empty((most, 3)), np.empty(most))
@@ -164,22 +166,25 @@ def _ends_of_side(
         norm = max(np.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2]), 1e-9)
         for k in range(3):
             across[k] /= norm
-    half_width = np.sqrt(2.0 * pieces.radius[other] * settings.inset)
+    radius, distance, shortest = pieces.radius[other], contacts.distance[c], settings.shortest_lever
+    half_width = np.sqrt(2.0 * radius * settings.inset)
+    lever, along, length, drop, outside = band.lever, band.along, band.length, band.drop, band.outside
+    end_contact, end_place, end_gap = ends.contact, ends.place, ends.gap
     whole = True
     for e in range(count):
-        reach = 1.0 / band.outside[e]
+        reach = 1.0 / outside[e]
         sag = 0.0
         if capsule:
-            offset = abs(across[0] * band.along[0, e] + across[1] * band.along[1, e] + across[2] * band.along[2, e])
+            offset = abs(across[0] * along[0, e] + across[1] * along[1, e] + across[2] * along[2, e])
             if offset > half_width:
                 reach = min(reach, half_width / max(offset, 1e-12))
-            sag = (reach * offset) ** 2 / (2.0 * pieces.radius[other])
+            sag = (reach * offset) ** 2 / (2.0 * radius)
         whole = whole and reach >= 1.0
-        if band.length[e] * reach > settings.shortest_lever:
-            ends.contact[filled] = c
+        if length[e] * reach > shortest:
+            end_contact[filled] = c
             for k in range(3):
-                ends.place[filled, k] = witness[k] + reach * band.lever[k, e]
-            ends.gap[filled] = contacts.distance[c] + reach * band.drop[e] + sag
+                end_place[filled, k] = witness[k] + reach * lever[k, e]
+            end_gap[filled] = distance + reach * drop[e] + sag
             filled += 1
     return filled, whole
 
@@ -190,8 +195,8 @@ def _points_in_band(
     band: Band,
 ) -> int:  # fmt: skip
     """Write levers, lengths and drops of a piece's points within `width` of the plane into `band`; how many."""
-    points, radius = pieces.points, pieces.radius[own]
-    down = band.vectors[0]
+    points, radius, down = pieces.points, pieces.radius[own], band.vectors[0]
+    lever, length, drop = band.lever, band.length, band.drop
     _to_frame(placement, normal, sign, down)
     above = 0.0
     for k in range(3):
@@ -201,15 +206,15 @@ def _points_in_band(
         height = above + points[number, 0] * down[0] + points[number, 1] * down[1] + points[number, 2] * down[2]
         if -height - radius >= width:
             continue
-        band.drop[count] = max(-height - radius, 0.0)
+        drop[count] = max(-height - radius, 0.0)
         square = 0.0
         for k in range(3):
             step = placement[3, k] - witness[k] - height * sign * normal[k]
             for i in range(3):
                 step += points[number, i] * placement[i, k]
-            band.lever[k, count] = step
+            lever[k, count] = step
             square += step * step
-        band.length[count] = np.sqrt(square)
+        length[count] = np.sqrt(square)
         count += 1
     return count
 
@@ -217,22 +222,19 @@ def _points_in_band(
 @compiled(inner=True)
 def _turn_levers(placement: Array, count: int, band: Band) -> None:
     """Write the levers in the axes of the other piece."""
-    lever = band.lever
+    lever, along = band.lever, band.along
     for i in range(3):
         for e in range(count):
-            band.along[i, e] = (
-                placement[i, 0] * lever[0, e] + placement[i, 1] * lever[1, e] + placement[i, 2] * lever[2, e]
-            )
+            along[i, e] = placement[i, 0] * lever[0, e] + placement[i, 1] * lever[1, e] + placement[i, 2] * lever[2, e]
 
 
 @compiled(inner=True)
 def _measure_against_faces(other: int, base: Array, count: int, pieces: PieceArrays, band: Band) -> None:
     """Write how far the levers, from the point `base` of the other piece, lead out of its faces."""
-    longest = 0.0
+    faces, along, length, outside, longest = pieces.faces, band.along, band.length, band.outside, 0.0
     for e in range(count):
-        band.outside[e] = 1.0
-        longest = max(longest, band.length[e])
-    faces, along = pieces.faces, band.along
+        outside[e] = 1.0
+        longest = max(longest, length[e])
     for f in range(pieces.first_face[other], pieces.first_face[other + 1]):
         x, y, z = faces[f, 0], faces[f, 1], faces[f, 2]
         room = faces[f, 3] - x * base[0] - y * base[1] - z * base[2]
@@ -240,8 +242,8 @@ def _measure_against_faces(other: int, base: Array, count: int, pieces: PieceArr
             share = 1.0 / max(room, 1e-12)
             for e in range(count):
                 climb = share * (x * along[0, e] + y * along[1, e] + z * along[2, e])
-                if climb > band.outside[e]:
-                    band.outside[e] = climb
+                if climb > outside[e]:
+                    outside[e] = climb
 
 
 @compiled(inner=True)
@@ -290,29 +292,32 @@ def contact_rows(
         settings: see `RowSettings`.
         rows: room for the rows.
     """
-    count = len(contacts.distance)
+    pair, distance, normal, point_a = contacts.pair, contacts.distance, contacts.normal, contacts.point_a
+    number, joint = contacts.number, pieces.joint
+    wrench, gap, contact, joints = rows.wrench, rows.gap, rows.contact, rows.joints
+    count = len(distance)
     wide = np.empty(count, dtype=np.intp)
     found = 0
     for c in range(count):
-        if extended[contacts.number[c]] and contacts.distance[c] < clearance[c] + settings.lever_distance:
+        if extended[number[c]] and distance[c] < clearance[c] + settings.lever_distance:
             wide[found] = c
             found += 1
     wide = wide[:found]
     if found:
         snap_normals(wide, contacts, pieces, settings.same_normal, settings.normal_room)
     for c in range(count):
-        rows.gap[c], rows.contact[c] = contacts.distance[c], c
-        for side in range(2):
-            rows.joints[c, side] = pieces.joint[contacts.pair[c, side]]
-        _wrench(contacts.normal[c], contacts.point_a[c], rows.wrench[c])
+        gap[c], contact[c] = distance[c], c
+        joints[c, 0], joints[c, 1] = joint[pair[c, 0]], joint[pair[c, 1]]
+        _wrench(normal[c], point_a[c], wrench[c])
     if not found:
         return count
     ends, more = patch_ends(wide, contacts, pieces, settings)
+    owner, place, open_by = ends.contact, ends.place, ends.gap
     for e in range(more):
-        c, row = ends.contact[e], count + e
-        rows.gap[row], rows.contact[row] = ends.gap[e], c
-        rows.joints[row, 0], rows.joints[row, 1] = rows.joints[c, 0], rows.joints[c, 1]
-        _wrench(contacts.normal[c], ends.place[e], rows.wrench[row])
+        c, row = owner[e], count + e
+        gap[row], contact[row] = open_by[e], c
+        joints[row, 0], joints[row, 1] = joints[c, 0], joints[c, 1]
+        _wrench(normal[c], place[e], wrench[row])
     return count + more
 
 

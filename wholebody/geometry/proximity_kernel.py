@@ -81,16 +81,17 @@ def cull(placement: Array, pieces: PieceArrays, memory: Memory, within: float, m
     Returns:
         How many there are.
     """
-    travelled, bound, index = memory.travelled, memory.bound, memory.index
-    bound_by_boxes(placement, pieces.half, memory.extent)
+    travelled, bound, index, extent = memory.travelled, memory.bound, memory.index, memory.extent
+    pairs, reach = pieces.pairs, pieces.reach
+    bound_by_boxes(placement, pieces.half, extent)
     count = 0
-    for p in range(len(pieces.pairs)):
-        a, b = pieces.pairs[p, 0], pieces.pairs[p, 1]
+    for p in range(len(pairs)):
+        a, b = pairs[p, 0], pairs[p, 1]
         way = travelled[a] + travelled[b]
         near = min(within, most[p])
         if bound[p] - way >= near:
             continue
-        gap = outer_gap(placement, pieces.reach, memory.extent, a, b)
+        gap = outer_gap(placement, reach, extent, a, b)
         if gap >= near:
             bound[p] = gap + way
             continue
@@ -125,20 +126,21 @@ def gather(
     Returns:
         How many are near, and whether one of them needs its normal repaired.
     """
+    pairs, points_meet, travelled, bound = pieces.pairs, pieces.points_meet, memory.travelled, memory.bound
+    nearest, vectors, number, pair = room
     count = 0
     broken = False
     for p in index:
-        a, b = pieces.pairs[p, 0], pieces.pairs[p, 1]
+        a, b = pairs[p, 0], pairs[p, 1]
         distance = results[p, RESULT_FIRST]
-        way = memory.travelled[a] + memory.travelled[b]
-        memory.bound[p] = distance - accuracy * (1.0 + abs(distance)) + way
+        bound[p] = distance - accuracy * (1.0 + abs(distance)) + travelled[a] + travelled[b]
         if not distance < min(within, most[p]):
             continue
-        room.distance[count], room.number[count] = distance, p
+        nearest[count], number[count] = distance, p
         for k in range(9):
-            room.vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
-        room.pair[count, 0], room.pair[count, 1] = a, b
-        broken = broken or distance <= pieces.points_meet[p]
+            vectors[k // 3, count, k % 3] = results[p, RESULT_FIRST + 1 + k]
+        pair[count, 0], pair[count, 1] = a, b
+        broken = broken or distance <= points_meet[p]
         count += 1
     return count, broken
 

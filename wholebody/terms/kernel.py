@@ -86,27 +86,27 @@ def linearise(pose: Pose, tables: TermTables, contacts: RowRoom, count: int, roo
 @compiled(inner=True, error_model="numpy")
 def _wrench_terms(pose: Pose, tables: TermTables, contacts: RowRoom, count: int, room: TermRoom) -> None:
     """Terms whose rows are wrenches between two joints, the contacts' rows, and the centre of mass."""
-    joints, columns, jacobian = pose.joints, pose.columns, room.jacobian
+    joints, columns, jacobian, wrench, value = pose.joints, pose.columns, room.jacobian, room.wrench, room.value
     column, bodies = _integers(tables, COLUMN), _integers(tables, BODY)
-    residuals(_floats(tables, RESIDUAL), _integers(tables, RESIDUAL), joints, room.wrench, room.value)
-    planes(_floats(tables, PLANE), _integers(tables, PLANE), joints, room.wrench, room.value)
-    axis_errors(_floats(tables, AXIS), _integers(tables, AXIS), joints, room.wrench, room.value)
+    residuals(_floats(tables, RESIDUAL), _integers(tables, RESIDUAL), joints, wrench, value)
+    planes(_floats(tables, PLANE), _integers(tables, PLANE), joints, wrench, value)
+    axis_errors(_floats(tables, AXIS), _integers(tables, AXIS), joints, wrench, value)
     cones(
-        _floats(tables, CONE), _integers(tables, CONE), _floats(tables, EDGE), joints, room.wrench, room.value
+        _floats(tables, CONE), _integers(tables, CONE), _floats(tables, EDGE), joints, wrench, value
     )  # fmt: skip
-    twists(_floats(tables, TWIST), _integers(tables, TWIST), joints, room.wrench, room.value)
+    twists(_floats(tables, TWIST), _integers(tables, TWIST), joints, wrench, value)
     for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
         entries = _integers(tables, table)
         for e in range(len(entries)):
             against = entries[e, 2] if table in (RESIDUAL, CONE, TWIST) else 0
             height = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
             for r in range(entries[e, 0], entries[e, 0] + height):
-                _row(room.wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
-    terms = len(room.value)
+                _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
+    terms, gap_joints, gap_wrench = len(value), contacts.joints, contacts.wrench
     for r in range(count):
         jacobian[terms + r] = 0.0
-        first, second = contacts.joints[r, 0], contacts.joints[r, 1]
-        _row(contacts.wrench[r], second, first, columns, bodies, column, jacobian[terms + r])
+        first, second = gap_joints[r, 0], gap_joints[r, 1]
+        _row(gap_wrench[r], second, first, columns, bodies, column, jacobian[terms + r])
     if tables.layout[MASS_CENTER, 1]:
         _mass_centers(pose, tables, room)
 
@@ -196,7 +196,7 @@ def _mass_centers(pose: Pose, tables: TermTables, room: TermRoom) -> None:
     """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment."""
     centers, entries = _floats(tables, MASS_CENTER), _integers(tables, MASS_CENTER)
     bodies, parents, column = _floats(tables, BODY), _integers(tables, BODY), _integers(tables, COLUMN)
-    joints, columns = pose.joints, pose.columns
+    joints, columns, value, jacobian = pose.joints, pose.columns, room.value, room.jacobian
     count = len(bodies)
     moment = np.zeros((count, 4))  # mass, and mass times centre in the world
     for j in range(1, count):
@@ -213,7 +213,7 @@ def _mass_centers(pose: Pose, tables: TermTables, room: TermRoom) -> None:
     total = moment[0, 0]
     for e in range(len(centers)):
         inner = centers[e, 0] * moment[0, 1] + centers[e, 1] * moment[0, 2] + centers[e, 2] * moment[0, 3]
-        room.value[entries[e, 0]] = inner / total - centers[e, 3]
+        value[entries[e, 0]] = inner / total - centers[e, 3]
     for k in range(len(columns)):
         j = column[k, 1]
         mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
@@ -222,7 +222,7 @@ def _mass_centers(pose: Pose, tables: TermTables, room: TermRoom) -> None:
         up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
         for e in range(len(centers)):
             along = centers[e, 0] * forth + centers[e, 1] * left + centers[e, 2] * up
-            room.jacobian[entries[e, 0], column[k, 0]] += along
+            jacobian[entries[e, 0], column[k, 0]] += along
 
 
 @compiled(inner=True)

@@ -58,9 +58,10 @@ def far_moved(pieces: PieceArrays, before: QueryResult, after: QueryResult, arc:
 @compiled(inner=True)
 def _apart(placed: QueryResult, count: int) -> Array:
     """(count,) distances of all pairs, at least 0; of those that are not near the query distance."""
+    number, distance = placed.contacts.number, placed.contacts.distance
     apart = np.full(count, max(placed.within, 0.0))
-    for c in range(len(placed.contacts.number)):
-        apart[placed.contacts.number[c]] = max(placed.contacts.distance[c], 0.0)
+    for c in range(len(number)):
+        apart[number[c]] = max(distance[c], 0.0)
     return apart
 
 
@@ -76,9 +77,10 @@ def separated(doubtful: Indices, pieces: PieceArrays, before: Contacts, after: A
         overlap: metres by which a piece may be beyond the plane.
     """
     found = np.zeros(len(doubtful), dtype=np.bool_)
+    number = before.number
     for k in range(len(doubtful)):
-        for c in range(len(before.number)):
-            if before.number[c] == doubtful[k]:
+        for c in range(len(number)):
+            if number[c] == doubtful[k]:
                 a, b, normal = before.pair[c, 0], before.pair[c, 1], before.normal[c]
                 found[k] = _beyond(
                     pieces, before.placements, after, a, b, normal, before.point_a[c], overlap
@@ -96,6 +98,7 @@ def _beyond(
     points = pieces.points[pieces.first_point[other] : pieces.first_point[other + 1]]
     if len(points) == 0:
         return False
+    radius, reach = pieces.radius[other], pieces.reach[other]
     local_normal, height, apart = np.empty(3), 0.0, 0.0
     for j in range(3):
         along, place = 0.0, 0.0
@@ -118,14 +121,14 @@ def _beyond(
                 for j in range(3):
                     at += points[p, j] * placed[other, j, i]
                 own += world[i] * at
-            least = min(least, own - height - pieces.radius[other])
+            least = min(least, own - height - radius)
     for piece in (carrier, other):
         turned = 0.0
         for j in range(3):
             for i in range(3):
                 turned += (after[piece, j, i] - before[piece, j, i]) ** 2
         angle += np.sqrt(0.5 * turned)
-    arc = 0.125 * angle * angle * (pieces.reach[other] + np.sqrt(apart))
+    arc = 0.125 * angle * angle * (reach + np.sqrt(apart))
     return bool(least - arc > -overlap)
 
 

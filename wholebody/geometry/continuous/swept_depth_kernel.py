@@ -30,12 +30,12 @@ def screen(
         How many pairs there are.
     """
     bound_by_boxes(place, pieces.half, extent)
-    pairs = pieces.pairs
+    pairs, reach = pieces.pairs, pieces.reach
     count = 0
     for p in range(len(pairs)):
         least = before[p] - speed[p]
         if before[p] + least - speed[p] < 0.0:
-            least = max(least, outer_gap(place, pieces.reach, extent, pairs[p, 0], pairs[p, 1]))
+            least = max(least, outer_gap(place, reach, extent, pairs[p, 0], pairs[p, 1]))
             if before[p] + least - speed[p] < 0.0:
                 index[count] = p
                 count += 1
