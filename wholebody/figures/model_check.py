@@ -1,14 +1,10 @@
-"""Models whose numbers lead to NaN are refused; angles that were probably meant in degrees are told."""
+"""Numbers of a model that lead to postures with NaN: refused before a figure is made of it."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
-from wholebody.base.checks import warn
 from wholebody.base.errors import InputError
 
 HEAVIEST = 1e9
@@ -49,61 +45,3 @@ def check_model(model: pin.Model, name: str) -> None:
         joint = next(j for j in model.joints if j.idx_v <= wrong[0] < j.idx_v + j.nv)
         speed = model.velocityLimit[wrong[0]]
         raise InputError(f"{name}, joint {model.names[joint.id]!r}: its velocity limit is {speed:g}; give 0 or more")
-
-
-FAR_OUT = 1.0
-"""Radians beyond a limit from which a value was probably meant in degrees."""
-
-MOST_TURNED = 4.0 * np.pi
-"""Radians, two turns: a joint without limits that is turned farther was probably meant in degrees."""
-
-
-class Turning:
-    """The joints of a model that turn by one number, with their limits."""
-
-    def __init__(self, model: Any) -> None:
-        """Look them up; a joint without a limit has two turns as its limit here."""
-        every = list(zip(model.joints, model.names, strict=True))[1:]  # but the world's, whose numbers are not set
-        joints = [(j, n) for j, n in every if j.nq == j.nv == 1]
-        # How the names of Pinocchio's prismatic joints begin.
-        found = [(j.idx_q, str(name)) for j, name in joints if not j.shortname().startswith("JointModelP")]
-        self._places = np.array([place for place, _ in found], dtype=np.intp)
-        self._names = [name for _, name in found]
-        low, high = model.lowerPositionLimit[self._places], model.upperPositionLimit[self._places]
-        self._limits = low, high
-        self._low = np.where(np.isfinite(low), low, -MOST_TURNED)
-        self._high = np.where(np.isfinite(high), high, MOST_TURNED)
-
-    def warn(self, q: Array, what: str) -> bool:
-        """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
-        values = np.atleast_2d(q)[:, self._places]
-        beyond = np.maximum(self._low - values, values - self._high)
-        if not beyond.size or not float(beyond.max()) > FAR_OUT:
-            return False
-        frame, column = (int(k) for k in np.unravel_index(int(np.argmax(beyond)), beyond.shape))
-        where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
-        self._say(where, float(values[frame, column]), column)
-        return True
-
-    def warn_of(self, name: str, value: float, place: int, q: Array) -> None:
-        """Warn where a value of a joint, which is at a place of the posture q (nq,), is far out."""
-        for column in np.flatnonzero(self._places == place).tolist():
-            if not self._low[column] - FAR_OUT <= q[place] <= self._high[column] + FAR_OUT:
-                self._say(f"joint {name!r}", value, column)
-
-    def _say(self, where: str, value: float, column: int) -> None:
-        warn(_as_degrees(where, value, float(self._limits[0][column]), float(self._limits[1][column])))
-
-
-def warn_of_turns(name: str, value: float) -> None:
-    """Warn where the value of a joint without limits is more than two turns."""
-    if abs(value) > MOST_TURNED:
-        warn(_as_degrees(f"joint {name!r}", value, -np.inf, np.inf))
-
-
-def _as_degrees(what: str, value: float, low: float, high: float) -> str:
-    """What is told of an angle [rad] that is far out of its limits."""
-    if low <= np.radians(value) <= high:
-        out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
-        return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
-    return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"

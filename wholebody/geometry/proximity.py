@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.memory_views import RESULT_DOUBLES, Guesses, fields, placement_view, read_result, result_view
 from wholebody.geometry.records import ContactRoom, Contacts, Memory, PieceArrays
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
-from wholebody.geometry.swept_points import SweptPoints, swept_points
+from wholebody.geometry.swept_points import swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
@@ -53,22 +53,6 @@ class _ContactBuffer:
         return known
 
 
-def _half_boxes(swept: list[SweptPoints], reach: Array) -> Array:
-    """The `half_box` (n, 3) of every piece; that of a ball is its radius."""
-    found = np.repeat(np.minimum(reach, ENDLESS)[:, None], 3, axis=1)
-    for k, piece in enumerate(swept):
-        if len(piece.points) > 1:
-            found[k] = half_box(piece)
-    return found
-
-
-def half_box(swept: SweptPoints) -> Array:
-    """Half the size (3,) of a box about a piece's origin, along the piece's axes, that holds the piece."""
-    if not len(swept.points):
-        return np.full(3, min(swept.reach, ENDLESS))
-    return np.asarray(np.abs(swept.points).max(axis=0) + swept.radius)
-
-
 class PairTable:
     """The pieces and pairs of a geometry model as arrays: what is the same at every posture, and never changes.
 
@@ -101,24 +85,19 @@ class PairTable:
         if pairs is None:
             listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
             pairs = np.array(listed, dtype=np.intp).reshape(-1, 2)
-        reach, radius, width = np.array([(one.reach, one.radius, one.width) for one in swept]).reshape(-1, 3).T.copy()
-        round_pairs = (radius[pairs] > 0.0).all(axis=1)
-        ellipsoids = [shape.radii if isinstance(shape, coal.Ellipsoid) else np.zeros(3) for shape in shapes]
-        self.arrays = PieceArrays(
-            pairs,
-            width[pairs].sum(axis=1),
-            # where round pieces' swept points meet, coal's normal is zero or noise along an axis
-            np.where(round_pairs, COAL_ACCURACY - radius[pairs].sum(axis=1), -np.inf),
-            np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp),
-            reach,
-            _half_boxes(swept, reach),
-            radius,
-            np.array(ellipsoids, dtype=float).reshape(-1, 3),
-            np.array([one.axis for one in swept]).reshape(-1, 3),
-            np.concatenate([np.zeros((0, 3)), *(one.points for one in swept)]),
-            np.cumsum([0, *(len(one.points) for one in swept)], dtype=np.intp),
-            np.concatenate([np.zeros((0, 4)), *(one.faces for one in swept)]),
-            np.cumsum([0, *(len(one.faces) for one in swept)], dtype=np.intp),
+        self.pairs: Indices = pairs
+        self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
+        self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
+        self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
+        width = np.array([swept.width for swept in self.swept]).reshape(-1)
+        self.widths: Array = width[self.pairs].sum(axis=1)
+        radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)
+        self.points = np.concatenate([np.zeros((0, 3)), *(swept.points for swept in self.swept)])
+        counts = [len(swept.points) for swept in self.swept]
+        self.first_point: Indices = np.cumsum([0, *counts], dtype=np.intp)
+        # where round pieces' swept points meet, coal's normal is zero or noise along an axis
+        self.points_meet = np.where(
+            (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
         )
         self.pairs, self.widths = self.arrays.pairs, self.arrays.widths
         self.joint, self.reach, self.half = self.arrays.joint, self.arrays.reach, self.arrays.half

@@ -12,9 +12,16 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.checks import shown, warn
+from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
+
+MOST_BYTES = 64 * 2**20
+"""Largest file that is accepted as a description of a robot."""
+
+
+A_TURN = 2.0 * math.pi
+"""Radians: roll, pitch and yaw beyond this were probably meant in degrees."""
 
 MOST = 1e9
 """Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
@@ -30,7 +37,7 @@ def read_xml(path: Path, kind: str) -> Element:
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
     """
-    data = read_bytes(path, kind, 64 * 2**20)  # Largest file that is accepted as a description of a robot.
+    data = read_bytes(path, kind, MOST_BYTES)
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
@@ -119,11 +126,8 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
     if origin is None:
         return pin.SE3.Identity()
     roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
-    # Radians: roll, pitch and yaw beyond this were probably meant in degrees.
-    if max(abs(angle) for angle in (roll, pitch, yaw)) > 2.0 * math.pi:
-        degrees = " ".join(f"{math.radians(angle):.4g}" for angle in (roll, pitch, yaw))
-        told = f"{place}: <origin> has rpy={_short(origin.get('rpy'))}, more than a turn in radians"
-        warn(f"{told}; these numbers of degrees are {degrees}")
+    for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
+        warn_of_degrees(angle, f"{place}: the {name} of <origin>", A_TURN)
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
 
 
