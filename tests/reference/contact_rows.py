@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry import contact_rows as module
 from wholebody.geometry.contact_rows import ContactRowBuilder, ContactRows
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 
 
 class ReferenceRowBuilder(ContactRowBuilder):
@@ -35,28 +35,26 @@ class ReferenceRowBuilder(ContactRowBuilder):
         )
 
     def _snap(self, contacts: Contacts, wide: Indices) -> None:
-        pieces = self.table.arrays
         placement = contacts.placements
         for side, sign in ((0, 1.0), (1, -1.0)):
             own, other = contacts.pair[wide, side], contacts.pair[wide, 1 - side]
-            flat = np.flatnonzero((pieces.radius[own] == 0.0) & (np.diff(pieces.first_point)[other] > 0))
-            entry, face = _expand(pieces.first_face, own[flat])
+            flat = np.flatnonzero((self._radius[own] == 0.0) & (self._point_count[other] > 0))
+            entry, face = _expand(self._face_start, self._face_count, own[flat])
             contact = wide[flat[entry]]
-            direction = np.einsum("ij,ijk->ik", pieces.faces[face, :3], placement[own[flat[entry]], :3])
+            direction = np.einsum("ij,ijk->ik", self._faces[face, :3], placement[own[flat[entry]], :3])
             along = sign * np.einsum("ij,ij->i", direction, contacts.normal[contact])
             for row in np.flatnonzero(along >= module.SAME_NORMAL):
                 c, piece = contact[row], contacts.pair[contact[row], 1 - side]
-                points = pieces.points[slice(*pieces.first_point[piece : piece + 2])]
+                points = self._points[self._point_start[piece] :][: self._point_count[piece]]
                 heights = (
                     points @ placement[piece, :3] + placement[piece, 3] - placement[own[flat[entry[row]]], 3]
                 ) @ (direction[row])
-                apart = heights.min() - pieces.faces[face[row], 3] - pieces.radius[piece]
+                apart = heights.min() - self._faces[face[row], 3] - self._radius[piece]
                 if apart >= contacts.distance[c] - module.NORMAL_ROOM:
                     contacts.normal[c] = sign * direction[row]
 
     def _patch_ends(self, contacts: Contacts, wide: Indices) -> tuple[Indices, Array, Array]:
         """Ends of the contact patches: contact, point (m, 3) and gap of each."""
-        pieces = self.table.arrays
         count = len(wide)
         normal = contacts.normal[wide]
         # two sides a contact: a piece, the other one, the direction from it to the other, the witness points
@@ -68,11 +66,11 @@ class ReferenceRowBuilder(ContactRowBuilder):
         distance = np.concatenate([contacts.distance[wide]] * 2)
 
         placement = contacts.placements
-        side, local = _expand(pieces.first_point, own)
+        side, local = _expand(self._point_start, self._point_count, own)
         placed = placement[own[side]]
-        lever = np.einsum("ij,ijk->ik", pieces.points[local], placed[:, :3]) + placed[:, 3] - witness[side]
+        lever = np.einsum("ij,ijk->ik", self._points[local], placed[:, :3]) + placed[:, 3] - witness[side]
         height = np.einsum("ij,ij->i", lever, towards[side])
-        drop = -height - pieces.radius[own[side]]  # how far the point stands behind the witness point, >= 0
+        drop = -height - self._radius[own[side]]  # how far the point stands behind the witness point, >= 0
         near = np.flatnonzero(drop < module.BAND)
         side, drop = side[near], np.maximum(drop[near], 0.0)
         lever = lever[near] - height[near, None] * towards[side]
@@ -105,7 +103,6 @@ class ReferenceRowBuilder(ContactRowBuilder):
         self, placements: Array, other: Indices, facing: Array, towards: Array, lever: Array
     ) -> tuple[Array, Array]:
         """How far along each lever the other piece is still below: share of the lever in [0, 1], and its sag there."""
-        pieces = self.table.arrays
         placement = placements[other]
         rotation = placement[:, :3]
         base = np.einsum("ijk,ik->ij", rotation, facing + module.INSET * towards - placement[:, 3])
@@ -113,22 +110,22 @@ class ReferenceRowBuilder(ContactRowBuilder):
         reach = np.ones(len(other))
         sag = np.zeros(len(other))
 
-        row, face = _expand(pieces.first_face, other)
+        row, face = _expand(self._face_start, self._face_count, other)
         if len(row):
-            plane = pieces.faces[face]
+            plane = self._faces[face]
             climb = np.einsum("ij,ij->i", plane[:, :3], along[row])
             room = plane[:, 3] - np.einsum("ij,ij->i", plane[:, :3], base[row])
             rising = climb > 1e-12
             limit = np.where(rising, np.maximum(room, 0.0) / np.where(rising, climb, 1.0), 1.0)
             np.minimum.at(reach, row, limit)
 
-        capsule: Indices = np.flatnonzero(pieces.axis[other].any(axis=1))
+        capsule: Indices = np.flatnonzero(self._is_capsule[other])
         if len(capsule):
-            axis = pieces.axis[other[capsule]]
+            axis = self._axis[other[capsule]]
             down = np.einsum("ijk,ik->ij", rotation[capsule], towards[capsule])
             across = np.cross(axis, down)
             norm = np.sqrt(np.einsum("ij,ij->i", across, across))
-            radius = pieces.radius[other[capsule]]
+            radius = self._radius[other[capsule]]
             offset = np.abs(np.einsum("ij,ij->i", across, along[capsule])) / np.maximum(norm, 1e-9)
             width = np.sqrt(2.0 * radius * module.INSET)
             limit = np.where(offset > width, width / np.maximum(offset, 1e-12), 1.0)
@@ -154,12 +151,12 @@ def _farthest_first(group: Indices, point: Array, beyond: Array, witness: Array)
     return group[chosen]
 
 
-def _expand(first: Indices, item: Indices) -> tuple[Indices, Indices]:
+def _expand(start: Indices, count: Indices, item: Indices) -> tuple[Indices, Indices]:
     """Flat table look-up: for each entry of `item` all its rows; (which entry, which row)."""
-    counts = np.diff(first)[item]
+    counts = count[item]
     entry = np.repeat(np.arange(len(item)), counts)
     offset = np.arange(len(entry)) - np.repeat(np.cumsum(counts) - counts, counts)
-    return entry, first[item][entry] + offset
+    return entry, start[item][entry] + offset
 
 
 def _wrenches(normal: Array, point: Array) -> Array:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, distances
+from wholebody.geometry.continuous.moved_pairs import ARC, ENDLESS, QueryResult, distances
 from wholebody.geometry.proximity import PairTable
-from wholebody.geometry.records import QueryResult
 
 
 def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:

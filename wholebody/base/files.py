@@ -24,6 +24,9 @@ from typing import Any
 from wholebody.base import checks
 from wholebody.base.errors import FileFormatError, InputError, one_line
 
+LARGEST_TEXT = 10_000_000
+"""Bytes of a file that people write by hand, such as a task."""
+
 LARGEST = 1_000_000_000
 """Bytes of any other file, such as a mesh or a recorded track."""
 
@@ -69,8 +72,7 @@ def read_bytes(path: str | PathLike[str], kind: str = "file", largest: int = LAR
     return data
 
 
-# Bytes of a file that people write by hand, such as a task.
-def read_text(path: str | PathLike[str], kind: str = "file", largest: int = 10_000_000) -> str:
+def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
     """Read a text file in UTF-8, with or without a byte order mark.
 
     Line ends are kept as they are.

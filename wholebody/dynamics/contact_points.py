@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.pieces import Pieces, PlacedPieces, PlacedProximity
 from wholebody.geometry.contact_rows import ContactRowBuilder
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 
 POINTS = 6  # of one contact beside its witness points: a box on a box has four, two crossed planks have six
 SAME_NORMAL = 0.995  # cosine of 0.1 rad: where pieces are 50 um apart, coal's normal is off by some 0.02 rad

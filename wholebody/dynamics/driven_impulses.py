@@ -15,8 +15,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
-from wholebody.geometry.proximity import PairTable
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.materials import Surface
 
 TOUCH = 1.5e-3  # m: nearer pieces touch; a figure stops short of things by less

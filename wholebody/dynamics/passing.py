@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.dynamics import passing_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
 MOST_LOOKS = 64  # places of one pair on the way; what would need more is doubtful

@@ -31,7 +31,7 @@ from wholebody.dynamics.pieces import Pieces
 from wholebody.dynamics.sleeping import Sleepers
 from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
 from wholebody.geometry.placement import FARTHEST
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.scene.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2

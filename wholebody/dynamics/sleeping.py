@@ -8,7 +8,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import contact_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 
 STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
 SLEEP_AFTER = 0.5  # s that all bodies of an island are so slow before they sleep

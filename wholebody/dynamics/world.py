@@ -25,7 +25,7 @@ from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.geometry.continuous.passing_through import INSIDE
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
 from wholebody.scene.matter.materials import Surface, surface
 from wholebody.scene.moving_obstacles import Collision

@@ -15,8 +15,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.description import ExcludedPair, limits_of
 from wholebody.figures.self_pairs import drop_pairs, random_postures
 from wholebody.figures.state import State
-from wholebody.geometry.proximity import PairTable, Proximity
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 
 APART = 1e-3
 """Least distance of two pieces in the posture, metres."""

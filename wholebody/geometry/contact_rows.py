@@ -18,12 +18,11 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
+from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.geometry.proximity import COAL_ACCURACY, PairTable
-from wholebody.geometry.records import Contacts, RowRoom, RowSettings, no_contacts
+from wholebody.geometry.proximity import COAL_ACCURACY, Contacts, PairTable
 
 BAND = 0.02  # m: swept points this much farther than the witness point still make a row; wider = more rows
 LEVER_DISTANCE = 0.025  # m: pairs that are this much farther apart than they must be get their witness row only
@@ -33,6 +32,8 @@ NORMAL_ROOM = 2.0 * COAL_ACCURACY  # m: by which a face's normal may part the pi
 MOST_ENDS = 8  # rows of one contact beside the witness row: a round face has dozens of corners; fewer rows rock more
 SETBACK = 1e-3  # m: of too many ends, one this much farther off counts as half as far out; less = more of the near ones
 SHORTEST_LEVER = 8e-3  # m: rows nearer to the witness point than this say what the witness row says
+LENGTHS = np.array([LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, SAME_NORMAL, NORMAL_ROOM, SETBACK])
+"""What the compiled loops take of the above."""
 
 
 class ContactRows(NamedTuple):
@@ -64,12 +65,21 @@ class ContactRowBuilder:
             most_ends: rows of one contact beside its witness row.
             same_normal: cosine of the angle to a face's normal within which coal's may be meant to be it.
         """
-        self.table = table
-        self._settings = RowSettings(
-            LEVER_DISTANCE, BAND, INSET, SHORTEST_LEVER, same_normal, NORMAL_ROOM, SETBACK, most_ends
-        )
-        flat = (np.diff(table.arrays.first_point) >= 2) | np.isinf(table.reach)
-        self._extended: Mask = flat[table.pairs].all(axis=1)
+        self.table, self.most_ends = table, most_ends
+        self._lengths = LENGTHS.copy()
+        self._lengths[4] = same_normal
+        shapes = table.swept
+        self._points = np.vstack([swept.points for swept in shapes] or [np.zeros((0, 3))])
+        self._point_count = np.array([len(swept.points) for swept in shapes], dtype=np.intp)
+        self._point_start = np.concatenate([[0], np.cumsum(self._point_count)])[:-1].astype(np.intp)
+        self._faces = np.vstack([swept.faces for swept in shapes] or [np.zeros((0, 4))])
+        self._face_count = np.array([len(swept.faces) for swept in shapes], dtype=np.intp)
+        self._face_start = np.concatenate([[0], np.cumsum(self._face_count)])[:-1].astype(np.intp)
+        self._radius = np.array([swept.radius for swept in shapes])
+        self._axis = np.array([swept.axis for swept in shapes]).reshape(-1, 3)
+        self._is_capsule: NDArray[np.bool_] = np.asarray(self._axis.any(axis=1))
+        flat = (self._point_count >= 2) | np.isinf(table.reach)
+        self._extended = flat[table.pairs].all(axis=1)
         self._kernel = compiled_kernel()
 
     def rows(self, contacts: Contacts, clearance: Array | float = 0.0) -> ContactRows:
@@ -92,23 +102,35 @@ class ContactRowBuilder:
                 f"contacts among {len(contacts.placements)} pieces are not among these {len(self.table.joint)}; ask "
                 "the scene that they come from"
             )
-        found = RowRoom.of(len(contacts.distance) * (1 + self._settings.most_ends))
+        most = len(contacts.distance) * (1 + self.most_ends)
+        wrench, gap = np.empty((most, 6)), np.empty(most)
+        contact, joints = np.empty(most, dtype=np.intp), np.empty((most, 2), dtype=np.intp)
         asked = np.full(contacts.distance.shape, clearance, dtype=float)  # not a view: numba takes it for another type
-        count = self.write(contacts, asked, found)
-        wrench, gap, contact, joints = (array[:count].copy() for array in found)
-        return ContactRows(gap, wrench, contact, joints[:, 0].copy(), joints[:, 1].copy())
+        count = self.write(contacts, asked, wrench, gap, contact, joints)
+        return ContactRows(
+            gap[:count].copy(), wrench[:count].copy(), contact[:count].copy(), joints[:count, 0].copy(),
+            joints[:count, 1].copy(),
+        )  # fmt: skip
 
-    def write(self, contacts: Contacts, clearance: Array, rows: RowRoom) -> int:
-        """Write the rows of all contacts; how many there are.
+    def write(
+        self, contacts: Contacts, clearance: Array, wrench: Array, gap: Array, contact: Indices, joints: Indices
+    ) -> int:
+        """Write the rows of all contacts into arrays with room for ``k * (1 + most_ends)`` rows; how many there are.
 
         Args:
             contacts: the near pairs of the same pieces.
             clearance: (k,) distance asked of each, metres.
-            rows: room for ``k * (1 + most_ends)`` rows.
+            wrench: (rows, 6) room.
+            gap: (rows,) room.
+            contact: (rows,) room for the contact that a row belongs to.
+            joints: (rows, 2) room for the joints of its first and second piece.
         """
         count: int = self._kernel.contact_rows(
-            contacts, clearance, self._extended, self.table.arrays, self._settings, rows
-        )
+            contacts.pair, contacts.distance, contacts.normal, contacts.point_a, contacts.point_b, contacts.number,
+            contacts.placements, clearance, self._extended, self.table.joint, self._points, self._point_start,
+            self._point_count, self._faces, self._face_start, self._face_count, self._radius, self._axis,
+            self._is_capsule, self._lengths, self.most_ends, wrench, gap, contact, joints,
+        )  # fmt: skip
         return count
 
 
@@ -117,8 +139,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import patch_kernel
 
-    table = PairTable(pin.Model(), pin.GeometryModel())
-    contacts, extended = no_contacts(np.zeros((0, 4, 3))), np.zeros(0, dtype=bool)
-    settings = RowSettings(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0)
-    patch_kernel.contact_rows(contacts, np.zeros(0), extended, table.arrays, settings, RowRoom.of(0))
+    none, points, lengths = np.zeros(0, dtype=np.intp), np.zeros((0, 3)), np.zeros(0)
+    pair, faces, placement = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros((0, 4, 3))
+    patch_kernel.contact_rows(
+        pair, lengths, points, points, points, none, placement, lengths, np.zeros(0, dtype=bool), none, points, none,
+        none, faces, none, none, lengths, points, np.zeros(0, dtype=bool), LENGTHS, MOST_ENDS, np.zeros((0, 6)),
+        lengths, none, pair,
+    )  # fmt: skip
     return patch_kernel

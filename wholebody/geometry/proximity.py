@@ -10,13 +10,12 @@ import time
 from functools import lru_cache
 from typing import Any, NamedTuple, Protocol
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import number
 from wholebody.geometry.memory_views import RESULT_DOUBLES, Guesses, fields, placement_view, read_result, result_view
-from wholebody.geometry.records import ContactRoom, Contacts, Memory, PieceArrays
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points
 
@@ -31,24 +30,81 @@ AWAY = 10.0  # m: between pieces that stand anywhere
 ENDLESS = 1e9  # m: what counts for the reach of a half-space, and half the size of its box
 
 
+class Contacts(NamedTuple):
+    """Pairs nearer than a query distance. All arrays have k rows, and no gaps in memory.
+
+    Attributes:
+        pair: (k, 2) indices of the two pieces in the geometry model.
+        distance: (k,) signed distance, metres; negative when one is inside the other.
+        normal: (k, 3) unit vector from the first piece to the second, also in penetration.
+        point_a: (k, 3) witness point on the first piece, world.
+        point_b: (k, 3) witness point on the second; point_b - point_a = distance * normal.
+        number: (k,) place of the pair among the geometry model's collision pairs.
+        placements: (n, 4, 3) where all pieces were: columns of the rotation, then the translation.
+    """
+
+    pair: Indices
+    distance: Array
+    normal: Array
+    point_a: Array
+    point_b: Array
+    number: Indices
+    placements: Array
+
+    def nearest_first(self) -> Contacts:
+        """The same in the order of their distances."""
+        return self._rows(np.argsort(self.distance, kind="stable"))
+
+    def nearer(self, distance: float) -> Contacts:
+        """Those that are nearer than a distance, metres.
+
+        Raises:
+            InputError: the distance is no number.
+        """
+        distance = number(distance, "nearer: distance", -np.inf, np.inf, "m")
+        return self._rows(np.flatnonzero(self.distance < distance))
+
+    def joined(self, others: Contacts) -> Contacts:
+        """These and others at the same placements."""
+        return Contacts(
+            np.concatenate([self.pair, others.pair]), np.concatenate([self.distance, others.distance]),
+            np.concatenate([self.normal, others.normal]), np.concatenate([self.point_a, others.point_a]),
+            np.concatenate([self.point_b, others.point_b]), np.concatenate([self.number, others.number]),
+            self.placements,
+        )  # fmt: skip
+
+    def _rows(self, rows: Indices) -> Contacts:
+        return Contacts(
+            self.pair[rows], self.distance[rows], self.normal[rows], self.point_a[rows], self.point_b[rows],
+            self.number[rows], self.placements,
+        )  # fmt: skip
+
+
 class _ContactBuffer:
-    """Room for `size` contacts."""
+    """Room for contacts.
+
+    Attributes:
+        size: how many contacts it has room for.
+        distance: (size,) see `Contacts`, like the following.
+        vectors: (3, size, 3) normals, points on the first and on the second piece.
+        number: (size,).
+        pair: (size, 2).
+    """
 
     def __init__(self, size: int) -> None:
         """Allocate."""
         self.size = size
-        number, pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
-        self.room = ContactRoom(np.empty(size), np.empty((3, size, 3)), number, pair)
+        self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
+        self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
         self._front: dict[int, Contacts] = {}
 
     def contacts(self, count: int, placements: Array) -> Contacts:
         """The first `count` of the contacts; the same object where both arguments are the same."""
         known = self._front.get(count)
         if known is None or known.placements is not placements:
-            room = self.room
-            normal, point_a, point_b = room.vectors[:, :count]
+            normal, point_a, point_b = self.vectors[:, :count]
             known = self._front[count] = Contacts(
-                room.pair[:count], room.distance[:count], normal, point_a, point_b, room.number[:count], placements
+                self.pair[:count], self.distance[:count], normal, point_a, point_b, self.number[:count], placements
             )
         return known
 
@@ -60,12 +116,15 @@ class PairTable:
         model: Pinocchio's model.
         geometry: the geometry model; only the placements of its pieces may change.
         swept: the swept points of every piece.
-        arrays: all of the following, and more, as compiled loops take it; see `PieceArrays`.
         pairs: (pairs, 2) indices of the two pieces of every collision pair.
         joint: (n,) joint that carries each piece; 0 is the world.
         reach: (n,) radius of each piece about its origin, metres; infinite for a half-space.
         half: (n, 3) half the size of a box about each piece's origin, along its own axes, metres.
         widths: (pairs,) width of both pieces together, metres.
+        points: (m, 3) swept points of all pieces, one piece after the other, each in its piece's frame.
+        first_point: (n + 1,) where those of each piece begin.
+        radius: (n,) around them, metres.
+        points_meet: (pairs,) distance at and below which coal's normal means nothing, metres; -inf for most pairs.
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
@@ -80,8 +139,7 @@ class PairTable:
             InputError: a geometry that is not a convex piece.
         """
         self.model, self.geometry = model, geometry
-        shapes = [piece.geometry for piece in geometry.geometryObjects]
-        swept = self.swept = [swept_points(shape) for shape in shapes]
+        self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         if pairs is None:
             listed = [[pair.first, pair.second] for pair in geometry.collisionPairs]
             pairs = np.array(listed, dtype=np.intp).reshape(-1, 2)
@@ -99,8 +157,6 @@ class PairTable:
         self.points_meet = np.where(
             (radius[self.pairs] > 0.0).all(axis=1), COAL_ACCURACY - radius[self.pairs].sum(axis=1), -np.inf
         )
-        self.pairs, self.widths = self.arrays.pairs, self.arrays.widths
-        self.joint, self.reach, self.half = self.arrays.joint, self.arrays.reach, self.arrays.half
 
 
 class Kinematics(Protocol):
@@ -140,19 +196,20 @@ class Proximity:
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
         self._singly = pairs >= SINGLY
-        index, marked, changed = (np.zeros(pairs, dtype=np.intp) for _ in range(3))
-        last, extent, bound = np.zeros((count, 4, 3)), np.zeros((count, 3)), np.full(pairs, -np.inf)
-        self._memory, self._count = Memory(last, np.zeros(count), bound, extent, index, marked, changed), 0
+        self._index, self._changed = np.zeros((2, pairs), dtype=np.intp)
+        self._marked, self._count = np.zeros(pairs, dtype=np.intp), 0
+        self._travelled, self._bound = np.zeros(count), np.full(pairs, -np.inf)
         self._endless = np.full(pairs, np.inf)
         self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
+        self._last, self._extent = np.zeros((count, 4, 3)), np.zeros((count, 3))
         self._lay_views()
 
     def reset(self) -> None:
         """Forget how near each pair was and where coal ended for it: the same queries give the same answers again."""
         self._guesses.reset()
         self._ask_nothing()
-        self._memory.travelled[:] = 0.0
-        self._memory.bound[:] = -np.inf
+        self._travelled[:] = 0.0
+        self._bound[:] = -np.inf
 
     def place_piece(self, index: int, placement: pin.SE3) -> None:
         """Place a piece anew in its joint's frame."""
@@ -211,22 +268,26 @@ class Proximity:
 
     def _asked(self, placements: Array, within: float, most: Array) -> Indices:
         """Compute with coal the distances of all pairs that can be nearer than `within`; their indices."""
-        memory, results = self._memory, self.results
+        table, kernel = self.table, self._kernel
+        results = self.results
         try:
-            count, gone, came = self._kernel.look(placements, self.table.arrays, memory, self._count, within, most)
+            count, gone, came = kernel.look(
+                placements, self._last, table.pairs, table.reach, table.half, self._travelled, self._bound,
+                self._extent, within, most, self._index, self._marked, self._count, self._changed,
+            )  # fmt: skip
             self._count = count
             self.asked += count
-            numbers = memory.index[:count]
             if not self._kept:
+                numbers = self._index[:count]
                 assert self._distances is not None
-                fields(self._distances)[numbers] = self._single.measured(placements, self.table.pairs[numbers])
+                fields(self._distances)[numbers] = self._single.measured(placements, table.pairs[numbers])
                 return numbers
             if self._singly:
-                for number in numbers.tolist():
+                for number in self._index[:count].tolist():
                     pin.computeDistance(self.geometry, results, number)
-                return numbers
+                return self._index[:count]
             if gone or came:
-                changed = memory.changed[: gone + came].tolist()
+                changed = self._changed[: gone + came].tolist()
                 for number in changed[:gone]:
                     results.deactivateCollisionPair(number)
                 for number in changed[gone:]:
@@ -236,24 +297,23 @@ class Proximity:
         except BaseException:  # Ctrl-C between what is noted and what Pinocchio is told: begin again from no pairs
             self._ask_nothing()
             raise
-        return numbers
+        return self._index[:count]
 
     def _ask_nothing(self) -> None:
         self.results.deactivateAllCollisionPairs()
         self._count = 0
 
-    def _gather(
-        self, buffer: _ContactBuffer, placements: Array, index: Indices, within: float, most: Array
-    ) -> Contacts:
+    def _gather(self, room: _ContactBuffer, placements: Array, index: Indices, within: float, most: Array) -> Contacts:
         results, known = self._distances, self.table
         if results is None:
             results = np.zeros((len(known.pairs), RESULT_DOUBLES))
             for number in index.tolist():
                 fields(results)[number] = read_result(self.results.distanceResults[number])
         count, broken = self._kernel.gather(
-            results, index, known.arrays, self._memory, 10.0 * COAL_ACCURACY, within, most, buffer.room
-        )
-        contacts = buffer.contacts(count, placements)
+            results, index, known.pairs, known.points_meet, self._travelled, self._bound, 10.0 * COAL_ACCURACY, within,
+            most, room.distance, room.vectors, room.number, room.pair,
+        )  # fmt: skip
+        contacts = room.contacts(count, placements)
         if broken:
             self._repair_normals(contacts)
         return contacts
@@ -261,7 +321,7 @@ class Proximity:
     def _repair_normals(self, contacts: Contacts) -> None:
         """Give a normal to pairs where coal has none: capsule axes that cross exactly, concentric spheres."""
         placements = contacts.placements
-        for row in np.flatnonzero(contacts.distance <= self.table.arrays.points_meet[contacts.number]):
+        for row in np.flatnonzero(contacts.distance <= self.table.points_meet[contacts.number]):
             first, second = contacts.pair[row]
             axis_a = self.table.swept[first].axis @ placements[first, :3]
             axis_b = self.table.swept[second].axis @ placements[second, :3]
@@ -280,11 +340,14 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.geometry import proximity_kernel
 
-    table = PairTable(pin.Model(), pin.GeometryModel())
-    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
-    memory = Memory(np.zeros((0, 4, 3)), none, none, np.zeros((0, 3)), index, index, index)
-    proximity_kernel.look(np.zeros((0, 4, 3)), table.arrays, memory, 0, 0.0, none)
+    placement, one, none = np.zeros((1, 4, 3)), np.zeros(1), np.zeros(0)
+    index, pairs = np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
+    proximity_kernel.look(
+        placement, placement.copy(), pairs, one, np.zeros((1, 3)), one.copy(), none, np.zeros((1, 3)), 0.0, none, index,
+        index, 0, index,
+    )  # fmt: skip
     proximity_kernel.gather(
-        np.zeros((0, RESULT_DOUBLES)), index, table.arrays, memory, 0.0, 0.0, none, _ContactBuffer(0).room
-    )
+        np.zeros((0, RESULT_DOUBLES)), index, pairs, none, one, none, 0.0, 0.0, none, none, np.zeros((3, 0, 3)), index,
+        pairs,
+    )  # fmt: skip
     return proximity_kernel

@@ -7,7 +7,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.geometry.memory_views import RESULT_FIRST
-from wholebody.geometry.records import ContactRoom, Memory, PieceArrays
 
 
 @compiled(inner=True)
@@ -64,8 +63,19 @@ def outer_gap(placement: Array, reach: Array, extent: Array, a: int, b: int) -> 
 
 
 @compiled(inner=True)
-def cull(placement: Array, pieces: PieceArrays, memory: Memory, within: float, most: Array) -> int:
-    """Pairs that may be nearer than `within`, in the order of the pairs: they go to the front of `memory.index`.
+def cull(
+    placement: Array,
+    pairs: Indices,
+    reach: Array,
+    half: Array,
+    travelled: Array,
+    bound: Array,
+    extent: Array,
+    within: float,
+    most: Array,
+    index: Indices,
+) -> int:
+    """Pairs that may be nearer than `within`, in the order of the pairs: their places go to the front of `index`.
 
     A pair is left out where one of three lower bounds of its signed distance is not below that: the bound when it
     was last looked at, less what both pieces have moved since; the gap between spheres about the pieces; the gap
@@ -73,17 +83,21 @@ def cull(placement: Array, pieces: PieceArrays, memory: Memory, within: float, m
 
     Args:
         placement: (n, 4, 3) where the pieces are.
-        pieces: see `PieceArrays`.
-        memory: see `Memory`; its bounds are renewed for pairs that the spheres or boxes leave out.
+        pairs: (pairs, 2) their pieces.
+        reach: (n,) radius of each piece about its origin; may be infinite.
+        half: (n, 3) half the size of a box about each piece's origin, along its own axes.
+        travelled: (n,) see `travel`.
+        bound: (pairs,) lower bound of the distance when the pair was last looked at, plus what both had travelled then;
+            renewed for pairs that the spheres or boxes leave out.
+        extent: (n, 3) room for the sizes of the boxes.
         within: metres.
-        most: (p,) for one pair each, in place of `within` where it is less.
+        most: (pairs,) for one pair each, in place of `within` where it is less.
+        index: (pairs,) room for the answer.
 
     Returns:
         How many there are.
     """
-    travelled, bound, index, extent = memory.travelled, memory.bound, memory.index, memory.extent
-    pairs, reach = pieces.pairs, pieces.reach
-    bound_by_boxes(placement, pieces.half, extent)
+    bound_by_boxes(placement, half, extent)
     count = 0
     for p in range(len(pairs)):
         a, b = pairs[p, 0], pairs[p, 1]
@@ -104,30 +118,38 @@ def cull(placement: Array, pieces: PieceArrays, memory: Memory, within: float, m
 def gather(
     results: Array,
     index: Indices,
-    pieces: PieceArrays,
-    memory: Memory,
+    pairs: Indices,
+    points_meet: Array,
+    travelled: Array,
+    bound: Array,
     accuracy: float,
     within: float,
     most: Array,
-    room: ContactRoom,
+    nearest: Array,
+    vectors: Array,
+    number: Indices,
+    pair: Indices,
 ) -> tuple[int, bool]:
     """Copy the results of the pairs nearer than `within`, and remember the distances of all that were asked.
 
     Args:
-        results: (p, 20) of coal; see `memory_views.result_view`.
+        results: (pairs, 20) of coal; see `memory_views.result_view`.
         index: (k,) the pairs that were asked.
-        pieces: see `PieceArrays`.
-        memory: see `Memory`; its bounds are renewed.
+        pairs: (pairs, 2) their pieces.
+        points_meet: (pairs,) distance at and below which coal may have no normal.
+        travelled: (n,) see `travel`.
+        bound: (pairs,) see `cull`; renewed.
         accuracy: metres to which a distance is known, and share of it.
         within: metres.
-        most: (p,) see `cull`.
-        room: for the contacts.
+        most: (pairs,) see `cull`.
+        nearest: (k,) room for distances.
+        vectors: (3, k, 3) room for normals and the nearest points on first and second pieces.
+        number: (k,) room for the places of the pairs.
+        pair: (k, 2) room for their pieces.
 
     Returns:
         How many are near, and whether one of them needs its normal repaired.
     """
-    pairs, points_meet, travelled, bound = pieces.pairs, pieces.points_meet, memory.travelled, memory.bound
-    nearest, vectors, number, pair = room
     count = 0
     broken = False
     for p in index:
@@ -173,14 +195,27 @@ def renew(marked: Indices, before: int, index: Indices, count: int, changed: Ind
 
 @compiled()
 def look(
-    placement: Array, pieces: PieceArrays, memory: Memory, before: int, within: float, most: Array
+    placement: Array,
+    last: Array,
+    pairs: Indices,
+    reach: Array,
+    half: Array,
+    travelled: Array,
+    bound: Array,
+    extent: Array,
+    within: float,
+    most: Array,
+    index: Indices,
+    marked: Indices,
+    before: int,
+    changed: Indices,
 ) -> tuple[int, int, int]:
-    """`travel`, `cull` and `renew`; `before` pairs are marked.
+    """`travel`, `cull` and `renew`.
 
     Returns:
         How many pairs may be near, how many of those that were marked are so no longer, and how many are newly.
     """
-    travel(placement, memory.last, pieces.reach, memory.travelled)
-    count = cull(placement, pieces, memory, within, most)
-    gone, came = renew(memory.marked, before, memory.index, count, memory.changed)
+    travel(placement, last, reach, travelled)
+    count = cull(placement, pairs, reach, half, travelled, bound, extent, within, most, index)
+    gone, came = renew(marked, before, index, count, changed)
     return count, gone, came

@@ -16,8 +16,7 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, entered
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
-from wholebody.geometry.proximity import PairTable
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 

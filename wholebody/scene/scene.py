@@ -17,7 +17,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.broad_phase import near_among
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.placement import placement as to_placement
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.scene.contents import SceneContents
 from wholebody.scene.workspace import Workspace, borrowed
 

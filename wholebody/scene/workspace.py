@@ -16,8 +16,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.approach import largest_approach
 from wholebody.geometry.continuous.passing_through import INSIDE
-from wholebody.geometry.proximity import PairTable, Proximity
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.geometry_model import SceneGeometry
 
 if TYPE_CHECKING:

@@ -9,8 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Constraint
-from wholebody.terms.entries import Pose, TermRoom
-from wholebody.terms.linearisation import NO_LIMITS, NO_ROWS, compiled_kernel
+from wholebody.terms.linearisation import NO_JOINTS, NO_LIMITS, NO_WRENCHES, compiled_kernel
 from wholebody.terms.plan import Terms, checked_count, make_plan
 
 
@@ -22,10 +21,9 @@ class ConstraintValues:
         self._kernel = compiled_kernel()
         self._plan = plan = make_plan(NO_LIMITS, Terms(constraints=constraints), None, state)
         self._model, rows, nv = state.model, plan.value_rows, state.model.nv
-        self._room = TermRoom(
-            np.empty((rows, 6)), np.empty(rows), np.empty((rows, nv)), np.empty((2, nv)), np.empty((2, nv + 1)),
-            np.zeros((0, nv)),
-        )  # fmt: skip
+        self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
+        self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))
+        self._no_squares = np.zeros((0, nv))
 
     def take(self, constraints: Sequence[Constraint]) -> bool:
         """Put others in their place; False, and nothing is done, where these are not of the same classes and frames."""
@@ -35,8 +33,12 @@ class ConstraintValues:
 
     def at(self, state: State) -> Array:
         """The values (c,) where a state is; overwritten by the next call."""
-        plan, value = self._plan, self._room.value
-        self._kernel.linearise(Pose(state.joints, state.columns, state.q), plan.tables, NO_ROWS, 0, self._room)
+        plan, value = self._plan, self._value
+        self._kernel.linearise(
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            NO_WRENCHES, NO_JOINTS, 0, self._wrench, value, self._jacobian, self._box, self._measure,
+            self._no_squares,
+        )  # fmt: skip
         for term, evaluate, row, rows in plan.others:
             part = np.atleast_1d(evaluate(state))
             checked_count(term, len(part), rows)

@@ -52,58 +52,6 @@ Row: TypeAlias = tuple[tuple[int, ...], Array]
 _NO_EDGES: Array = np.zeros((0, 15))
 
 
-class TermTables(NamedTuple):
-    """The tables of a plan, as compiled loops take them.
-
-    Attributes:
-        floats: all tables of floats, one after the other.
-        integers: all tables of integers.
-        layout: (tables, 6) where each table of floats begins, its rows and columns, and the same of integers.
-        support: (njoints, n) 1 where a column of the joint Jacobian moves a joint.
-    """
-
-    floats: Array
-    integers: Integers
-    layout: Integers
-    support: NDArray[np.int8]
-
-
-class Pose(NamedTuple):
-    """A posture, as compiled loops take it.
-
-    Attributes:
-        joints: (njoints, 4, 3) placements of the joints; see `placement_view`.
-        columns: (n, 6) columns of the joint Jacobian, in the world.
-        q: (nq,) the posture.
-    """
-
-    joints: Array
-    columns: Array
-    q: Array
-
-
-class TermRoom(NamedTuple):
-    """Room for what is computed of a plan's terms.
-
-    Attributes:
-        wrench: (rows, 6) wrenches of the rows that have one.
-        value: (rows,) values.
-        jacobian: (rows + contact rows, nv) derivatives, then those of the contacts' gaps.
-        box: (2, nv) bounds on the displacement.
-        measure: (2, nv + 1) gradient and value, and curvature; with squares a third row is for their part of the
-            curvature.
-        squares: (s, nv) rows S of measures that are sums of squares, whose second derivative is S' S; (0, nv) if they
-            are not asked for.
-    """
-
-    wrench: Array
-    value: Array
-    jacobian: Array
-    box: Array
-    measure: Array
-    squares: Array
-
-
 class Entry(NamedTuple):
     """One row of a table of goals or constraints.
 

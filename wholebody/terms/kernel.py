@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
-from wholebody.geometry.records import RowRoom
 from wholebody.tasks.discomfort import POWER, STEEPNESS
 from wholebody.terms.coordinate_kernel import (
     balls,
@@ -45,88 +45,114 @@ from wholebody.terms.entries import (
     TURN,
     TWIST,
     Integers,
-    Pose,
-    TermRoom,
-    TermTables,
 )
 from wholebody.terms.residual_kernel import axis_errors, cones, planes, residuals, twists
 
 
 @compiled(inner=True)
-def _floats(tables: TermTables, table: int) -> Array:
-    start, rows, columns = tables.layout[table, 0], tables.layout[table, 1], tables.layout[table, 2]
-    return tables.floats[start : start + rows * columns].reshape((rows, columns))
+def _floats(flat: Array, layout: Integers, table: int) -> Array:
+    start, rows, columns = layout[table, 0], layout[table, 1], layout[table, 2]
+    return flat[start : start + rows * columns].reshape((rows, columns))
 
 
 @compiled(inner=True)
-def _integers(tables: TermTables, table: int) -> Integers:
-    start, rows, columns = tables.layout[table, 3], tables.layout[table, 4], tables.layout[table, 5]
-    return tables.integers[start : start + rows * columns].reshape((rows, columns))
+def _integers(flat: Integers, layout: Integers, table: int) -> Integers:
+    start, rows, columns = layout[table, 3], layout[table, 4], layout[table, 5]
+    return flat[start : start + rows * columns].reshape((rows, columns))
 
 
 @compiled(error_model="numpy")
-def linearise(pose: Pose, tables: TermTables, contacts: RowRoom, count: int, room: TermRoom) -> None:
+def linearise(
+    joints: Array,
+    columns: Array,
+    support: NDArray[np.int8],
+    q: Array,
+    floats: Array,
+    integers: Integers,
+    layout: Integers,
+    gap_wrench: Array,
+    gap_joints: Integers,
+    gaps: int,
+    wrench: Array,
+    value: Array,
+    jacobian: Array,
+    box: Array,
+    measure: Array,
+    squares: Array,
+) -> None:
     """Values and Jacobian rows of all terms of a plan, then the Jacobian rows of contacts; bounds and measures.
 
     Args:
-        pose: the posture.
-        tables: of the plan.
-        contacts: the contacts' rows.
-        count: how many there are.
-        room: for the answers.
+        joints: (njoints, 4, 3) placements of the joints; see `placement_view`.
+        columns: (n, 6) columns of the joint Jacobian, in the world.
+        support: (njoints, n) 1 where a column moves a joint.
+        q: (nq,) the posture.
+        floats: of the plan.
+        integers: of the plan.
+        layout: of the plan.
+        gap_wrench: (gaps or more, 6) wrenches of the contacts' rows.
+        gap_joints: (gaps or more, 2) joints of the first and second piece of each.
+        gaps: how many.
+        wrench: (terms' rows, 6) room.
+        value: (terms' rows,) room for the values.
+        jacobian: (terms' rows + gaps, nv) room for all rows.
+        box: (2, nv) room for the bounds on the displacement.
+        measure: (2, nv + 1) room for the gradient and the value, and for the curvature; with squares a third row is
+            for their part of the curvature.
+        squares: (s, nv) room for the rows S of measures that are sums of squares, whose second derivative is S' S;
+            (0, nv) if they are not asked for.
     """
-    room.jacobian[: len(room.value)] = 0.0
-    room.wrench[:] = 0.0
-    _wrench_terms(pose, tables, contacts, count, room)
-    _coordinate_terms(pose, tables, room)
-    _box(_floats(tables, LIMIT), _integers(tables, LIMIT), _floats(tables, BOX), pose.q, room.box)
-    _measure_terms(pose, tables, room)
-
-
-@compiled(inner=True, error_model="numpy")
-def _wrench_terms(pose: Pose, tables: TermTables, contacts: RowRoom, count: int, room: TermRoom) -> None:
-    """Terms whose rows are wrenches between two joints, the contacts' rows, and the centre of mass."""
-    joints, columns, jacobian, wrench, value = pose.joints, pose.columns, room.jacobian, room.wrench, room.value
-    column, bodies = _integers(tables, COLUMN), _integers(tables, BODY)
-    residuals(_floats(tables, RESIDUAL), _integers(tables, RESIDUAL), joints, wrench, value)
-    planes(_floats(tables, PLANE), _integers(tables, PLANE), joints, wrench, value)
-    axis_errors(_floats(tables, AXIS), _integers(tables, AXIS), joints, wrench, value)
-    cones(
-        _floats(tables, CONE), _integers(tables, CONE), _floats(tables, EDGE), joints, wrench, value
-    )  # fmt: skip
-    twists(_floats(tables, TWIST), _integers(tables, TWIST), joints, wrench, value)
+    nv = jacobian.shape[1]
+    terms = len(value)
+    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
+    jacobian[:terms] = 0.0
+    wrench[:] = 0.0
+    residuals(_floats(floats, layout, RESIDUAL), _integers(integers, layout, RESIDUAL), joints, wrench, value)
+    if layout[PLANE, 1]:
+        planes(_floats(floats, layout, PLANE), _integers(integers, layout, PLANE), joints, wrench, value)
+    if layout[AXIS, 1]:
+        axis_errors(_floats(floats, layout, AXIS), _integers(integers, layout, AXIS), joints, wrench, value)
+    if layout[CONE, 1]:
+        cones(
+            _floats(floats, layout, CONE), _integers(integers, layout, CONE), _floats(floats, layout, EDGE), joints,
+            wrench, value,
+        )  # fmt: skip
+    if layout[TWIST, 1]:
+        twists(_floats(floats, layout, TWIST), _integers(integers, layout, TWIST), joints, wrench, value)
     for table, rows in ((RESIDUAL, 0), (PLANE, 1), (AXIS, 2), (CONE, 1), (TWIST, 1)):
-        entries = _integers(tables, table)
+        entries = _integers(integers, layout, table)
         for e in range(len(entries)):
             against = entries[e, 2] if table in (RESIDUAL, CONE, TWIST) else 0
-            height = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
-            for r in range(entries[e, 0], entries[e, 0] + height):
+            count = 3 * (entries[e, 3] + entries[e, 4]) if table == RESIDUAL else rows
+            for r in range(entries[e, 0], entries[e, 0] + count):
                 _row(wrench[r], entries[e, 1], against, columns, bodies, column, jacobian[r])
-    terms, gap_joints, gap_wrench = len(value), contacts.joints, contacts.wrench
-    for r in range(count):
+    for r in range(gaps):
         jacobian[terms + r] = 0.0
-        first, second = gap_joints[r, 0], gap_joints[r, 1]
-        _row(gap_wrench[r], second, first, columns, bodies, column, jacobian[terms + r])
-    if tables.layout[MASS_CENTER, 1]:
-        _mass_centers(pose, tables, room)
-
-
-@compiled(inner=True, error_model="numpy")
-def _coordinate_terms(pose: Pose, tables: TermTables, room: TermRoom) -> None:
-    """Terms of joint coordinates."""
-    q, value, jacobian = pose.q, room.value, room.jacobian
-    coordinates(_floats(tables, COORDINATE), _integers(tables, COORDINATE), q, value, jacobian)
-    turns(_floats(tables, TURN), _integers(tables, TURN), q, value, jacobian)
-    roots(_floats(tables, ROOT), _integers(tables, ROOT), q, value, jacobian)
-    coupled_ranges(_floats(tables, COUPLED), _integers(tables, COUPLED), q, value, jacobian)
-    elliptic_ranges(_floats(tables, ELLIPSE), _integers(tables, ELLIPSE), q, value, jacobian)
-
-
-@compiled(inner=True, error_model="numpy")
-def _measure_terms(pose: Pose, tables: TermTables, room: TermRoom) -> None:
-    """Value, derivative and curvature of the measures."""
-    q, measure, squares = pose.q, room.measure, room.squares
-    constant, nv = _floats(tables, CURVATURE), measure.shape[1] - 1
+        _row(gap_wrench[r], gap_joints[r, 1], gap_joints[r, 0], columns, bodies, column, jacobian[terms + r])
+    centers = _floats(floats, layout, MASS_CENTER)
+    if len(centers):
+        _mass_centers(
+            centers, _integers(integers, layout, MASS_CENTER), _floats(floats, layout, BODY), bodies, column, joints,
+            columns, value, jacobian,
+        )  # fmt: skip
+    if layout[COORDINATE, 1]:
+        coordinates(
+            _floats(floats, layout, COORDINATE), _integers(integers, layout, COORDINATE), q, value, jacobian
+        )  # fmt: skip
+    if layout[TURN, 1]:
+        turns(_floats(floats, layout, TURN), _integers(integers, layout, TURN), q, value, jacobian)
+    if layout[ROOT, 1]:
+        roots(_floats(floats, layout, ROOT), _integers(integers, layout, ROOT), q, value, jacobian)
+    if layout[COUPLED, 1]:
+        coupled_ranges(
+            _floats(floats, layout, COUPLED), _integers(integers, layout, COUPLED), q, value, jacobian
+        )  # fmt: skip
+    if layout[ELLIPSE, 1]:
+        elliptic_ranges(
+            _floats(floats, layout, ELLIPSE), _integers(integers, layout, ELLIPSE), q, value, jacobian
+        )  # fmt: skip
+    _box(_floats(floats, layout, LIMIT), _integers(integers, layout, LIMIT), _floats(floats, layout, BOX), q, box)
+    constant = _floats(floats, layout, CURVATURE)
     for v in range(nv):
         measure[0, v] = 0.0
         measure[1, v] = constant[0, v]
@@ -134,32 +160,36 @@ def _measure_terms(pose: Pose, tables: TermTables, room: TermRoom) -> None:
     if len(squares):
         measure[2] = 0.0
     _measures(
-        _floats(tables, DISTANCE), _integers(tables, DISTANCE), _floats(tables, DISCOMFORT),
-        _integers(tables, DISCOMFORT), q, measure,
+        _floats(floats, layout, DISTANCE), _integers(integers, layout, DISTANCE), _floats(floats, layout, DISCOMFORT),
+        _integers(integers, layout, DISCOMFORT), q, measure,
     )  # fmt: skip
-    root_distances(_floats(tables, ROOT_DISTANCE), _integers(tables, ROOT_DISTANCE), q, measure)
-    rhythmic = tables.layout[ELEVATION, 1] + tables.layout[LUMBAR, 1]
-    if rhythmic:
+    root_distances(_floats(floats, layout, ROOT_DISTANCE), _integers(integers, layout, ROOT_DISTANCE), q, measure)
+    if layout[ELEVATION, 1] + layout[LUMBAR, 1]:
         rhythms(
-            _floats(tables, ELEVATION), _integers(tables, ELEVATION), _floats(tables, LUMBAR),
-            _integers(tables, LUMBAR), q, measure, squares,
+            _floats(floats, layout, ELEVATION), _integers(integers, layout, ELEVATION), _floats(floats, layout, LUMBAR),
+            _integers(integers, layout, LUMBAR), q, measure, squares,
         )  # fmt: skip
-    if tables.layout[BALL, 1]:
-        balls(_floats(tables, BALL), _integers(tables, BALL), q, measure, squares, rhythmic)
-    if tables.layout[HEIGHT, 1]:
+    if layout[BALL, 1]:
+        balls(
+            _floats(floats, layout, BALL), _integers(integers, layout, BALL), q, measure, squares,
+            layout[ELEVATION, 1] + layout[LUMBAR, 1],
+        )  # fmt: skip
+    if layout[HEIGHT, 1]:
         heights(
-            _floats(tables, HEIGHT), _integers(tables, HEIGHT), pose.joints, pose.columns, tables.support,
-            _integers(tables, COLUMN), measure,
+            _floats(floats, layout, HEIGHT), _integers(integers, layout, HEIGHT), joints, columns, support, column,
+            measure,
         )  # fmt: skip
 
 
 @compiled(error_model="numpy")
-def wrench_rows(wrench: Array, joint: int, against: int, columns: Array, tables: TermTables, rows: Array) -> None:
+def wrench_rows(
+    wrench: Array, joint: int, against: int, columns: Array, integers: Integers, layout: Integers, rows: Array
+) -> None:
     """Write the Jacobian rows (m, nv) of wrenches (m, 6) that work on the motion of a joint relative to another.
 
-    `columns` and `tables` are those of `linearise`.
+    `columns`, `integers` and `layout` are as for `linearise`.
     """
-    column, bodies = _integers(tables, COLUMN), _integers(tables, BODY)
+    column, bodies = _integers(integers, layout, COLUMN), _integers(integers, layout, BODY)
     rows[:] = 0.0
     for r in range(len(wrench)):
         _row(wrench[r], joint, against, columns, bodies, column, rows[r])
@@ -192,11 +222,18 @@ def _row(
 
 
 @compiled(inner=True, error_model="numpy")
-def _mass_centers(pose: Pose, tables: TermTables, room: TermRoom) -> None:
+def _mass_centers(
+    tables: Array,
+    entries: Integers,
+    bodies: Array,
+    parents: Integers,
+    column: Integers,
+    joints: Array,
+    columns: Array,
+    value: Array,
+    jacobian: Array,
+) -> None:
     """Rows of the centre of mass: what hangs on a joint moves with it, so each column needs its subtree's moment."""
-    centers, entries = _floats(tables, MASS_CENTER), _integers(tables, MASS_CENTER)
-    bodies, parents, column = _floats(tables, BODY), _integers(tables, BODY), _integers(tables, COLUMN)
-    joints, columns, value, jacobian = pose.joints, pose.columns, room.value, room.jacobian
     count = len(bodies)
     moment = np.zeros((count, 4))  # mass, and mass times centre in the world
     for j in range(1, count):
@@ -211,18 +248,17 @@ def _mass_centers(pose: Pose, tables: TermTables, room: TermRoom) -> None:
         for i in range(4):
             moment[parents[j, 0], i] += moment[j, i]
     total = moment[0, 0]
-    for e in range(len(centers)):
-        inner = centers[e, 0] * moment[0, 1] + centers[e, 1] * moment[0, 2] + centers[e, 2] * moment[0, 3]
-        value[entries[e, 0]] = inner / total - centers[e, 3]
+    for e in range(len(tables)):
+        inner = tables[e, 0] * moment[0, 1] + tables[e, 1] * moment[0, 2] + tables[e, 2] * moment[0, 3]
+        value[entries[e, 0]] = inner / total - tables[e, 3]
     for k in range(len(columns)):
         j = column[k, 1]
         mass, x, y, z = moment[j, 0] / total, moment[j, 1] / total, moment[j, 2] / total, moment[j, 3] / total
         forth = mass * columns[k, 0] + columns[k, 4] * z - columns[k, 5] * y
         left = mass * columns[k, 1] + columns[k, 5] * x - columns[k, 3] * z
         up = mass * columns[k, 2] + columns[k, 3] * y - columns[k, 4] * x
-        for e in range(len(centers)):
-            along = centers[e, 0] * forth + centers[e, 1] * left + centers[e, 2] * up
-            jacobian[entries[e, 0], column[k, 0]] += along
+        for e in range(len(tables)):
+            jacobian[entries[e, 0], column[k, 0]] += tables[e, 0] * forth + tables[e, 1] * left + tables[e, 2] * up
 
 
 @compiled(inner=True)

@@ -20,15 +20,16 @@ from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State, Wrench
 from wholebody.geometry.contact_rows import MOST_ENDS
-from wholebody.geometry.records import Contacts, RowRoom, no_contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
-from wholebody.terms.entries import Pose, TermRoom
 from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_plan
 from wholebody.terms.planes import TermPlanes, term_planes
+
+MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
 
 
 class Linearisation(NamedTuple):
@@ -75,11 +76,14 @@ class Linearisation(NamedTuple):
     planes: TermPlanes | None = None
 
 
-_NO_CONTACTS = no_contacts(np.zeros((0, 4, 3)))
+_NO_CONTACTS = Contacts(
+    np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
+    np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
+)  # fmt: skip
 
 
 NO_LIMITS = Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))
-NO_ROWS = RowRoom.of(0)
+NO_WRENCHES, NO_JOINTS = np.zeros((0, 6)), np.zeros((0, 2), dtype=np.intp)
 
 
 class PackedLinearisation(NamedTuple):
@@ -213,12 +217,12 @@ class Lineariser:
             if part is not None:
                 squares = np.vstack([squares, sqrt(2.0 * term.weight) * part[1]])
                 squared = squared + term.weight * term.curvature(self.state)
-        goals, contact = self._plan.goal_rows, self._rows.contact[:count].copy()
+        goals, contact = self._plan.goal_rows, self._contact[:count].copy()
         terms: list[Goal | Constraint] = [*self.goals, *self.constraints]
         found = term_planes(terms, self.rows(), self.state) if planes and self._plan.others else None
         return Linearisation(
             self.state.q.copy(), value[:goals], jacobian[:goals], value[goals:], jacobian[goals:rows], contacts,
-            self._rows.gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
+            self._gap[:count].copy(), jacobian[rows:], contact, clearance[contact], float(measure[0, nv]),
             measure[0, :nv], measure[1, :nv], box[0], box[1], squares, squared, found,
         )  # fmt: skip
 
@@ -234,10 +238,9 @@ class Lineariser:
         room = self._packed
         jacobian = room.jacobian[: len(room.value) + count]
         self._terms(count, room.value, jacobian, room.box, room.measure, self._no_squares)
-        contact = self._rows.contact[:count]
+        contact = self._contact[:count]
         return PackedLinearisation(
-            self.state.q, room.goals, room.value, jacobian, contacts, self._rows.gap[:count], contact,
-            clearance[contact],
+            self.state.q, room.goals, room.value, jacobian, contacts, self._gap[:count], contact, clearance[contact],
             room.measure, room.box,
         )  # fmt: skip
 
@@ -245,7 +248,7 @@ class Lineariser:
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         none = np.zeros(0)
         return PackedLinearisation(
-            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._rows.gap), nv)), _NO_CONTACTS, none,
+            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
 
@@ -255,17 +258,18 @@ class Lineariser:
         """Contacts at a posture by a query, the clearance asked of each, and how many rows were written of them."""
         contacts = near(q, within + self._largest_clearance, self._most)
         clearance = self.clearances[contacts.number]
-        if len(clearance) * (1 + MOST_ENDS) > len(self._rows.gap):
+        if len(clearance) * (1 + MOST_ENDS) > len(self._gap):
             self._grow(2 * len(clearance))
-        count = self.workspace.rows.write(contacts, clearance, self._rows)
+        count = self.workspace.rows.write(contacts, clearance, self._wrench, self._gap, self._contact, self._joints)
         return contacts, clearance, count
 
     def _terms(self, count: int, value: Array, jacobian: Array, box: Array, measure: Array, squares: Array) -> None:
         """Write all terms where the state is, and the Jacobian of `count` rows of contacts."""
         state, plan = self.state, self._plan
-        pose = Pose(state.joints, state.columns, state.q)
-        room = TermRoom(self._term_wrench, value, jacobian, box, measure, squares)
-        self._kernel.linearise(pose, plan.tables, self._rows, count, room)
+        self._kernel.linearise(
+            state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+            self._wrench, self._joints, count, self._term_wrench, value, jacobian, box, measure, squares,
+        )  # fmt: skip
         if plan.others:
             self._evaluate(plan.others, value, jacobian)
         if plan.other_bounds:
@@ -305,13 +309,14 @@ class Lineariser:
         if self.dt is None or not limits:
             return None
         most = np.min([bound.bounds(self.state, self.dt)[1] for bound in limits], axis=0)
-        # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
-        return self.workspace.largest_approach(most) + 1e-3
+        return self.workspace.largest_approach(most) + MORE
 
     def _grow(self, contacts: int) -> None:
         """Make room for the rows of so many contacts."""
         rows = contacts * (1 + MOST_ENDS)
-        self._rows, self._packed = RowRoom.of(rows), None
+        self._wrench, self._gap = np.zeros((rows, 6)), np.zeros(rows)
+        self._contact, self._joints = np.zeros(rows, dtype=np.intp), np.zeros((rows, 2), dtype=np.intp)
+        self._packed = None
 
     def _evaluate(self, others: Sequence[OtherTerm], value: Array, jacobian: Array) -> None:
         """Write values and rows of terms of other classes."""
@@ -330,7 +335,9 @@ class Lineariser:
     def _write_rows(self, wrench: Wrench, rows: Array) -> None:
         """Write the rows (m, nv) of a wrench."""
         wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
-        self._kernel.wrench_rows(wrenches, joint, against, self.state.columns, self._plan.tables, rows)
+        self._kernel.wrench_rows(
+            wrenches, joint, against, self.state.columns, self._plan.integers, self._plan.layout, rows
+        )
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:
@@ -354,10 +361,12 @@ def compiled_kernel() -> Any:
     state = State(pin.buildSampleModelManipulator())
     plan = make_plan(NO_LIMITS, Terms(), None, state)
     nv = state.model.nv
-    pose = Pose(state.joints, state.columns, state.q)
-    room = TermRoom(
-        NO_ROWS.wrench, np.zeros(0), np.zeros((0, nv)), np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv))
-    )
-    term_kernel.linearise(pose, plan.tables, NO_ROWS, 0, room)
-    term_kernel.wrench_rows(NO_ROWS.wrench, 0, 0, state.columns, plan.tables, np.zeros((0, nv)))
+    term_kernel.linearise(
+        state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,
+        NO_WRENCHES, NO_JOINTS, 0, np.zeros((0, 6)), np.zeros(0), np.zeros((0, nv)),
+        np.zeros((2, nv)), np.zeros((2, nv + 1)), np.zeros((0, nv)),
+    )  # fmt: skip
+    term_kernel.wrench_rows(
+        np.zeros((0, 6)), 0, 0, state.columns, plan.integers, plan.layout, np.zeros((0, nv))
+    )  # fmt: skip
     return term_kernel

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody import tasks
 from wholebody.base.arrays import Array
@@ -40,7 +41,6 @@ from wholebody.terms.entries import (
     Entry,
     Integers,
     Row,
-    TermTables,
     entries_of,
     placement_floats,
 )
@@ -75,7 +75,10 @@ class TermPlan(NamedTuple):
     """The terms of a problem as arrays.
 
     Attributes:
-        tables: of all terms that compiled loops evaluate.
+        floats: all tables of floats, one after the other.
+        integers: all tables of integers.
+        layout: (tables, 6) where each table of floats begins, its rows and columns, and the same of integers.
+        support: (njoints, n) 1 where a column of the joint Jacobian moves a joint.
         goal_rows: rows of all goals.
         value_rows: rows of all constraints.
         others: goals and constraints of other classes.
@@ -85,7 +88,10 @@ class TermPlan(NamedTuple):
         constraints: the same of each constraint.
     """
 
-    tables: TermTables
+    floats: Array
+    integers: Integers
+    layout: Integers
+    support: NDArray[np.int8]
     goal_rows: int
     value_rows: int
     others: tuple[OtherTerm, ...]
@@ -97,7 +103,7 @@ class TermPlan(NamedTuple):
     @property
     def squares(self) -> int:
         """Number of squares that built-in measures are the sum of."""
-        return int(self.tables.layout[[ELEVATION, LUMBAR, BALL], 1] @ (1, 1, 3))
+        return int(self.layout[ELEVATION, 1] + self.layout[LUMBAR, 1] + 3 * self.layout[BALL, 1])
 
     def with_terms(
         self, goals: Sequence[Goal], model: pin.Model, constraints: Sequence[Constraint] | None = None
@@ -113,7 +119,7 @@ class TermPlan(NamedTuple):
         old = self.goals if constraints is None else (*self.goals, *self.constraints)
         if len(goals) != len(self.goals) or len(terms) != len(old):
             return None
-        floats = self.tables.floats.copy()
+        floats = self.floats.copy()
         filled = dict.fromkeys(WIDTHS, 0)
         found: list[list[Entry] | None] = []
         others = list(self.others)
@@ -128,23 +134,18 @@ class TermPlan(NamedTuple):
                 others[number] = with_values(others[number], term=term, value=value)
                 number += 1
                 continue
-            if not _alike(entries, known):
+            if [entry[:2] for entry in entries] != [entry[:2] for entry in known]:
                 return None
-            for entry in entries:
-                start, _, columns = self.tables.layout[entry.table, :3].tolist()
+            for entry, before in zip(entries, known, strict=True):
+                if not np.array_equal(entry.edges, before.edges):
+                    return None
+                start, _, columns = self.layout[entry.table, :3].tolist()
                 place = start + columns * filled[entry.table]
                 floats[place : place + columns] = entry.floats
                 filled[entry.table] += 1
         kept = self.constraints if constraints is None else tuple(found[len(goals) :])
         goal_entries = tuple(found[: len(goals)])
-        tables = with_values(self.tables, floats=floats)
-        return with_values(self, tables=tables, goals=goal_entries, constraints=kept, others=tuple(others))
-
-
-def _alike(entries: Sequence[Entry], others: Sequence[Entry]) -> bool:
-    """Whether entries are of the same tables, with the same integers and planes."""
-    same = [entry[:2] for entry in entries] == [entry[:2] for entry in others]
-    return same and all(np.array_equal(a.edges, b.edges) for a, b in zip(entries, others, strict=True))
+        return with_values(self, floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
 
 
 def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:
@@ -205,7 +206,7 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     ]
     floats, integers, layout = _packed(parts)
     return TermPlan(
-        TermTables(floats, integers, layout, state.support.astype(np.int8)), goal_rows, row - goal_rows, tuple(others),
+        floats, integers, layout, state.support.astype(np.int8), goal_rows, row - goal_rows, tuple(others),
         other_bounds, other_measures, goal_entries, constraint_entries,
     )  # fmt: skip
 

@@ -38,8 +38,9 @@ def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, va
     """See `tasks.residuals.PlacementResidual`."""
     if not len(tables):
         return
-    turn, base_turn, work = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3, 3))
-    place, base_place, angle = np.empty(3), np.empty(3), np.empty(3)
+    turn, base_turn, relative, change = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    place, base_place, way, angle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    left = np.empty((3, 3))
     for e in range(len(tables)):
         row, position, orientation, based = entries[e, 0], entries[e, 3], entries[e, 4], entries[e, 5]
         _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
@@ -52,50 +53,35 @@ def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, va
                     base_turn[i, j] = 1.0 if i == j else 0.0
         if position:
             for i in range(3):
-                base_place[i] = place[i] - base_place[i]
-            _position_rows(tables[e, 24:27], place, base_place, base_turn, value[row:], wrench[row:])
+                way[i] = place[i] - base_place[i]
+            for i in range(3):
+                value[row + i] = -tables[e, 24 + i]
+                for k in range(3):
+                    value[row + i] += base_turn[k, i] * way[k]
+                x, y, z = base_turn[0, i], base_turn[1, i], base_turn[2, i]  # axis i of the base, in the world
+                wrench[row + i, 0], wrench[row + i, 1], wrench[row + i, 2] = x, y, z
+                wrench[row + i, 3] = place[1] * z - place[2] * y
+                wrench[row + i, 4] = place[2] * x - place[0] * z
+                wrench[row + i, 5] = place[0] * y - place[1] * x
             row += 3
         if orientation:
-            _rotation_rows(tables[e, 27:36], turn, base_turn, work, angle, value[row:], wrench[row:])
-
-
-@compiled(inner=True)
-def _position_rows(target: Array, place: Array, way: Array, base_turn: Array, value: Array, wrench: Array) -> None:
-    """Rows of a position: `way` from the base to the place, both in the world, less the target in the base."""
-    for i in range(3):
-        value[i] = -target[i]
-        for k in range(3):
-            value[i] += base_turn[k, i] * way[k]
-        x, y, z = base_turn[0, i], base_turn[1, i], base_turn[2, i]  # axis i of the base, in the world
-        wrench[i, 0], wrench[i, 1], wrench[i, 2] = x, y, z
-        wrench[i, 3] = place[1] * z - place[2] * y
-        wrench[i, 4] = place[2] * x - place[0] * z
-        wrench[i, 5] = place[0] * y - place[1] * x
-
-
-@compiled(inner=True, error_model="numpy")
-def _rotation_rows(
-    undo: Array, turn: Array, base_turn: Array, work: Array, angle: Array, value: Array, wrench: Array
-) -> None:
-    """Rows of a rotation in the base, times the inverse of its target; `work` (3, 3, 3) and `angle` (3,) are room."""
-    relative, change, left = work[0], work[1], work[2]
-    for i in range(3):
-        for j in range(3):
-            relative[i, j] = 0.0
-            for k in range(3):
-                relative[i, j] += base_turn[k, i] * turn[k, j]
-    for i in range(3):
-        for j in range(3):
-            change[i, j] = 0.0
-            for k in range(3):
-                change[i, j] += relative[i, k] * undo[3 * j + k]
-    rotation_vector(change, angle)
-    inverse_left(angle, left)
-    for i in range(3):
-        value[i] = angle[i]
-        for j in range(3):
-            for k in range(3):
-                wrench[i, 3 + j] += left[i, k] * base_turn[j, k]
+            for i in range(3):
+                for j in range(3):
+                    relative[i, j] = 0.0
+                    for k in range(3):
+                        relative[i, j] += base_turn[k, i] * turn[k, j]
+            for i in range(3):
+                for j in range(3):
+                    change[i, j] = 0.0
+                    for k in range(3):
+                        change[i, j] += relative[i, k] * tables[e, 27 + 3 * j + k]
+            rotation_vector(change, angle)
+            inverse_left(angle, left)
+            for i in range(3):
+                value[row + i] = angle[i]
+                for j in range(3):
+                    for k in range(3):
+                        wrench[row + i, 3 + j] += left[i, k] * base_turn[j, k]
 
 
 @compiled(inner=True, error_model="numpy")
@@ -181,7 +167,17 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
     for e in range(len(tables)):
         row = entries[e, 0]
         _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
-        distance = _target_direction(tables[e, 21:24], entries[e, 2], place, direction)
+        distance = np.inf
+        for i in range(3):
+            direction[i] = tables[e, 21 + i]
+        if entries[e, 2]:
+            distance = 0.0
+            for i in range(3):
+                direction[i] -= place[i]
+                distance += direction[i] * direction[i]
+            distance = np.sqrt(distance)
+            for i in range(3):
+                direction[i] /= max(distance, TOUCHING)
         if distance < TOUCHING:
             value[row] = value[row + 1] = 0.0
             continue
@@ -190,7 +186,21 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                 axes[i, j] = 0.0
                 for k in range(3):
                     axes[i, j] += tables[e, 12 + 3 * i + k] * turn[j, k]
-        _equidistant(axes, direction, value[row:], change)
+        x = axes[0, 0] * direction[0] + axes[0, 1] * direction[1] + axes[0, 2] * direction[2]
+        y = axes[1, 0] * direction[0] + axes[1, 1] * direction[1] + axes[1, 2] * direction[2]
+        along = axes[2, 0] * direction[0] + axes[2, 1] * direction[1] + axes[2, 2] * direction[2]
+        sine = np.hypot(x, y)
+        angle = np.arctan2(sine, along)
+        if sine < NO_ANGLE:
+            value[row], value[row + 1] = angle, 0.0
+            gain = 1.0 if along > 0.0 else STEEPEST
+        else:
+            value[row], value[row + 1] = x * angle / sine, y * angle / sine
+            gain = min(angle / sine, STEEPEST)
+        ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
+        fall = along - gain
+        change[0, 0], change[0, 1], change[0, 2] = gain + fall * ux * ux, fall * ux * uy, -x
+        change[1, 0], change[1, 1], change[1, 2] = fall * ux * uy, gain + fall * uy * uy, -y
         for r in range(2):
             inner = 0.0
             for j in range(3):
@@ -205,43 +215,6 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
                 for j in range(3):
                     k, m = (j + 1) % 3, (j + 2) % 3
                     wrench[row + r, 3 + j] -= wrench[row + r, k] * place[m] - wrench[row + r, m] * place[k]
-
-
-@compiled(inner=True, error_model="numpy")
-def _target_direction(target: Array, toward: int, place: Array, direction: Array) -> float:
-    """Write the unit vector `target`, or that from a place toward it; the distance, infinite for a direction."""
-    for i in range(3):
-        direction[i] = target[i]
-    if not toward:
-        return np.inf
-    square = 0.0
-    for i in range(3):
-        direction[i] -= place[i]
-        square += direction[i] * direction[i]
-    distance = np.sqrt(square)
-    for i in range(3):
-        direction[i] /= max(distance, TOUCHING)
-    return float(distance)
-
-
-@compiled(inner=True, error_model="numpy")
-def _equidistant(axes: Array, direction: Array, value: Array, change: Array) -> None:
-    """Error (2,) of a direction, and its derivative (2, 3); see `tasks.axis`."""
-    x = axes[0, 0] * direction[0] + axes[0, 1] * direction[1] + axes[0, 2] * direction[2]
-    y = axes[1, 0] * direction[0] + axes[1, 1] * direction[1] + axes[1, 2] * direction[2]
-    along = axes[2, 0] * direction[0] + axes[2, 1] * direction[1] + axes[2, 2] * direction[2]
-    sine = np.hypot(x, y)
-    angle = np.arctan2(sine, along)
-    if sine < NO_ANGLE:
-        value[0], value[1] = angle, 0.0
-        gain = 1.0 if along > 0.0 else STEEPEST
-    else:
-        value[0], value[1] = x * angle / sine, y * angle / sine
-        gain = min(angle / sine, STEEPEST)
-    ux, uy = (x / sine, y / sine) if sine > NO_ANGLE else (1.0, 0.0)
-    fall = along - gain
-    change[0, 0], change[0, 1], change[0, 2] = gain + fall * ux * ux, fall * ux * uy, -x
-    change[1, 0], change[1, 1], change[1, 2] = fall * ux * uy, gain + fall * uy * uy, -y
 
 
 @compiled(inner=True, error_model="numpy")

@@ -12,8 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.proximity import PENETRATION
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import PENETRATION, Contacts
 from wholebody.methods.ccd.overlap_resolution.resolver import chains_of
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from wholebody.assessment.posture import assess
 from wholebody.base.arrays import Array
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.base import Tracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene

@@ -8,8 +8,7 @@ import pytest
 
 import wholebody as wb
 from tests.reference import moved_pairs as reference
-from wholebody.geometry.continuous.moved_pairs import compiled_kernel, far_moved, separated
-from wholebody.geometry.records import QueryResult
+from wholebody.geometry.continuous.moved_pairs import QueryResult, compiled_kernel, far_moved, separated
 
 WITHIN = 0.05
 

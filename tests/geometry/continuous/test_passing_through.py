@@ -7,8 +7,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import doubtful_pairs, first_passed, last_free, passes_through
-from wholebody.geometry.records import QueryResult
 
 WITHIN = 0.05
 

@@ -19,7 +19,6 @@ from wholebody.geometry.pieces import LARGEST
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 
 
-
 class Mimic(NamedTuple):
     """A joint's value is that of another times `multiplier` plus `offset`."""
 

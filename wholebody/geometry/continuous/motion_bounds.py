@@ -10,27 +10,19 @@ joints are rigid. The speed of approach of two pieces is at most the sum over th
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 
 TURNING_AXES = ("Composite", "SphericalZYX", "Universal", "Ellipsoid")
 """Joints whose twist is not constant along a geodesic, by a part of Pinocchio's name for them."""
 
 _NONE: Array = np.zeros((6, 0))
-
-
-class Speeds(NamedTuple):
-    """Speeds of one motion, as compiled loops take them; see `MotionBounds`."""
-
-    turn: Array
-    speed: Array
-    carries: Mask
 
 
 class MotionBounds:
@@ -118,11 +110,6 @@ class MotionBounds:
         own = np.sqrt(np.einsum("ij,ij->i", lever, lever)) + reach
         farthest = (own + along[first])[:, None] - along
         return np.where(self.carries[self.joint], self._slide + self.turn * farthest, 0.0)
-
-    @property
-    def speeds(self) -> Speeds:
-        """The speeds of the present motion."""
-        return Speeds(self.turn, self.speed, self.carries)
 
     def approach(self, first: NDArray[np.intp], second: NDArray[np.intp]) -> Array:
         """Largest rate of change of the distance of each pair, (k,), metres for the whole motion."""

@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
-from wholebody.geometry.proximity import ENDLESS, PairTable
-from wholebody.geometry.records import QueryResult, no_contacts
+from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
 
 ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
+
+
+class QueryResult(NamedTuple):
+    """The near pairs at a posture and the query distance, for tests of motions."""
+
+    contacts: Contacts
+    within: float
+
+    @property
+    def placements(self) -> Array:
+        """(n, 4, 3) placements of the pieces."""
+        return self.contacts.placements
 
 
 def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
@@ -27,7 +37,11 @@ def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indi
         raise InputError(
             f"placements of {len(before.placements)} and {len(after.placements)} pieces; give {count} each"
         )
-    found: Indices = compiled_kernel().far_moved(table.arrays, before, after, ARC, ENDLESS)
+    found: Indices = compiled_kernel().far_moved(
+        before.placements, after.placements, table.pairs, table.widths, table.reach,
+        before.contacts.number, np.ascontiguousarray(before.contacts.distance), float(before.within),
+        after.contacts.number, np.ascontiguousarray(after.contacts.distance), float(after.within), ARC, ENDLESS,
+    )  # fmt: skip
     return found
 
 
@@ -43,7 +57,11 @@ def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: 
         pairs: (k,) places among the collision pairs.
         overlap: metres by which a piece may be beyond the plane.
     """
-    found: Mask = compiled_kernel().separated(pairs, table.arrays, before.contacts, after.placements, overlap)
+    known = before.contacts
+    found: Mask = compiled_kernel().separated(
+        pairs, before.placements, after.placements, known.number, known.pair, known.normal, known.point_a,
+        known.point_b, table.points, table.first_point, table.radius, table.reach, overlap,
+    )  # fmt: skip
     return found
 
 
@@ -52,11 +70,16 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or loaded from the cache, before a solve."""
     from wholebody.geometry.continuous import moved_pairs_kernel
 
-    table = PairTable(pin.Model(), pin.GeometryModel())
-    placed = QueryResult(no_contacts(np.zeros((0, 4, 3))), 0.0)
-    moved_pairs_kernel.far_moved(table.arrays, placed, placed, ARC, ENDLESS)
-    none = np.zeros(0, dtype=np.intp)
-    moved_pairs_kernel.separated(none, table.arrays, placed.contacts, placed.placements, 0.0)
+    none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
+    placements = np.zeros((0, 4, 3))
+    moved_pairs_kernel.far_moved(
+        placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
+    )
+    lines = np.zeros((0, 3))
+    moved_pairs_kernel.separated(
+        places, placements, placements, places, pairs, lines, lines, lines, lines, np.zeros(1, dtype=np.intp), none,
+        none, 0.0,
+    )  # fmt: skip
     return moved_pairs_kernel
 
 

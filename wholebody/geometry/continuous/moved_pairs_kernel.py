@@ -6,33 +6,57 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.geometry.records import Contacts, PieceArrays, QueryResult
 
 
 @compiled()
-def far_moved(pieces: PieceArrays, before: QueryResult, after: QueryResult, arc: float, endless: float) -> Indices:
+def far_moved(
+    before: Array,
+    after: Array,
+    pairs: Indices,
+    widths: Array,
+    reach: Array,
+    number_before: Indices,
+    distance_before: Array,
+    within_before: float,
+    number_after: Indices,
+    distance_after: Array,
+    within_after: float,
+    arc: float,
+    endless: float,
+) -> Indices:
     """Return the pairs (k,) that moved against each other by more than their distance.
 
     Args:
-        pieces: see `PieceArrays`.
-        before: the near pairs before the motion; all others were farther apart than its query distance.
-        after: the near pairs after it.
+        before: (n, 4, 3) placements of the pieces before the motion.
+        after: the same after the motion.
+        pairs: (p, 2).
+        widths: (p,) of both pieces of a pair together.
+        reach: (n,) of the pieces from their origins; infinite where endless.
+        number_before: pairs that were near before.
+        distance_before: their distances.
+        within_before: query distance before; all other pairs were farther apart.
+        number_after: pairs that are near after.
+        distance_after: their distances.
+        within_after: query distance after.
         arc: largest ratio of an arc to its chord.
         endless: value used for an infinite reach.
     """
-    pairs, widths, reach = pieces.pairs, pieces.widths, pieces.reach
-    start, end = before.contacts.placements, after.contacts.placements
-    count = len(start)
+    count = len(before)
     motion = np.empty(count)
     for i in range(count):
         center, turn = 0.0, 0.0
         for k in range(3):
-            center += (end[i, 3, k] - start[i, 3, k]) ** 2
+            center += (after[i, 3, k] - before[i, 3, k]) ** 2
             for j in range(3):
-                turn += (end[i, j, k] - start[i, j, k]) ** 2
+                turn += (after[i, j, k] - before[i, j, k]) ** 2
         far = reach[i] if np.isfinite(reach[i]) else 0.0
         motion[i] = arc * (np.sqrt(center) + np.sqrt(0.5 * turn) * far)
-    apart, apart_after = _apart(before, len(pairs)), _apart(after, len(pairs))
+    apart = np.full(len(pairs), max(within_before, 0.0))
+    for c in range(len(number_before)):
+        apart[number_before[c]] = max(distance_before[c], 0.0)
+    apart_after = np.full(len(pairs), max(within_after, 0.0))
+    for c in range(len(number_after)):
+        apart_after[number_after[c]] = max(distance_after[c], 0.0)
     found = np.empty(len(pairs), dtype=np.intp)
     kept = 0
     for p in range(len(pairs)):
@@ -42,68 +66,90 @@ def far_moved(pieces: PieceArrays, before: QueryResult, after: QueryResult, arc:
             continue
         radii = reach[first] + reach[second]
         room = widths[p]
-        room += max(_between(start, first, second) - radii, apart[p])
-        room += max(_between(end, first, second) - radii, apart_after[p])
+        room += max(_between(before, first, second) - radii, apart[p])
+        room += max(_between(after, first, second) - radii, apart_after[p])
         if way <= room:
             continue
-        if _seen(start, end, first, second, reach[second], arc, endless) <= room:
+        if _seen(before, after, first, second, reach[second], arc, endless) <= room:
             continue
-        if _seen(start, end, second, first, reach[first], arc, endless) <= room:
+        if _seen(before, after, second, first, reach[first], arc, endless) <= room:
             continue
         found[kept] = p
         kept += 1
     return found[:kept]
 
 
-@compiled(inner=True)
-def _apart(placed: QueryResult, count: int) -> Array:
-    """(count,) distances of all pairs, at least 0; of those that are not near the query distance."""
-    number, distance = placed.contacts.number, placed.contacts.distance
-    apart = np.full(count, max(placed.within, 0.0))
-    for c in range(len(number)):
-        apart[number[c]] = max(distance[c], 0.0)
-    return apart
-
-
 @compiled()
-def separated(doubtful: Indices, pieces: PieceArrays, before: Contacts, after: Array, overlap: float) -> Mask:
+def separated(
+    doubtful: Indices,
+    before: Array,
+    after: Array,
+    number: Indices,
+    pair: Indices,
+    normal: Array,
+    point_a: Array,
+    point_b: Array,
+    points: Array,
+    first_point: Indices,
+    radius: Array,
+    reach: Array,
+    overlap: float,
+) -> Mask:
     """Return whether the plane between the pieces of a pair before a motion, fixed to either, parts them after it (k,).
 
     Args:
         doubtful: (k,) pairs; those that were not near before are not separated.
-        pieces: see `PieceArrays`.
-        before: the near pairs before the motion.
-        after: (n, 4, 3) placements of the pieces after it.
+        before: (n, 4, 3) placements of the pieces before the motion.
+        after: the same after the motion.
+        number: (c,) pairs that were near before.
+        pair: (c, 2) their pieces.
+        normal: (c, 3) from the first piece to the second.
+        point_a: (c, 3) nearest point of the first.
+        point_b: (c, 3) and of the second.
+        points: (m, 3) swept points of all pieces, one piece after the other.
+        first_point: (n + 1,) where those of each piece begin.
+        radius: (n,) around the points.
+        reach: (n,) of the pieces from their origins.
         overlap: metres by which a piece may be beyond the plane.
     """
     found = np.zeros(len(doubtful), dtype=np.bool_)
-    number = before.number
     for k in range(len(doubtful)):
         for c in range(len(number)):
             if number[c] == doubtful[k]:
-                a, b, normal = before.pair[c, 0], before.pair[c, 1], before.normal[c]
+                a, b = pair[c, 0], pair[c, 1]
                 found[k] = _beyond(
-                    pieces, before.placements, after, a, b, normal, before.point_a[c], overlap
-                ) or _beyond(pieces, before.placements, after, b, a, -normal, before.point_b[c], overlap)
+                    before, after, a, b, normal[c], 1.0, point_a[c], points[first_point[b] : first_point[b + 1]],
+                    radius[b], reach[b], overlap,
+                ) or _beyond(
+                    before, after, b, a, normal[c], -1.0, point_b[c], points[first_point[a] : first_point[a + 1]],
+                    radius[a], reach[a], overlap,
+                )  # fmt: skip
                 break
     return found
 
 
 @compiled(inner=True)
 def _beyond(
-    pieces: PieceArrays, before: Array, after: Array, carrier: int, other: int, normal: Array, point: Array,
+    before: Array,
+    after: Array,
+    carrier: int,
+    other: int,
+    normal: Array,
+    sign: float,
+    point: Array,
+    points: Array,
+    radius: float,
+    reach: float,
     overlap: float,
-) -> bool:  # fmt: skip
+) -> bool:
     """Whether a piece stays beyond a plane that is fixed to another one, also on the arcs between both placements."""
-    points = pieces.points[pieces.first_point[other] : pieces.first_point[other + 1]]
     if len(points) == 0:
         return False
-    radius, reach = pieces.radius[other], pieces.reach[other]
     local_normal, height, apart = np.empty(3), 0.0, 0.0
     for j in range(3):
         along, place = 0.0, 0.0
         for i in range(3):
-            along += before[carrier, j, i] * normal[i]
+            along += sign * before[carrier, j, i] * normal[i]
             place += before[carrier, j, i] * (point[i] - before[carrier, 3, i])
         local_normal[j] = along
         height += along * place

@@ -17,9 +17,8 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.moved_pairs import distances, far_moved, separated
-from wholebody.geometry.proximity import PairTable
-from wholebody.geometry.records import Contacts, QueryResult
+from wholebody.geometry.continuous.moved_pairs import QueryResult, distances, far_moved, separated
+from wholebody.geometry.proximity import Contacts, PairTable
 
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import FirstContact, Sweep

@@ -10,15 +10,19 @@ from __future__ import annotations
 from functools import lru_cache
 from typing import Any, NamedTuple
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.geometry.continuous.motion_bounds import MotionBounds, Speeds
+from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.memory_views import Guesses, distance_view, placement_view, read_result
 from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
-from wholebody.geometry.records import Parts
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
+
+FINEST = 2.0**-12
+"""Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets the
+depth that it may have."""
 
 SHARP = 0.1
 """Share of the tolerance that decides: a pair found to be less deep than the tolerance by this much is looked at until
@@ -60,6 +64,7 @@ class SweptDepth:
         self._table, self._geometry, self._tolerance = table, geometry, tolerance
         self._bounds = MotionBounds(table.model, table.joint, table.reach)
         self._kernel = compiled_kernel()
+        self._shapes = _shapes(table)
         self._before, self._now, self._middle = (_Postures(table, geometry) for _ in range(3))
         count = len(table.pairs)
         self._extent, self._index = np.zeros((geometry.ngeoms, 3)), np.zeros(count, dtype=np.intp)
@@ -103,7 +108,9 @@ class SweptDepth:
     def _look(self, before: Array, speed: Array) -> tuple[Depths, Indices]:
         """Overlaps at the present posture, and the pairs that may overlap on the way there."""
         now, table = self._now, self._table
-        count = self._kernel.screen(now.places, table.arrays, speed, before, now.least, self._extent, self._index)
+        count = self._kernel.screen(
+            now.places, table.pairs, table.reach, table.half, speed, before, now.least, self._extent, self._index
+        )
         doubtful = self._index[:count].copy()
         now.exact[:] = False
         self._ask(now, doubtful)
@@ -131,11 +138,12 @@ class SweptDepth:
         first, last = np.zeros(len(doubtful), dtype=np.intp), np.ones(len(doubtful), dtype=np.intp)
         while len(which):
             allowed, least, numbers = self._allowed(deepest)[which], np.empty(len(which)), doubtful[which]
-            parts = Parts(numbers, first, last, rows0, rows1, speed[numbers], -allowed)
-            self._kernel.lower_bounds(parts, stack.places, table.arrays, self._bounds.speeds, share, ACCURACY, least)
-            # Shortest part of a motion that is looked at; a hand moves 0.02 mm in it. What is still in doubt there gets
-            # the depth that it may have.
-            kept = least >= -allowed if share > 2.0**-12 else np.ones(len(which), dtype=bool)
+            self._kernel.lower_bounds(
+                numbers, table.pairs, stack.places, first, last, rows0, rows1, speed[numbers], -allowed, share,
+                ACCURACY, table.joint, self._bounds.turn, self._bounds.speed, self._bounds.carries, table.reach,
+                *self._shapes, least,
+            )  # fmt: skip
+            kept = least >= -allowed if share > FINEST else np.ones(len(which), dtype=bool)
             np.maximum.at(bound, which[kept], -least[kept])
             going = np.flatnonzero(~kept)
             if not len(going):
@@ -250,15 +258,34 @@ class _Postures:
         self.exact[numbers] = True
 
 
+def _shapes(table: PairTable) -> tuple[Array, Indices, Array, Array, Array, Indices]:
+    """Swept points, their first places, radii, radii of ellipsoids, faces and their first places, of all pieces."""
+    swept = table.swept
+    radii = np.zeros((len(swept), 3))
+    for k, piece in enumerate(table.geometry.geometryObjects):
+        if isinstance(piece.geometry, coal.Ellipsoid):
+            radii[k] = piece.geometry.radii
+    return (
+        np.ascontiguousarray(np.vstack([np.zeros((0, 3)), *(piece.points for piece in swept)])),
+        np.cumsum([0, *(len(piece.points) for piece in swept)], dtype=np.intp),
+        np.array([piece.radius for piece in swept], dtype=float),
+        radii,
+        np.ascontiguousarray(np.vstack([np.zeros((0, 4)), *(piece.faces for piece in swept)])),
+        np.cumsum([0, *(len(piece.faces) for piece in swept)], dtype=np.intp),
+    )
+
+
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a clip."""
     from wholebody.geometry.continuous import swept_depth_kernel
 
-    pieces = PairTable(pin.Model(), pin.GeometryModel()).arrays
-    none, rows, index = np.zeros(0), np.zeros((0, 4)), np.zeros(0, dtype=np.intp)
-    swept_depth_kernel.screen(np.zeros((0, 4, 3)), pieces, none, none, none, np.zeros((0, 3)), index)
-    parts = Parts(index, index, index, rows, rows, none, none)
-    speeds = Speeds(none, np.zeros((0, 0)), np.zeros((0, 0), dtype=bool))
-    swept_depth_kernel.lower_bounds(parts, np.zeros((0, 0, 4, 3)), pieces, speeds, 1.0, 0.0, none)
+    places, none, index = np.zeros((0, 4, 3)), np.zeros(0), np.zeros(0, dtype=np.intp)
+    pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
+    swept_depth_kernel.screen(places, pairs, none, np.zeros((0, 3)), none, none, none, np.zeros((0, 3)), index)
+    swept_depth_kernel.lower_bounds(
+        index, pairs, np.zeros((0, 0, 4, 3)), index, index, rows, rows, none, none, 1.0, 0.0, index, none,
+        np.zeros((0, 0)), np.zeros((0, 0), dtype=bool), none, np.zeros((0, 3)), one, none, np.zeros((0, 3)), rows,
+        one, none,
+    )  # fmt: skip
     return swept_depth_kernel

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.geometry.proximity import Joints
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
 from wholebody.scene.workspace import Workspace

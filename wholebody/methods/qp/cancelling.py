@@ -15,7 +15,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.penetration import global_depth
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 from wholebody.geometry.separation import least_separation
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace

@@ -23,8 +23,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.base.records import with_values
 from wholebody.figures.state import State, Wrench
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver

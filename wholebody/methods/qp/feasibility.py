@@ -22,7 +22,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import UndefinedTermError
 from wholebody.base.records import with_values
-from wholebody.geometry.records import QueryResult
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram

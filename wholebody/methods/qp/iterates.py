@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.records import QueryResult
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.qp.funnel import PredictedReduction
 from wholebody.methods.qp.multipliers import Multipliers
 from wholebody.methods.qp.subproblem import Rows, Violation

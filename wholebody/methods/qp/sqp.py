@@ -17,8 +17,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.base.records import with_values
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step

@@ -81,11 +81,11 @@ class PlainChain:
 
     def _descend(self, plan: TermPlan, q: Array, tolerance: float, most: int, rows: Array) -> int:
         """Move q; `rows` (rows, nv) get the derivatives of the errors of goals where the last step began."""
-        first, count, width, first_integer, _, integers = plan.tables.layout[RESIDUAL].tolist()
+        first, count, width, first_integer, _, integers = plan.layout[RESIDUAL].tolist()
         seen: int = compiled_kernel().reach(
-            self.parents, self.places, self.turns, self.slides, plan.tables.support,
-            plan.tables.floats[first : first + count * width].reshape(count, width),
-            plan.tables.integers[first_integer : first_integer + count * integers].reshape(count, integers),
+            self.parents, self.places, self.turns, self.slides, plan.support,
+            plan.floats[first : first + count * width].reshape(count, width),
+            plan.integers[first_integer : first_integer + count * integers].reshape(count, integers),
             self.lower, self.upper, tolerance, DAMPING**2, most, self.joints, self.columns, rows, self.free, q,
             self.trace,
         )  # fmt: skip
@@ -130,7 +130,7 @@ def unobstructed(problem: Problem, workspace: Workspace, tolerance: float, most:
 
 def takes(plan: TermPlan) -> bool:
     """Whether a plan has goals of places and rotations, measures, and nothing else."""
-    if plan.others or plan.other_bounds or plan.value_rows or plan.tables.layout[BOX, 1]:
+    if plan.others or plan.other_bounds or plan.value_rows or plan.layout[BOX, 1]:
         return False
     tables = [entry.table for entries in plan.goals for entry in entries or ()]
     return bool(tables) and all(table == RESIDUAL for table in tables)

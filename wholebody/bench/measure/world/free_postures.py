@@ -11,7 +11,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.geometry.records import Contacts
+from wholebody.geometry.proximity import Contacts
 
 FREE = 1e-4  # m: depth up to which a posture is free
 GAP = 3e-4  # m: to which pairs are parted

@@ -16,8 +16,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.ccd.attraction import Attraction
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
 from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver

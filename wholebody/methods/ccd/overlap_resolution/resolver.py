@@ -13,8 +13,8 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
+from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.proximity import Joints
-from wholebody.geometry.records import QueryResult
 from wholebody.methods.ccd.limbs import movable
 from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
 from wholebody.methods.ccd.overlap_resolution.links import Link, Overlap
