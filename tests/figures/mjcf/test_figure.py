@@ -87,7 +87,8 @@ def configuration(model: object, figure: wb.Figure, seed: int) -> tuple[np.ndarr
 
 
 @pytest.mark.parametrize("first", range(0, 40, 10))
-def test_random_files_are_mujocos(first: int, tmp_path: Path) -> None:
+def test_random_files_are_mujocos(first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
     for seed in range(first, first + 10):
         path = written(tmp_path, mjcf(seed), f"m{seed}.xml")
         model, figure = mujoco.MjModel.from_xml_path(str(path)), wb.load(path, samples=0)
@@ -114,6 +115,13 @@ def test_random_files_are_mujocos(first: int, tmp_path: Path) -> None:
             ends = (figure.model.lowerPositionLimit[slot], figure.model.upperPositionLimit[slot])
             limited = bool(model.jnt_limited[k])
             assert ends == (pytest.approx(tuple(joint.range), abs=1e-12) if limited else (-np.inf, np.inf))
+
+
+def test_nothing_is_written_beside_the_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for seed in range(12):  # of these MuJoCo says that their inertia is nearly singular
+        wb.load(written(tmp_path, mjcf(seed)), samples=0)
+    assert [file.name for file in tmp_path.iterdir()] == ["robot.xml"]
 
 
 def test_includes_world_bodies_and_keyframes_are_kept(tmp_path: Path) -> None:
