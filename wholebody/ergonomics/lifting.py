@@ -24,6 +24,8 @@ from wholebody.figures.figure import Figure
 CLOSEST, FARTHEST = 25.0, 63.0  # cm, of H
 HIGHEST = 175.0  # cm, of V and D
 
+Grip = Literal["good", "fair", "poor"]
+
 
 @dataclass(frozen=True)
 class Lift(Checked):
@@ -49,7 +51,7 @@ class Lift(Checked):
     asymmetry: Annotated[float, Range(0.0, pi, "rad")] = 0.0
     frequency: Annotated[float, Range(0.0, 60.0, "lifts a minute")] = 0.2
     duration: Annotated[float, Range(0.0, 8.0, "hours")] = 1.0
-    coupling: Literal["good", "fair", "poor"] = "good"
+    coupling: Grip = "good"
     load: Annotated[float, Range(0.0, 1000.0, "kg")] | None = None
 
     def __str__(self) -> str:
@@ -91,7 +93,7 @@ class Lift(Checked):
 
 def lift_between(
     figure: Figure, origin: Array, destination: Array, *, floor: float = 0.0, frequency: float = 0.2,
-    duration: float = 1.0, coupling: str = "good", load: float | None = None,
+    duration: float = 1.0, coupling: Grip = "good", load: float | None = None,
 ) -> tuple[Lift, Lift]:  # fmt: skip
     """The lift between two postures of a person: at its origin, and at its destination, where control is needed.
 
