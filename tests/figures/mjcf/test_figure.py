@@ -117,13 +117,6 @@ def test_random_files_are_mujocos(first: int, tmp_path: Path, monkeypatch: pytes
             assert ends == (pytest.approx(tuple(joint.range), abs=1e-12) if limited else (-np.inf, np.inf))
 
 
-def test_nothing_is_written_beside_the_caller(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    for seed in range(12):  # of these MuJoCo says that their inertia is nearly singular
-        wb.load(written(tmp_path, mjcf(seed)), samples=0)
-    assert [file.name for file in tmp_path.iterdir()] == ["robot.xml"]
-
-
 def test_includes_world_bodies_and_keyframes_are_kept(tmp_path: Path) -> None:
     written(tmp_path, ARM.replace('<body name="base">', '<body name="base" pos="0.3 0 1" quat="0 0 0 1">'), "arm.xml")
     path = written(

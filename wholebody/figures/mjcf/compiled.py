@@ -8,8 +8,6 @@ frames of their bodies.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Iterator
-from contextlib import contextmanager
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -141,26 +139,14 @@ def _compile(path: Path) -> Any:
             f"{path}: MJCF files are read by MuJoCo, which is not installed; run: pip install 'wholebody[mjcf]'"
         ) from None
     try:
-        with _unlogged(mujoco):
+        with warnings.catch_warnings():  # they tell of simulations
+            warnings.simplefilter("ignore")
             spec = mujoco.MjSpec.from_file(str(path))
             _without_textures(spec)
             return spec.compile()
     except (ValueError, mujoco.FatalError) as error:
         reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
         raise FileFormatError(f"{path}: MuJoCo cannot read it ({reason}); correct the file") from None
-
-
-@contextmanager
-def _unlogged(mujoco: Any) -> Iterator[None]:
-    """Without MuJoCo's warnings, which tell of simulations: as Python's, and in a MUJOCO_LOG.TXT in this folder."""
-    handler = mujoco.get_mju_user_warning()
-    mujoco.set_mju_user_warning(lambda message: None)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            yield
-    finally:
-        mujoco.set_mju_user_warning(handler)
 
 
 def _without_textures(spec: Any) -> None:
