@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
-from wholebody.geometry.guesses import Guesses
+from wholebody.geometry.memory_views import Guesses
 
 FEET = ("left_foot", "right_foot")
 
@@ -145,7 +145,7 @@ def test_forgotten_guesses_are_those_of_a_new_run(monkeypatch: pytest.MonkeyPatc
     expected = distances(pin.GeometryData(geometry))
     for seen in (True, False):
         if not seen:
-            monkeypatch.setattr("wholebody.geometry.guesses._views", lambda requests: None)
+            monkeypatch.setattr("wholebody.geometry.memory_views._views", lambda requests: None)
         used = pin.GeometryData(geometry)
         guesses = Guesses(used)
         for posture in ("standing", "t_pose"):

@@ -15,7 +15,7 @@ What fewer programs need stands in `wb.dynamics`, `wb.ergonomics`, `wb.figures`,
 
 from __future__ import annotations
 
-from wholebody.base.interrupts import end_quietly
+from wholebody.base.imports import end_quietly, exported
 
 end_quietly()  # before anything that takes time
 
@@ -29,7 +29,6 @@ from wholebody.base.errors import (  # noqa: E402
     UnknownNameError,
     WholebodyError,
 )
-from wholebody.base.lazy import exported  # noqa: E402
 from wholebody.version import __version__  # noqa: E402
 
 if TYPE_CHECKING:

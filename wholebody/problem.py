@@ -26,7 +26,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
 from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.terms.linearisation import Lineariser
-from wholebody.terms.plan import TermPlan, make_plan
+from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 
@@ -261,10 +261,7 @@ class Problem(checks.FixedAttributes):
         return Lineariser(
             workspace,
             self.scene.figure.limits,
-            self.goals,
-            self.constraints,
-            self.bounds,
-            self.measures,
+            Terms(self.goals, self.constraints, self.bounds, self.measures),
             self.clearances,
             dt,
             plan if known else None,
@@ -272,7 +269,7 @@ class Problem(checks.FixedAttributes):
 
     def _planned(self, state: State) -> tuple[tuple[Any, Any, Any], TermPlan]:
         terms = (self.constraints, self.bounds, self.measures)
-        return terms, make_plan(self.scene.figure.limits, self.goals, *terms, None, state)
+        return terms, make_plan(self.scene.figure.limits, Terms(self.goals, *terms), None, state)
 
     def check_fresh(self) -> None:
         """Refuse a problem that is out of date; things may be moved and clearances changed.

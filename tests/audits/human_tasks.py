@@ -257,7 +257,7 @@ def _margin(scene: Any, q: Array) -> float:
     import pinocchio as pin
     from scipy.spatial import ConvexHull
 
-    from wholebody.tasks.support import low_points, standing_points
+    from wholebody.tasks.balance import low_points, standing_points
 
     points = [standing_points(scene, q, ("left_foot", "right_foot"))]
     data, placed = scene.model.createData(), pin.GeometryData(scene.geometry)

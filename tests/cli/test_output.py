@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 import wholebody
-from wholebody.base.interrupts import _is_command
+from wholebody.base.imports import _is_command
 
 FROM_SCRATCH = True
 COMMAND = [sys.executable, "-m", "wholebody"]

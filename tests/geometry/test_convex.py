@@ -21,10 +21,10 @@ from wholebody.base.arrays import Array
 from wholebody.geometry import convex
 from wholebody.geometry.components import split_components
 from wholebody.geometry.convex import convex_pieces
+from wholebody.geometry.hull import simplified_hull
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.pieces import Piece
 from wholebody.geometry.shapes import Mesh
-from wholebody.geometry.simplified_hull import simplified_hull
 
 
 def outside(points: Array, pieces: tuple[Piece, ...]) -> Array:

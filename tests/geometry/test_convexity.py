@@ -10,8 +10,8 @@ import trimesh
 
 from wholebody.base.runner import BY_THE_CLOCK
 from wholebody.geometry import convex
+from wholebody.geometry.components import is_convex, passes_through_itself
 from wholebody.geometry.convex import convex_pieces
-from wholebody.geometry.convexity import is_convex, passes_through_itself
 
 Arrays = tuple[np.ndarray, np.ndarray]
 

@@ -15,7 +15,7 @@ from scipy.spatial import ConvexHull, Delaunay
 from wholebody import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import Balance
-from wholebody.tasks.support import convex_polygon, edges, low_points, shrunk
+from wholebody.tasks.balance import convex_polygon, edges, low_points, shrunk
 
 
 def test_rows_are_positive_exactly_where_the_centre_of_mass_is_over_the_feet(humanoid: Any) -> None:

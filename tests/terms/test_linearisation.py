@@ -11,7 +11,7 @@ from tests.reference.linearisation import ReferenceLineariser
 from wholebody.figures.state import Wrench
 from wholebody.tasks.base import Goal, Measure, filled
 from wholebody.terms.constraint_values import ConstraintValues
-from wholebody.terms.plan import make_plan
+from wholebody.terms.plan import Terms, make_plan
 
 
 class Squared(Goal):
@@ -210,8 +210,8 @@ def test_what_was_told_is_not_overwritten_by_the_next_posture(problem):
 
 def reference(problem, workspace, dt=None):
     return ReferenceLineariser(
-        workspace, problem.scene.figure.limits, problem.goals, problem.constraints, problem.bounds,
-        problem.measures, problem.clearances, dt,
+        workspace, problem.scene.figure.limits,
+        Terms(problem.goals, problem.constraints, problem.bounds, problem.measures), problem.clearances, dt,
     )  # fmt: skip
 
 
@@ -285,9 +285,8 @@ def test_reach_cones_roots_and_heights_are_in_the_plan(problem):
     goal = wb.Posture("sitting")
     asked = wb.Problem(problem.scene, goals=[goal], constraints=[wb.ReachCones()], measures=[wb.PotentialEnergy(0.01)])
     workspace = asked.workspace()
-    plan = make_plan(
-        problem.scene.figure.limits, asked.goals, asked.constraints, asked.bounds, asked.measures, None, workspace.state
-    )
+    terms = Terms(asked.goals, asked.constraints, asked.bounds, asked.measures)
+    plan = make_plan(problem.scene.figure.limits, terms, None, workspace.state)
     assert plan.others == () == plan.other_measures
     lineariser, plain = asked.lineariser(workspace), reference(asked, asked.workspace())
     rng, target = np.random.default_rng(4), problem.scene.figure.posture("sitting")

@@ -16,15 +16,10 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.base.pool import Pool
 from wholebody.figures.state import State
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import RESULT_FIELDS, distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import RESULT_FIELDS, Guesses, distance_view, placement_view, read_result
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.scene.geometry_model import SceneGeometry
 
-PATCH = 1e-4  # m: beyond the nearest points up to which corners of a contact patch count
-
-FIRST_ASKED = 100  # pairs of a scene of very many that are asked for first, to bound the least distance
-ASKED_AT_ONCE = 100_000  # pairs
 NOT_A_NUMBER = "a distance is not a number; an object's placement or shape is broken"
 
 Label = tuple[Literal["contact", "limit", "bound", "constraint"], tuple[str, ...]]
@@ -88,7 +83,7 @@ class AllPairs:
         if self._kept:
             return
         while len(number := np.flatnonzero(~self._asked & (self.distance < within))):
-            number = number[:ASKED_AT_ONCE]
+            number = number[:100_000]  # pairs
             self._rows[number] = self._single.measured(self._placed, self._built.table.pairs[number])
             self.distance[number], self._asked[number] = self._rows[number, 0], True
         if np.isnan(self.distance).any():
@@ -106,7 +101,8 @@ class AllPairs:
         )
         self._asked = np.zeros(len(first), dtype=bool)
         self._rows = np.zeros((len(first), RESULT_FIELDS))  # memory that is never written takes none
-        self.ask(float(np.sort(self.distance)[min(FIRST_ASKED, len(first) - 1)]))
+        # pairs of a scene of very many that are asked for first, to bound the least distance
+        self.ask(float(np.sort(self.distance)[min(100, len(first) - 1)]))
         self.ask(max(0.0, float(self.distance[self._asked].min(initial=np.inf))))  # what overlaps is counted
         self.least = float(self.distance.min(initial=np.inf))
 
@@ -187,7 +183,8 @@ class NearPairs(NamedTuple):
             return []
         first, placed_first, second, placed_second = (*self._placed(row, 0), *self._placed(row, 1))
         request, contact = coal.CollisionRequest(), coal.CollisionResult()
-        request.security_margin = float(self.found[row, 0]) + PATCH
+        # m: beyond the nearest points up to which corners of a contact patch count
+        request.security_margin = float(self.found[row, 0]) + 1e-4
         coal.collide(first, placed_first, second, placed_second, request, contact)
         if contact.isCollision():
             patch = coal.ContactPatchResult()

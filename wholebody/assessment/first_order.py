@@ -25,10 +25,8 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import values_and_rows
 
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
-FLAT = 1e-2  # share of the largest curvature below which a degree of freedom counts as having that much
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
-MOST_CHANGES = 20  # times the number of rows: changes of the passive set, at the most
 WORTH = 0.05  # share of the largest push from which on something counts as being in the way
 
 
@@ -142,7 +140,8 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))
         curvature = sum((goal.weight * (jacobian**2).sum(axis=0) for _, jacobian, goal in goals), np.zeros(nv))
-    scale = np.maximum(curvature, FLAT * curvature.max(initial=0.0))
+    # share of the largest curvature below which a degree of freedom counts as having that much
+    scale = np.maximum(curvature, 1e-2 * curvature.max(initial=0.0))
     if not scale.any():
         return 0.0
     _, left = _balanced(objective, signed, one_sided)
@@ -286,7 +285,7 @@ def nonnegative_least_squares(rows: Array, right: Array, lengths: Array) -> tupl
     products = units @ units.T
     share, passive, excluded = np.zeros(len(rows)), np.zeros(len(rows), dtype=bool), ~counts
     left, enough = right, INDEPENDENT * float(np.linalg.norm(right))
-    for _ in range(MOST_CHANGES * len(rows)):
+    for _ in range(20 * len(rows)):  # times the number of rows: changes of the passive set, at the most
         agrees = np.where(passive | excluded, -np.inf, units @ left)
         new = int(agrees.argmax())
         if agrees[new] <= enough:

@@ -36,8 +36,6 @@ TIME_STEP = (1e-6, 1e6)
 TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
 """The end of a message about a time step that is out of that range."""
 
-LONGEST_LIKELY = 10.0
-"""Seconds of a step beyond which a number of frames a second was probably meant."""
 
 MOST_TURNED = 4.0 * math.pi
 """Radians, two turns, beyond which degrees were probably meant."""
@@ -149,7 +147,7 @@ def time_step(value: object, what: str) -> float:
         InputError: no number within `TIME_STEP`.
     """
     found = number(value, what, *TIME_STEP, "s, such as 0.02")
-    if found > LONGEST_LIKELY:
+    if found > 10.0:  # Seconds of a step beyond which a number of frames a second was probably meant.
         told = f"{what} is {found:g} s; for {found:g} frames a second give 1 / {found:g}"
         warn(told)
     return found

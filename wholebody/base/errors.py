@@ -24,7 +24,6 @@ SIMILAR, ALIKE = 0.4, 0.6
 """Least similarity, 0 to 1, of a name that is offered, and of one beside which the dissimilar ones are left out."""
 
 _WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+|[0-9]+|[^\W_]")
-_SIDES = {"l": "left", "r": "right"}
 
 
 def nearest_names(name: str, known: Collection[str]) -> list[str]:
@@ -47,7 +46,7 @@ def nearest_names(name: str, known: Collection[str]) -> list[str]:
 def _spellings(name: str) -> tuple[str, str]:
     """A name in lower case, and its words in the order of the alphabet."""
     words = [word.lower() for word in _WORD.findall(name)]
-    return name.lower(), " ".join(sorted(_SIDES.get(word, word) for word in words))
+    return name.lower(), " ".join(sorted({"l": "left", "r": "right"}.get(word, word) for word in words))
 
 
 class WholebodyError(Exception):

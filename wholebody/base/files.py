@@ -36,8 +36,6 @@ LONGEST_NAME = 200
 DEEPEST_KEY = 20
 """Largest number of parts of a dotted key of TOML."""
 
-LONGEST_QUOTE = 300
-"""Largest number of characters of a message of the TOML reader that our message quotes."""
 
 _DEEP_KEY = re.compile(rf"""(?<![\w-])(?:(?:[\w-]+|"[^"\n]*"|'[^'\n]*')[ \t]*\.[ \t]*){{{DEEPEST_KEY}}}""")
 _LONG_NUMBER = re.compile(r"[\d_]{4000}")
@@ -134,7 +132,8 @@ def parsed_toml(text: str, name: str) -> dict[str, Any]:
         data: dict[str, Any] = tomllib.loads(text)
         return data
     except tomllib.TOMLDecodeError as error:
-        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), LONGEST_QUOTE)}") from None
+        # Largest number of characters of a message of the TOML reader that our message quotes.
+        raise FileFormatError(f"{name}: is not TOML: {one_line(str(error), 300)}") from None
     except RecursionError:
         raise FileFormatError(f"{name}: tables or lists stand in each other too deeply; three are enough") from None
     except ValueError:  # Python reads no whole number of more than 4300 digits

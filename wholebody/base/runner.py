@@ -32,8 +32,6 @@ ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_
 
 FULL = 2e9  # bytes: a process that holds more should be replaced; placo never frees a robot (some 6 MB)
 BY_THE_CLOCK = 10.0  # a deadline by the clock in units of that of the processor: others use the machine too
-ORPHANED = 1.0  # s: how often a process looks whether its parent is still there
-LONGEST_LINE = 200  # most characters kept of the last line that a process wrote
 
 _START = (
     "import sys; sys.path[:] = [{root!r}, *filter(None, {path!r})]; from wholebody.base.runner import serve; "
@@ -209,7 +207,8 @@ class Child:
         if self._output is not None:
             self._output.seek(0)
             lines = self._output.read().decode("utf-8", errors="replace").strip().splitlines()
-            said = lines[-1].strip()[:LONGEST_LINE] if lines else ""
+            # most characters kept of the last line that a process wrote
+            said = lines[-1].strip()[:200] if lines else ""
         self.close()
         return EndedError(code, said)
 
@@ -307,7 +306,7 @@ def end_with(parent: int) -> None:
 
 def _end_after(parent: int) -> None:
     while os.getppid() == parent:
-        time.sleep(ORPHANED)
+        time.sleep(1.0)  # s: how often a process looks whether its parent is still there
     _exit(1)
 
 

@@ -12,7 +12,7 @@ from importlib import import_module
 from io import TextIOWrapper, UnsupportedOperation
 
 from wholebody.base.errors import WholebodyError
-from wholebody.base.interrupts import raise_again
+from wholebody.base.imports import raise_again
 from wholebody.cli.arguments import Parser
 from wholebody.version import __version__
 

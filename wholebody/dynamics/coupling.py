@@ -10,12 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import cos, exp, sin, sqrt
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, number, posture, settle, time_step
+from wholebody.base.checks import TIME_STEP, number, posture, time_step
+from wholebody.base.fields import Checked, Range
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
@@ -26,7 +28,7 @@ NEAR_CRITICAL = 1e-6  # share of the squared rate within which the two roots cou
 
 
 @dataclass(frozen=True)
-class Spring:
+class Spring(Checked):
     """Constants of equation 6.
 
     Attributes:
@@ -38,15 +40,9 @@ class Spring:
         InputError: K is not within 1e-9 and 1e12 N/m, R not within 0 and 1e12 N s/m, or m not within 1e-9 and 1e6 kg.
     """
 
-    stiffness: float = STIFFNESS
-    damping: float = DAMPING
-    mass: float = MASS
-
-    def __post_init__(self) -> None:
-        """Check the constants."""
-        settle(self, "stiffness", number(self.stiffness, "Spring: stiffness", SOFTEST, GREATEST, "N/m"))
-        settle(self, "damping", number(self.damping, "Spring: damping", 0.0, GREATEST, "N s/m"))
-        settle(self, "mass", number(self.mass, "Spring: mass", LIGHTEST, HEAVIEST, "kg"))
+    stiffness: Annotated[float, Range(SOFTEST, GREATEST, "N/m")] = STIFFNESS
+    damping: Annotated[float, Range(0.0, GREATEST, "N s/m")] = DAMPING
+    mass: Annotated[float, Range(LIGHTEST, HEAVIEST, "kg")] = MASS
 
     def transition(self, time: float) -> Array:
         """The matrix (2, 2) that takes x and x' over a time of so many seconds.

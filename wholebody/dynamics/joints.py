@@ -15,7 +15,7 @@ from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import contact_kernel, joint_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.pieces import Pieces
-from wholebody.scene.matter.joints import BallJoint, Hinge
+from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.scene.scene import Scene
 
 CLOSED = 1e-9  # m: by which joint points may be apart at the end of a step

@@ -16,8 +16,7 @@ from wholebody.base.checks import known, posture, whole
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Capsule, HalfSpace, Sphere
-from wholebody.scene.matter.body import Body
-from wholebody.scene.matter.joints import BallJoint, Hinge
+from wholebody.scene.matter.body import BallJoint, Body, Hinge
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from wholebody.base.lazy import exported
+from wholebody.base.imports import exported
 
 if TYPE_CHECKING:
     from wholebody.ergonomics.angles import BodyAngles, body_angles

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import degrees, inf, pi
+from typing import Annotated, Literal
 
 import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import check_person
 from wholebody.ergonomics.published import published
 from wholebody.figures.figure import Figure
@@ -22,9 +24,11 @@ from wholebody.figures.figure import Figure
 CLOSEST, FARTHEST = 25.0, 63.0  # cm, of H
 HIGHEST = 175.0  # cm, of V and D
 
+Grip = Literal["good", "fair", "poor"]
+
 
 @dataclass(frozen=True)
-class Lift:
+class Lift(Checked):
     """A lift, and what the equation says of it.
 
     Attributes:
@@ -41,25 +45,14 @@ class Lift:
         InputError: a value of the wrong kind or out of range.
     """
 
-    horizontal: float
-    vertical: float
-    travel: float
-    asymmetry: float = 0.0
-    frequency: float = 0.2
-    duration: float = 1.0
-    coupling: str = "good"
-    load: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        for name in ("horizontal", "vertical", "travel"):
-            checks.settle(self, name, checks.number(getattr(self, name), f"Lift: {name}", 0.0, 3.0, "m"))
-        checks.settle(self, "asymmetry", checks.number(self.asymmetry, "Lift: asymmetry", 0.0, pi, "rad"))
-        checks.settle(self, "frequency", checks.number(self.frequency, "Lift: frequency", 0.0, 60.0, "lifts a minute"))
-        checks.settle(self, "duration", checks.number(self.duration, "Lift: duration", 0.0, 8.0, "hours"))
-        checks.choice(self.coupling, ("good", "fair", "poor"), "Lift: coupling")
-        if self.load is not None:
-            checks.settle(self, "load", checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg"))
+    horizontal: Annotated[float, Range(0.0, 3.0, "m")]
+    vertical: Annotated[float, Range(0.0, 3.0, "m")]
+    travel: Annotated[float, Range(0.0, 3.0, "m")]
+    asymmetry: Annotated[float, Range(0.0, pi, "rad")] = 0.0
+    frequency: Annotated[float, Range(0.0, 60.0, "lifts a minute")] = 0.2
+    duration: Annotated[float, Range(0.0, 8.0, "hours")] = 1.0
+    coupling: Grip = "good"
+    load: Annotated[float, Range(0.0, 1000.0, "kg")] | None = None
 
     def __str__(self) -> str:
         """The limit, what makes it zero, and the lifting index of a load."""
@@ -100,7 +93,7 @@ class Lift:
 
 def lift_between(
     figure: Figure, origin: Array, destination: Array, *, floor: float = 0.0, frequency: float = 0.2,
-    duration: float = 1.0, coupling: str = "good", load: float | None = None,
+    duration: float = 1.0, coupling: Grip = "good", load: float | None = None,
 ) -> tuple[Lift, Lift]:  # fmt: skip
     """The lift between two postures of a person: at its origin, and at its destination, where control is needed.
 

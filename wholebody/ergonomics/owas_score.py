@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import radians
+from typing import Annotated
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import BodyAngles
 from wholebody.ergonomics.published import published
 from wholebody.ergonomics.seat import seen
@@ -25,7 +26,7 @@ BENT_KNEE = radians(30.0)
 
 
 @dataclass(frozen=True)
-class Owas:
+class Owas(Checked):
     """An OWAS code.
 
     Attributes:
@@ -35,19 +36,10 @@ class Owas:
         load: 1 to 3.
     """
 
-    back: int
-    arms: int
-    legs: int
-    load: int
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            InputError: a code out of its range.
-        """
-        for name, most in {"back": 4, "arms": 3, "legs": 7, "load": 3}.items():
-            checks.settle(self, name, checks.whole(getattr(self, name), f"Owas: {name}", 1, most))
+    back: Annotated[int, Range(1, 4, whole=True)]
+    arms: Annotated[int, Range(1, 3, whole=True)]
+    legs: Annotated[int, Range(1, 7, whole=True)]
+    load: Annotated[int, Range(1, 3, whole=True)]
 
     @property
     def code(self) -> str:

@@ -11,7 +11,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, check_person
-from wholebody.ergonomics.work import HEAVIEST
+from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import clip_torques
@@ -71,7 +71,7 @@ def static_torques(
     person = check_person(figure, "static_torques: figure")
     q = checks.posture(q, person.model.nq, "static_torques: q")
     person.warn_of_angles(q, "static_torques: q")
-    load = checks.number(load, "static_torques: load", 0.0, HEAVIEST, "kg")
+    load = LOAD(load, "static_torques: load")
     seated = checks.flag(seated, "static_torques: seated")
     strength = Strength() if strength is None else checks.instance(
         strength, Strength, "static_torques: strength", "give wb.motion.Strength(percentile=50, sex='female')"

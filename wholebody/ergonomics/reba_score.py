@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import radians
+from typing import Annotated
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
 from wholebody.ergonomics.published import action, published
 from wholebody.ergonomics.rula_score import (
@@ -26,7 +27,7 @@ from wholebody.scene.scene import Scene
 
 
 @dataclass(frozen=True)
-class RebaParts:
+class RebaParts(Checked):
     """Scores of the parts of the body, which the tables combine.
 
     Attributes:
@@ -41,26 +42,15 @@ class RebaParts:
         activity: 0 to 3.
     """
 
-    neck: int
-    trunk: int
-    legs: int
-    upper_arm: int
-    lower_arm: int
-    wrist: int
-    load: int = 0
-    coupling: int = 0
-    activity: int = 0
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            InputError: a score out of its range.
-        """
-        for name, most in {"neck": 3, "trunk": 5, "legs": 4, "upper_arm": 6, "lower_arm": 2, "wrist": 3}.items():
-            checks.settle(self, name, checks.whole(getattr(self, name), f"RebaParts: {name}", 1, most))
-        for name in ("load", "coupling", "activity"):
-            checks.settle(self, name, checks.whole(getattr(self, name), f"RebaParts: {name}", 0, 3))
+    neck: Annotated[int, Range(1, 3, whole=True)]
+    trunk: Annotated[int, Range(1, 5, whole=True)]
+    legs: Annotated[int, Range(1, 4, whole=True)]
+    upper_arm: Annotated[int, Range(1, 6, whole=True)]
+    lower_arm: Annotated[int, Range(1, 2, whole=True)]
+    wrist: Annotated[int, Range(1, 3, whole=True)]
+    load: Annotated[int, Range(0, 3, whole=True)] = 0
+    coupling: Annotated[int, Range(0, 3, whole=True)] = 0
+    activity: Annotated[int, Range(0, 3, whole=True)] = 0
 
     @property
     def body(self) -> int:

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi, radians
+from typing import Annotated
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
+from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
 from wholebody.ergonomics.published import action, published
 from wholebody.ergonomics.seat import seen
@@ -28,7 +29,7 @@ END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side
 
 
 @dataclass(frozen=True)
-class RulaParts:
+class RulaParts(Checked):
     """Scores of the parts of the body, which the tables combine.
 
     Attributes:
@@ -43,27 +44,15 @@ class RulaParts:
         force: 0 to 3.
     """
 
-    upper_arm: int
-    lower_arm: int
-    wrist: int
-    wrist_twist: int
-    neck: int
-    trunk: int
-    legs: int
-    muscle: int = 0
-    force: int = 0
-
-    def __post_init__(self) -> None:
-        """Check the ranges.
-
-        Raises:
-            InputError: a score out of its range.
-        """
-        limits = {"upper_arm": 6, "lower_arm": 3, "wrist": 4, "wrist_twist": 2, "neck": 6, "trunk": 6, "legs": 2}
-        for name, most in limits.items():
-            checks.settle(self, name, checks.whole(getattr(self, name), f"RulaParts: {name}", 1, most))
-        checks.settle(self, "muscle", checks.whole(self.muscle, "RulaParts: muscle", 0, 1))
-        checks.settle(self, "force", checks.whole(self.force, "RulaParts: force", 0, 3))
+    upper_arm: Annotated[int, Range(1, 6, whole=True)]
+    lower_arm: Annotated[int, Range(1, 3, whole=True)]
+    wrist: Annotated[int, Range(1, 4, whole=True)]
+    wrist_twist: Annotated[int, Range(1, 2, whole=True)]
+    neck: Annotated[int, Range(1, 6, whole=True)]
+    trunk: Annotated[int, Range(1, 6, whole=True)]
+    legs: Annotated[int, Range(1, 2, whole=True)]
+    muscle: Annotated[int, Range(0, 1, whole=True)] = 0
+    force: Annotated[int, Range(0, 3, whole=True)] = 0
 
     @property
     def arm(self) -> int:

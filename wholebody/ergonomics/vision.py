@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi, radians
-from typing import Any
+from typing import Annotated, Any
 
 import coal
 import numpy as np
@@ -13,6 +13,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 
@@ -26,7 +27,7 @@ BLURRED = 0.05  # m: nearer points are not seen
 
 
 @dataclass(frozen=True)
-class FieldOfView:
+class FieldOfView(Checked):
     """An elliptical cone about the normal line of sight.
 
     Attributes:
@@ -39,18 +40,10 @@ class FieldOfView:
         InputError: a value out of range.
     """
 
-    horizontal: float = radians(35.0)
-    up: float = radians(40.0)
-    down: float = radians(20.0)
-    declination: float = radians(15.0)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        for name in ("horizontal", "up", "down"):
-            checks.settle(self, name, checks.number(getattr(self, name), f"FieldOfView: {name}", 1e-3, pi, "rad"))
-        checks.settle(
-            self, "declination", checks.number(self.declination, "FieldOfView: declination", -pi / 2, pi / 2, "rad")
-        )
+    horizontal: Annotated[float, Range(1e-3, pi, "rad")] = radians(35.0)
+    up: Annotated[float, Range(1e-3, pi, "rad")] = radians(40.0)
+    down: Annotated[float, Range(1e-3, pi, "rad")] = radians(20.0)
+    declination: Annotated[float, Range(-pi / 2, pi / 2, "rad")] = radians(15.0)
 
     def off(self, direction: Array) -> float:
         """How far a direction (3,) in the eyes' axes is off the line of sight: 1 at the border of the cone.

@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Annotated, Literal, get_args
 
 from wholebody.base import checks
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range
 from wholebody.ergonomics.angles import BodyAngles
 
-COUPLINGS = ("good", "fair", "poor", "unacceptable")
-HEAVIEST = 200.0  # kg
+Coupling = Literal["good", "fair", "poor", "unacceptable"]
+COUPLINGS: tuple[Coupling, ...] = get_args(Coupling)
+LOAD = Range(0.0, 200.0, "kg")
 
 KNEELING = 0.12  # m: height of a knee above the lower ankle up to which it is on the ground
 BOTH_FEET = 0.1  # share of the weight that a foot bears at least if both stand
 
 
 @dataclass(frozen=True)
-class Work:
+class Work(Checked):
     """What observation methods ask besides the posture.
 
     Attributes:
@@ -38,12 +41,12 @@ class Work:
         InputError: a value of the wrong kind or out of range.
     """
 
-    load: float = 0.0
+    load: Annotated[float, LOAD] = 0.0
     static: bool = False
     repeated: bool = False
     shock: bool = False
     unstable: bool = False
-    coupling: str = "good"
+    coupling: Coupling = "good"
     arms_supported: bool = False
     legs_supported: bool = True
     walking: bool = False
@@ -52,13 +55,7 @@ class Work:
 
     def __post_init__(self) -> None:
         """Check the values."""
-        checks.settle(self, "load", checks.number(self.load, "Work: load", 0.0, HEAVIEST, "kg"))
-        checks.choice(self.coupling, COUPLINGS, "Work: coupling")
-        for name in ("static", "repeated", "shock", "unstable", "arms_supported", "legs_supported", "walking"):
-            checks.settle(self, name, checks.flag(getattr(self, name), f"Work: {name}"))
-        for name in ("seated", "back_supported"):
-            if getattr(self, name) is not None:
-                checks.settle(self, name, checks.flag(getattr(self, name), f"Work: {name}"))
+        super().__post_init__()
         if self.seated and self.walking:
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 

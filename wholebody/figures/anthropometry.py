@@ -37,7 +37,6 @@ AGE = Range(20.0, 69.0, "years")
 
 _SEXES = {"male": "M", "female": "F"}
 
-_FITTED_LENGTHS = ("thigh", "shank", "upper_arm", "forearm", "hand")
 _ENDS = {
     "elbow_flexion": "upper_arm",
     "wrist_flexion": "forearm",
@@ -47,7 +46,6 @@ _ENDS = {
 """Joints at the ends of segments with a fitted length."""
 
 # Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
-_EXPECTED_MASS = {"M": (27.41, 1.999), "F": (23.00, 2.192)}
 
 
 FOLDER = Path(__file__).parent / "data"
@@ -93,7 +91,7 @@ class Person:
     def length(self, segment: str) -> float:
         """Length of a segment, metres."""
         part = segment.removeprefix("left_").removeprefix("right_")
-        if part in _FITTED_LENGTHS:
+        if part in ("thigh", "shank", "upper_arm", "forearm", "hand"):
             return self.fitted(part)
         length = self.segment(segment, "length") * self.stature
         return length if part in ("foot", "toes", "clavicle") else length * self._trunk_scale()
@@ -186,7 +184,7 @@ def make_person(
         stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
         mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:
-        factor, exponent = _EXPECTED_MASS[column]
+        factor, exponent = {"M": (27.41, 1.999), "F": (23.00, 2.192)}[column]
         mass = factor * STATURE(stature, "stature") ** exponent
     height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
     weight = MASS(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass")

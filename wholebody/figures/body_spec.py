@@ -99,8 +99,6 @@ VIRTUAL_MASS = 1e-6
 """Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
 the next link outwards, so that the total is right."""
 
-VIRTUAL_INERTIA = 1e-9
-"""Its moment of inertia about any axis, kg m^2."""
 
 SKIN = (0.85, 0.68, 0.55, 1.0)
 """Colour of the pieces: red, green, blue, opacity."""
@@ -146,7 +144,8 @@ def _with_virtual_masses(spec: BodySpec) -> list[Link]:
     made = []
     for link in spec.links:
         if not link.mass and link.name in moving:
-            made.append(with_values(link, mass=VIRTUAL_MASS, inertia=(VIRTUAL_INERTIA,) * 3))
+            # Its moment of inertia about any axis, kg m^2.
+            made.append(with_values(link, mass=VIRTUAL_MASS, inertia=(1e-9,) * 3))
         else:
             made.append(with_values(link, mass=link.mass - taken[link.name]) if link.mass else link)
     return made

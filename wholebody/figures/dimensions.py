@@ -13,20 +13,9 @@ RELAXED = 0.93
 PALM_LENGTH = {"M": 0.603, "F": 0.600}
 """Palm length as a fraction of hand length (ANSUR II)."""
 
-CHIN_HEIGHT = 0.870
-"""Fraction of stature (Drillis & Contini, in Winter 2009)."""
-
-
-THUMB_TIP = 0.675
-"""End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that finger's
-(estimate)."""
 
 MIDDLE_TIP = 0.991
 """End of the stretched middle finger, in hand lengths from the wrist: the sum of its parts in the table "hand"."""
-
-GRIP = 0.31
-"""Centre of a rod in the hand, in hand lengths from the wrist: what forearm-hand length leaves of forearm to centre of
-grip in ANSUR II (481 and 355 mm in 28 men)."""
 
 
 class Finger(NamedTuple):
@@ -60,19 +49,24 @@ class Dimensions:
         self.palm_length = PALM_LENGTH[column] * self.hand_length
         self.palm_half_thickness = keyed_hand("palm", "depth") * self.hand_breadth
         self.index = self._finger("index")
+        # End of the thumb, which lies beside the index finger, in hand lengths from the wrist: 0.26 behind that
+        # finger's (estimate).
         self.thumb = Finger(
             0.58 * self.hand_breadth,
             0.22 * self.hand_length,
-            THUMB_TIP * self.hand_length,
+            0.675 * self.hand_length,
             keyed_hand("thumb_dp", "width") * self.hand_breadth,
         )
-        self.grip = GRIP * self.hand_length
+        # Centre of a rod in the hand, in hand lengths from the wrist: what forearm-hand length leaves of forearm to
+        # centre of grip in ANSUR II (481 and 355 mm in 28 men).
+        self.grip = 0.31 * self.hand_length
 
         above = sum(self.joint(name)[2] for name in _UPWARD)
         self.head_top = height - self.hip_height - above
         self.head_half_breadth = person.radius("head_y")
         self.head_half_length = person.radius("head_x")
-        self.head_bottom = self.head_top - (1.0 - CHIN_HEIGHT) * height
+        # Fraction of stature (Drillis & Contini, in Winter 2009).
+        self.head_bottom = self.head_top - (1.0 - 0.870) * height
         self.head_x = person.center_of_mass("head")[0]
         self.eye_z = self.head_top - person.fitted("eye")
         # The skull is a capsule from front to back; its front at the height of the eyes.

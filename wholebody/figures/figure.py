@@ -21,9 +21,6 @@ from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.model_check import LARGEST, check_model
 from wholebody.figures.reduction import reduced_parts
 
-_LIMITS = ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
-"""Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it."""
-
 
 def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
     """A figure that was pickled."""
@@ -129,7 +126,11 @@ class Figure(checks.FixedAttributes):
         }
         visual = None if self.visual is self.geometry else self.visual
         made_from = (self.name, pin.Model(self.model), self.geometry, self.detail, Description(**known), visual)
-        limits = {name: np.array(getattr(self.model, name)) for name in _LIMITS}
+        # Of a model: infinite values, which Pinocchio's archives write and cannot read, are pickled beside it.
+        limits = {
+            name: np.array(getattr(self.model, name))
+            for name in ("lowerPositionLimit", "upperPositionLimit", "velocityLimit", "effortLimit")
+        }
         for name, values in limits.items():
             setattr(made_from[1], name, np.nan_to_num(values))
         return _with_limits, (made_from, limits), {"loaded_as": self.loaded_as}

@@ -30,8 +30,6 @@ from wholebody.figures.measuring import ansur, measure
 TOLERANCE = 0.005
 """Metres: a dimension that is off by this counts as one unit of the fit."""
 
-OVERHEAD_TOLERANCE = 0.010
-"""Metres, for the overhead reach: how far people stretch varies more than their bones."""
 
 PERCENTILES = (5, 50, 95)
 
@@ -143,8 +141,9 @@ def _fit_sex(sex: str) -> dict[str, tuple[float, float, float]]:
         for person, dimensions in zip(people, wanted, strict=True):
             moved = tuple((name, _value(line, person) - person.fitted(name)) for name, line in coefficients.items())
             found = measured(person, moved)
+            # Metres, for the overhead reach: how far people stretch varies more than their bones.
             off += [
-                (found[name] - value) / (OVERHEAD_TOLERANCE if name == "overhead_reach_sitting" else TOLERANCE)
+                (found[name] - value) / (0.010 if name == "overhead_reach_sitting" else TOLERANCE)
                 for name, value in dimensions.items()
             ]
         pull = (ends.reshape(2, -1) - prior) / spread

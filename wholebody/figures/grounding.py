@@ -12,9 +12,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
-DOWN = np.array((0.0, 0.0, -1.0))
-LOWEST = 0.03  # m: segments that reach as low as this above the lowest point are those that stand
-NEAR = 1e-7  # m: gap that counts as standing
 DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
 STEPS = 2000  # most steps; each goes down by the least distance, so none goes through anything
 
@@ -48,7 +45,11 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Scene
     own = set(segments)
     pieces = list(zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True))
     placed = [(piece.geometry, data.oMi[piece.parentJoint] * piece.placement, owner) for piece, owner in pieces]
-    body = [(shape, place, -support(shape, place, DOWN)) for shape, place, owner in placed if owner in own]
+    body = [
+        (shape, place, -support(shape, place, np.array((0.0, 0.0, -1.0))))
+        for shape, place, owner in placed
+        if owner in own
+    ]
     things = [
         (shape, coal.Transform3s(place.rotation, place.translation))
         for (shape, place, owner), (piece, _) in zip(placed, pieces, strict=True)
@@ -57,11 +58,12 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Scene
     if not things or not body:
         raise InputError("grounded: there is nothing to stand on; add wb.HalfSpace() to the scene")
     bottom = min(low for *_, low in body)
-    soles = [(shape, place) for shape, place, low in body if low <= bottom + LOWEST]
+    # m: segments that reach as low as this above the lowest point are those that stand
+    soles = [(shape, place) for shape, place, low in body if low <= bottom + 0.03]
     shift = 0.0
     for _ in range(STEPS):
         gap = _least(soles, things, shift)
-        if abs(gap) <= NEAR:
+        if abs(gap) <= 1e-7:  # m: gap that counts as standing
             break
         shift -= gap  # into what it overlaps the figure is no deeper than that, so it comes out after a few steps
         if abs(shift) > DEEPEST_FALL:

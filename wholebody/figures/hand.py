@@ -33,10 +33,6 @@ PARTS = {"mc": "metacarpal", "pp": "proximal", "mp": "middle", "dp": "distal"}
 _JOINT = {f"{kind}_flex": f"{kind}_flexion" for kind in ("cmc", "mcp", "pip", "dip", "ip")}
 _JOINT |= {f"{kind}_abd": f"{kind}_abduction" for kind in ("cmc", "mcp")}
 
-_THUMB_RADIAL = math.radians(40.0)
-_THUMB_PALMAR = math.radians(30.0)
-"""Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side (estimate), and out of the
-palm (CMC abduction of the table)."""
 
 # Degrees by kind of joint; "relaxed" is the neutral column of the table.
 POSTURES: dict[str, dict[str, float]] = {
@@ -177,7 +173,9 @@ def thumb_metacarpal(size: Dimensions, side: str) -> pin.SE3:
         side: "left" or "right".
     """
     sign = 1.0 if side == "left" else -1.0
-    radial, palmar = _THUMB_RADIAL, _THUMB_PALMAR
+    # Resting direction of the thumb's metacarpal: from the fingers towards the thumb's side (estimate), and out of the
+    # palm (CMC abduction of the table).
+    radial, palmar = math.radians(40.0), math.radians(30.0)
     along = np.array([math.sin(radial), -sign * math.sin(palmar), -math.cos(radial)])
     along /= np.linalg.norm(along)
     # The thumb bends across the palm, towards the little finger.

@@ -26,9 +26,6 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
 
-WHOLE_IN_ONE_FILE = (".obj", ".stl", ".ply", ".glb", ".dae")
-"""Kinds of mesh files whose triangles are all in the file itself, so that its content identifies them."""
-
 _log = logging.getLogger(__name__)
 
 Concavity = float | Mapping[str, float] | None
@@ -142,7 +139,8 @@ def _of_file(shape: LinkShape, share: float | None) -> ConvexPieces:
         vertices, faces = read_mesh(file)
         return _pieces(vertices * scale, faces[:, ::-1] if np.prod(scale) < 0.0 else faces, share, what)
 
-    if file.suffix.lower() not in WHOLE_IN_ONE_FILE:
+    # Kinds of mesh files whose triangles are all in the file itself, so that its content identifies them.
+    if file.suffix.lower() not in (".obj", ".stl", ".ply", ".glb", ".dae"):
         return make()
     settings = f"link {HULL_VERTICES} {share!r} {shape.size!r} {file.suffix.lower()} {coacd_version()}"
     return cached((file.read_bytes(),), settings, what, make)

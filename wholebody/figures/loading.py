@@ -13,11 +13,6 @@ from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.base.files import check_file, is_file
 from wholebody.figures.figure import Figure
 
-MOST_SAMPLES = 100_000
-"""Most random postures for finding pairs that always overlap: more take minutes."""
-
-LAST_SEED = 2**32 - 1
-
 
 def load(spec: str | PathLike[str], **options: Any) -> Figure:
     """Return a figure.
@@ -85,6 +80,7 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
         elif option in ("detail", "side", "hands") or (option == "root" and value is not None):
             text(value, f"{where}: {option}")
         elif option == "samples":
-            whole(value, f"{where}: {option}", 0, MOST_SAMPLES)
+            # Most random postures for finding pairs that always overlap: more take minutes.
+            whole(value, f"{where}: {option}", 0, 100_000)
         elif option == "seed":
-            whole(value, f"{where}: {option}", 0, LAST_SEED)
+            whole(value, f"{where}: {option}", 0, 2**32 - 1)

@@ -19,9 +19,6 @@ from wholebody.base.arrays import Array
 from wholebody.figures.anthropometry import table
 from wholebody.figures.postures import support
 
-CLAVICLE_OVERHEAD = 45.0
-"""Degrees of elevation of the clavicle in the overhead reach: people stretch as far as they can, so its limit."""
-
 
 class Measured(Protocol):
     """The part of a figure that is measured."""
@@ -70,7 +67,6 @@ class _Pose:
 
 
 UP, DOWN, FRONT, BACK, LEFT = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
-TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
 THIGHS = ("left_thigh", "right_thigh")
 
 
@@ -86,7 +82,8 @@ def measure(figure: Measured) -> dict[str, float]:
     sit = _Pose(figure, {"hip_flexion": 90.0, "knee_flexion": 90.0})
     cross = _Pose(figure, {"shoulder_abduction": 90.0})
     reach = _Pose(figure, {"shoulder_flexion": 90.0})
-    raised = _Pose(figure, {"clavicle_elevation": CLAVICLE_OVERHEAD})
+    # Degrees of elevation of the clavicle in the overhead reach: people stretch as far as they can, so its limit.
+    raised = _Pose(figure, {"clavicle_elevation": 45.0})
     bent = _Pose(figure, {"elbow_flexion": 90.0})
     floor, vertex = stand.frame("left_sole")[2], stand.frame("head_top")[2]
     seat, rest = -sit.extent(DOWN, ("pelvis", *THIGHS)), sit.frame("left_sole")[2]
@@ -98,7 +95,8 @@ def measure(figure: Measured) -> dict[str, float]:
         "acromial_height": stand.extent(UP, ("left_clavicle", "left_upper_arm")) - floor,
         "bideltoid_breadth": 2.0 * stand.extent(LEFT, ("left_clavicle", "left_upper_arm")),
         "span": 2.0 * cross.frame("left_middle_tip")[1],
-        "thumb_tip_reach": reach.frame("left_thumb_tip")[0] + reach.extent(BACK, TRUNK),
+        "thumb_tip_reach": reach.frame("left_thumb_tip")[0]
+        + reach.extent(BACK, ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")),
         "overhead_reach_sitting": raised.frame("left_shoulder")[2] + float(arm) - seat,
         "sitting_height": vertex - seat,
         "eye_height_sitting": sit.frame("gaze")[2] - seat,

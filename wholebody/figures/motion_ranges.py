@@ -99,8 +99,6 @@ NECK = (
 AAOS). That they end on an ellipsoid is an ESTIMATE: rotation lessens with flexion and extension (Walmsley et al. 1996).
 """
 
-CENTRAL_PLANE = 45.0
-"""Degrees from the sagittal plane, outwards: where the arm points, level, in the middle of its directions."""
 
 INTERNAL_ROTATION = ((80.0, 70.0), (120.0, 0.0))
 """Elevations in the frontal plane, and the most inward rotation of the upper arm there, degrees: 70 up to 80 (AAOS, of
@@ -145,7 +143,8 @@ def shoulder_twist(side: str) -> TwistRange:
     `INTERNAL_ROTATION`.
     """
     outward = 1.0 if side == "left" else -1.0
-    center = swing(90.0, CENTRAL_PLANE, outward)
+    # Degrees from the sagittal plane, outwards: where the arm points, level, in the middle of its directions.
+    center = swing(90.0, 45.0, outward)
     heights, twists = [], []
     for elevation, inward in INTERNAL_ROTATION:
         turned = center.T @ swing(elevation, 90.0, outward)

@@ -15,10 +15,6 @@ from wholebody.figures.description import Articulated
 GAP = 0.004
 """Least distance of any two pieces in a named posture, metres; arms and legs move outwards if a build needs it."""
 
-_DOWN = np.array([0.0, 0.0, -1.0])
-_SPREAD_STEP = math.radians(1.0)
-_SPREAD_STEPS = 45
-
 
 class Attitude(NamedTuple):
     """Joint angles in degrees and the pitch of the pelvis; the lowest piece is then put on the ground.
@@ -80,12 +76,12 @@ def stand(figure: Articulated, attitude: Attitude) -> Array:
     q = figure.clamp(figure.with_joints(q, values))
     spread = [name for name in figure.joints if name.endswith(("shoulder_abduction", "hip_abduction"))]
     free = q
-    for _ in range(_SPREAD_STEPS):
+    for _ in range(45):
         close = _close_segments(figure, free)
         if not close:
             break
         moved = {
-            name: figure.joint_values(free)[name] + _SPREAD_STEP
+            name: figure.joint_values(free)[name] + math.radians(1.0)
             for name in spread
             if any(_moves(name, segment) for segment in close)
         }
@@ -122,7 +118,7 @@ def lowest(figure: Articulated, q: Array) -> float:
     geometry_data = pin.GeometryData(figure.geometry)
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
     return min(
-        -support(piece.geometry, placement, _DOWN)
+        -support(piece.geometry, placement, np.array([0.0, 0.0, -1.0]))
         for piece, placement in zip(figure.geometry.geometryObjects, geometry_data.oMg, strict=True)
     )
 

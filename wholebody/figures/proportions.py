@@ -26,23 +26,12 @@ DIMENSION = Range(0.0, 3.0, "m")
 FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
 
-OBSERVER = 0.002
-"""Metres by which two measurements of one person differ: it keeps dimensions that almost determine each other, such as
-sitting height, eye height and their difference, from contradicting by a millimetre (estimate)."""
-
-STATED = 0.0002
-"""Metres: a stated dimension that is off by this counts as one unit, one that follows counts by `TOLERANCE`."""
 
 MET = 0.001
 """Metres within which a stated dimension must be met."""
 
 SIZES = {"hand_length": "hand", "hand_breadth": "hand_breadth", "foot_length": "foot_length"}
 """Dimensions that are sizes of the body themselves, with the names of the sizes. Others are measured."""
-
-_P05_TO_P95 = 3.2897
-"""Standard deviations from the 5th to the 95th percentile of a normal distribution."""
-
-_ITERATIONS = 12
 
 
 def dimension_names() -> tuple[str, ...]:
@@ -122,7 +111,9 @@ def likely_change(person: Person, which: list[int], change: Array) -> Array:
             )
     from scipy.special import chdtri, ndtr  # loading it takes longer than loading a person, and few are asked for so
 
-    given = covariance[np.ix_(which, which)] + OBSERVER**2 * np.eye(len(which))
+    # Metres by which two measurements of one person differ: it keeps dimensions that almost determine each other, such
+    # as sitting height, eye height and their difference, from contradicting by a millimetre (estimate).
+    given = covariance[np.ix_(which, which)] + 0.002**2 * np.eye(len(which))
     gains = np.linalg.solve(given, change)
     if change @ gains > chdtri(len(which), 2.0 * ndtr(-FARTHEST)):
         raise InputError(
@@ -166,7 +157,8 @@ def _spread(name: str, dimension: str, column: str) -> float:
         if row["sex"] == column and row["dim"] == dimension:
             return float(row["sd"]) * (1.0 if name == "mass" else 0.01)
     row = next(row for row in table("dimensions") if row["name"] == name)
-    return (float(row[f"{column}95"]) - float(row[f"{column}5"])) / _P05_TO_P95
+    # Standard deviations from the 5th to the 95th percentile of a normal distribution.
+    return (float(row[f"{column}95"]) - float(row[f"{column}5"])) / 3.2897
 
 
 @lru_cache(maxsize=64)
@@ -182,7 +174,8 @@ def _sized(person: Person, sizes: Mapping[str, float], wanted: Mapping[str, floa
     """The person whose measured dimensions are nearest to the wanted ones: Gauss and Newton with one Jacobian."""
     free = [name for name in PRIORS if name not in DIRECT]
     names = list(wanted)
-    unit = np.array([STATED if name in stated else TOLERANCE for name in names])
+    # Metres: a stated dimension that is off by this counts as one unit, one that follows counts by `TOLERANCE`.
+    unit = np.array([0.0002 if name in stated else TOLERANCE for name in names])
     pull = np.diag([1.0 / PRIORS[name].spread for name in free])
 
     def made(x: Array) -> Person:
@@ -198,7 +191,7 @@ def _sized(person: Person, sizes: Mapping[str, float], wanted: Mapping[str, floa
     step = 1e-3
     slopes = np.column_stack([(off(x + step * axis) - start) / step for axis in np.eye(len(free))])
     rows = np.vstack([slopes, pull])
-    for _ in range(_ITERATIONS):
+    for _ in range(12):
         x = x + np.linalg.lstsq(rows, np.concatenate([-now, -pull @ x]), rcond=None)[0]
         now = off(x)
         if all(abs(value) < 1.0 for value, name in zip(now, names, strict=True) if name in stated):

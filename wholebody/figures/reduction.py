@@ -16,8 +16,6 @@ from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Descri
 from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticRange, MotionRange
 from wholebody.figures.self_pairs import drop_pairs
 
-_LOCKED = "locked together"
-
 
 class ReducedParts(NamedTuple):
     """The parts from which a smaller figure is made."""
@@ -107,7 +105,7 @@ def drop_rigid_pairs(geometry: pin.GeometryModel) -> list[ExcludedPair]:
         for number, pair in enumerate(geometry.collisionPairs)
         if pieces[pair.first].parentJoint == pieces[pair.second].parentJoint
     ]
-    return drop_pairs(geometry, together, _LOCKED)
+    return drop_pairs(geometry, together, "locked together")
 
 
 def _filtered(groups: Mapping[str, tuple[str, ...]], names: set[str]) -> dict[str, tuple[str, ...]]:

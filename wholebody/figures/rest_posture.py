@@ -29,11 +29,6 @@ LONGEST_STEP = 0.25
 DAMPING = 1e-4
 """Square metres added to the diagonal of the normal equations; larger = shorter steps along singular directions."""
 
-PATIENCE = 12
-"""Corrections without fewer overlaps or less depth after which the attempt from a start ends."""
-
-TRIES = 8
-"""Random starts, half-way from zero, if zero itself does not lead to a free posture."""
 
 BACK = (1.0, 0.5, 0.25)
 """Shares of the motion back to zero that are tried for each joint, while the posture stays free."""
@@ -75,7 +70,8 @@ def rest_posture(model: pin.Model, geometry: pin.GeometryModel, seed: int) -> Re
     if not len(begun.number) and not len(search.contacts(zero, APART).number):
         return RestPosture(zero, zero.copy(), (), ())
     best = search.away_from(zero)
-    for other in random_postures(model, TRIES, seed + 1):
+    # Random starts, half-way from zero, if zero itself does not lead to a free posture.
+    for other in random_postures(model, 8, seed + 1):
         if not len(best.left):
             break
         best = min(best, search.away_from(pin.interpolate(model, zero, other, 0.5)), key=_badness)
@@ -125,7 +121,8 @@ class _Parting:
             if best is None or _badness(found) < _badness(best) or not len(near.number):
                 best, since = found, 0
             since += 1
-            if not len(near.number) or since > PATIENCE:
+            # Corrections without fewer overlaps or less depth after which the attempt from a start ends.
+            if not len(near.number) or since > 12:
                 break
             q = self._corrected(q, near)
         assert best is not None

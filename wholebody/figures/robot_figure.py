@@ -25,9 +25,6 @@ from wholebody.figures.urdf.file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import SMALLEST
 
-DATA_KEPT = 4
-"""Number of Pinocchio's data objects in a scene with one problem."""
-
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
@@ -122,7 +119,7 @@ def check_size(model: pin.Model, path: Path) -> None:
     Raises:
         InputError: too many degrees of freedom.
     """
-    needed = DATA_KEPT * 4 * 8 * model.nv**3
+    needed = 4 * 4 * 8 * model.nv**3  # a scene with one problem has four of Pinocchio's data objects
     if needed > machine_memory():
         raise InputError(
             f"{path}: {model.nv} degrees of freedom need {needed / 1e9:.0f} GB, since Pinocchio keeps tables of their "

@@ -1,5 +1,5 @@
 """Geometry: shapes, convex pieces, contacts, penetration, sweeps."""
 
-from wholebody.geometry.guesses import fix_box_inflation
+from wholebody.geometry.memory_views import fix_box_inflation
 
 fix_box_inflation()

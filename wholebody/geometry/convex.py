@@ -17,8 +17,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.base.records import with_values
 from wholebody.geometry.closing import closed_up
-from wholebody.geometry.components import Component, enclosed_volume, split_components
-from wholebody.geometry.convexity import is_convex, passes_through_itself
+from wholebody.geometry.components import Component, enclosed_volume, is_convex, passes_through_itself, split_components
 from wholebody.geometry.hull import hull_piece, thickened
 from wholebody.geometry.mesh_cache import ConvexPieces, cached
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
@@ -26,19 +25,12 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 if TYPE_CHECKING:
     from wholebody.base.runner import Child
 
-CONVEX_VOLUME = 1e-4
-"""A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller."""
 
 HULL_VERTICES = (64, 48)
 """A hull of a whole mesh with more vertices than the first number gets as many as the second. With 32 the hulls of real
 robots have 12 % more volume than with all their vertices, with 48 they have 6 %, and with 64 they have 4 %. Contacts
 have more rows with more vertices."""
 
-TOLD_VOLUME = 0.01
-"""Share of added volume from which a note reports it."""
-
-DECOMPOSED_AT_MOST = 64
-"""Decompositions kept in memory: the same chair ten times in a scene is decomposed once."""
 
 _log = logging.getLogger(__name__)
 
@@ -104,7 +96,7 @@ def mesh_hull(vertices: ArrayLike, faces: ArrayLike, what: str = "mesh") -> Conv
         notes.append(f"{what}: its surface is not closed, so what its convex hull adds is not known")
         return ConvexPieces((piece,), 0.0, tuple(notes))
     added = max(piece.volume / solid - 1.0, 0.0)
-    if added > TOLD_VOLUME:
+    if added > 0.01:  # Share of added volume from which a note reports it.
         notes.append(f"{what}: its convex hull has {added:.0%} more volume")
     return ConvexPieces((piece,), added, tuple(notes))
 
@@ -137,7 +129,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array,
     return cloud, np.ascontiguousarray(whole)
 
 
-@lru_cache(maxsize=DECOMPOSED_AT_MOST)
+@lru_cache(maxsize=64)  # Decompositions kept in memory: the same chair ten times in a scene is decomposed once.
 def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: float, what: str) -> ConvexPieces:
     settings = f"decomposed and closed {max_vertices} {threshold!r} {coacd_version()}"
     return cached((vertices, faces), settings, what, lambda: _decompose(vertices, faces, max_vertices, threshold, what))
@@ -192,7 +184,8 @@ def _part_pieces(
         return _thickened(part.vertices, name, notes)
     if not part.closed:
         return _shell(part, name, notes)
-    if whole.volume - part.volume <= CONVEX_VOLUME * part.volume:
+    # A closed part counts as convex if its hull adds at most this share of its volume; float32 rounding is smaller.
+    if whole.volume - part.volume <= 1e-4 * part.volume:
         return [whole]
     pieces: list[Piece] = []
     for corners in _coacd(part, threshold, name, child):
@@ -245,12 +238,6 @@ _MEND = "repair the mesh where it passes through itself, or place its hull with 
 MOST_SECONDS = 40.0
 """Limit of CoACD for one part, seconds of the processor; the largest of real robots took a fraction of it."""
 
-CROSSING_SECONDS = 1.0
-"""The same for a part that passes through itself, of which CoACD often finds no end: for each ..."""
-
-CROSSING_TRIANGLES = 100
-"""... so many triangles that it has, or a part of them."""
-
 
 def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[Array]:
     if find_spec("coacd") is None:
@@ -261,7 +248,8 @@ def _coacd(part: Component, threshold: float, name: str, child: Child) -> list[A
     faces = part.faces.astype(np.int32)
     seconds = MOST_SECONDS
     if passes_through_itself(part.vertices, part.faces):
-        seconds = min(seconds, CROSSING_SECONDS * math.ceil(len(faces) / CROSSING_TRIANGLES))
+        # CoACD often finds no end of such a part: a second for each hundred triangles
+        seconds = min(seconds, float(math.ceil(len(faces) / 100)))
     try:
         asked = (run_coacd, seconds, np.asarray(part.vertices), faces, threshold)
         parts = child.call(limited, *asked, seconds=BY_THE_CLOCK * seconds)

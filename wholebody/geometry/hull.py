@@ -2,6 +2,10 @@
 
 coal's own ``ConvexBase.convexHull`` crashes the process on flat or collinear points and accepts NaN silently. So qhull
 computes the hulls through scipy, and everything is checked before coal gets it.
+
+A simpler hull around a hull, with fewer vertices.
+
+Dropping vertices would leave parts of the surface uncovered, and a posture could be free of contact and still inside.
 """
 
 from __future__ import annotations
@@ -16,19 +20,12 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
-from wholebody.geometry.simplified_hull import simplified_hull
 
 MOST_NEIGHBOURS = 255
 """Most edges at one vertex that coal can represent."""
 
 FEW = 1000
 """Number of points up to which duplicates are dropped before the hull is made; of more points qhull drops them."""
-
-MOST_LOOKED_AT = 1000
-"""Number of faces, those nearest to the middle, along whose normals the width of a hull is measured."""
-
-MANY_EDGES = 128
-"""Vertices of the hull that replaces one with too many edges at a vertex."""
 
 
 def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] | None = None) -> Piece:
@@ -52,7 +49,8 @@ def hull_piece(points: ArrayLike, what: str = "hull", vertices: tuple[int, int] 
     if vertices is not None and len(hull.vertices) > vertices[0]:
         hull = _solid_hull(simplified_hull(cloud[hull.vertices], vertices[1]), what)
     if np.bincount(hull.simplices.ravel()).max() > MOST_NEIGHBOURS:
-        hull = _solid_hull(simplified_hull(cloud[hull.vertices], MANY_EDGES), what)
+        # Vertices of the hull that replaces one with too many edges at a vertex.
+        hull = _solid_hull(simplified_hull(cloud[hull.vertices], 128), what)
     used = hull.vertices
     corners = hull.points[used]
     centre, _ = enclosing_ball(corners)
@@ -131,7 +129,8 @@ def _solid_hull(cloud: Array, what: str) -> Any:
     corners = cloud[hull.vertices]
     inside = -(hull.equations[:, :3] @ corners.mean(axis=0) + hull.equations[:, 3])
     if inside.min() < SMALLEST:  # no ball of that size is known to be inside: compute the width itself
-        thin = np.argsort(inside)[:MOST_LOOKED_AT]
+        # Number of faces, those nearest to the middle, along whose normals the width of a hull is measured.
+        thin = np.argsort(inside)[:1000]
         width = -(corners @ hull.equations[thin, :3].T + hull.equations[thin, 3]).min(axis=0)
         if width.min() < SMALLEST:
             raise InputError(f"{what}: the points are {width.min():.2g} m thick; give at least {SMALLEST} m")
@@ -172,3 +171,63 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
         centre = points[candidates].mean(axis=0)
         best = (candidates[-4:], centre, float(np.linalg.norm(points[candidates] - centre, axis=1).max()))
     return best
+
+
+SAME_NORMAL = 0.02
+"""Radians: of faces whose normals differ by less, only one is tried."""
+
+
+def simplified_hull(points: Array, max_vertices: int) -> Array:
+    """Vertices of a convex polytope that contains points and has few vertices.
+
+    The polytope begins as a box along the points' principal axes. Planes of the points' own hull then cut it: each time
+    the plane that cuts most off the farthest protruding vertex, as long as the number of vertices allows.
+
+    Args:
+        points: (n, 3), enclosing a volume.
+        max_vertices: most vertices, at least 8.
+
+    Returns:
+        (k, 3) vertices; those of the points' hull if they are few enough.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    hull = ConvexHull(points)
+    corners = points[hull.vertices]
+    if len(corners) <= max_vertices:
+        return np.asarray(corners)
+    inside = corners.mean(axis=0)
+    axes = np.linalg.svd(corners - inside, full_matrices=False)[2]
+    box = np.vstack([axes, -axes])
+    planes = np.column_stack([box, -(corners @ box.T).max(axis=0)])
+    best = _vertices(planes, inside)
+    faces = _apart(hull.equations)
+    for _ in range(len(faces)):
+        outside = best @ faces[:, :3].T + faces[:, 3]
+        vertex, plane = np.unravel_index(int(outside.argmax()), outside.shape)
+        if outside[vertex, plane] < SMALLEST:
+            break
+        planes = np.vstack([planes, faces[plane]])
+        try:
+            trial = _vertices(planes, inside)
+        except QhullError:  # nearly coincident planes: the present polytope already contains the points
+            break
+        if len(trial) > max_vertices:
+            break
+        best = trial
+    return np.asarray(best)
+
+
+def _apart(equations: Array) -> Array:
+    """Of thousands of faces, those whose normals differ: a rounded edge of a part in CAD has hundreds."""
+    if len(equations) <= 1000:  # Number of faces above which only some are tried.
+        return equations
+    _, first = np.unique(np.round(equations[:, :3] / SAME_NORMAL), axis=0, return_index=True)
+    return np.asarray(equations[np.sort(first)])
+
+
+def _vertices(planes: Array, inside: Array) -> Array:
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    found = HalfspaceIntersection(planes, inside).intersections
+    return np.asarray(found[ConvexHull(found).vertices])

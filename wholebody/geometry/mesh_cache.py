@@ -34,19 +34,11 @@ VARIABLE = "WHOLEBODY_CACHE"
 LARGEST_CACHE = 256 * 2**20
 """Largest size of the cache, bytes; a mesh as hull takes 3 kB, a decomposition 20 kB."""
 
-LEFT_AFTER_EVICTION = 0.75
-"""Share of `LARGEST_CACHE` that remains after eviction; the least recently used entries are removed first."""
 
 LOOKED_AT_EVERY = 64
 """Number of writes of a process between checks of the cache's size; the first write checks it too."""
 
-TOUCHED_EVERY = 3600.0
-"""Least seconds between two updates of an entry's time of use."""
 
-STALE = 600.0
-"""Seconds after which the temporary file of a killed process is removed."""
-
-_FORMAT = "1"
 _SUFFIX = ".pieces"
 _OTHER = ".made"
 _PART = ".part"
@@ -105,7 +97,7 @@ def cached(content: tuple[bytes, ...], settings: str, what: str, make: Callable[
         what: name of the mesh, with which all notes begin; the cache does not depend on it.
         make: makes the pieces.
     """
-    digest = hashlib.sha256("\0".join((_FORMAT, __version__, settings)).encode())
+    digest = hashlib.sha256("\0".join(("1", __version__, settings)).encode())
     for part in content:
         digest.update(hashlib.sha256(part).digest())
     path = cache_folder() / f"{digest.hexdigest()}{_SUFFIX}"
@@ -166,7 +158,8 @@ def _read(path: Path, unpacked: Callable[[bytes], T]) -> T | None:
         path.unlink(missing_ok=True)
         return None
     try:
-        if time.time() - path.stat().st_mtime > TOUCHED_EVERY:
+        # Least seconds between two updates of an entry's time of use.
+        if time.time() - path.stat().st_mtime > 3600.0:
             os.utime(path)
     except OSError:
         pass
@@ -195,7 +188,8 @@ def _evict(folder: Path) -> None:
     """Remove the least recently used entries if the cache is too large, and the files of killed processes."""
     for file in folder.glob(f"*{_PART}"):
         try:
-            if time.time() - file.stat().st_mtime > STALE:
+            # Seconds after which the temporary file of a killed process is removed.
+            if time.time() - file.stat().st_mtime > 600.0:
                 file.unlink(missing_ok=True)
         except OSError:
             continue
@@ -204,7 +198,8 @@ def _evict(folder: Path) -> None:
     if size <= LARGEST_CACHE:
         return
     for _, bytes_, file in files:
-        if size <= LEFT_AFTER_EVICTION * LARGEST_CACHE:
+        # Share of `LARGEST_CACHE` that remains after eviction; the least recently used entries are removed first.
+        if size <= 0.75 * LARGEST_CACHE:
             return
         try:
             file.unlink(missing_ok=True)

@@ -122,19 +122,16 @@ def object_penetrations(
         touching[owners[i], owners[j]].append((i, j))
     found = []
     for (a, b), pairs_of_both in touching.items():
-        allowed = pairs_of_both or _all_pairs(owners, a, b)
-        of_a, of_b = sorted({i for i, _ in allowed}), sorted({j for _, j in allowed})
+        allowed = np.array(pairs_of_both or _all_pairs(owners, a, b))
+        (of_a, row), (of_b, column) = (np.unique(allowed[:, side], return_inverse=True) for side in range(2))
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)
-        for i, j in allowed:
-            mask[of_a.index(i), of_b.index(j)] = True
+        mask[row, column] = True
         pieces_a, pieces_b = (
             [(geometry.geometryObjects[k].geometry, pin.SE3(placements[k, :3].T, placements[k, 3])) for k in of]
-            for of in (of_a, of_b)
+            for of in (of_a.tolist(), of_b.tolist())
         )
-        one = object_penetration(a, b, pieces_a, pieces_b, mask)
-        if one is not None:
-            found.append(one)
-    return sorted(found, key=lambda one: -float(np.linalg.norm(one.separation)))
+        found.append(object_penetration(a, b, pieces_a, pieces_b, mask))
+    return sorted(filter(None, found), key=lambda one: -float(np.linalg.norm(one.separation)))
 
 
 def _all_pairs(owners: Sequence[str], a: str, b: str) -> list[tuple[int, int]]:

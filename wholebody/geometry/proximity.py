@@ -15,8 +15,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import number
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
+from wholebody.geometry.memory_views import RESULT_DOUBLES, Guesses, fields, placement_view, read_result, result_view
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points
 

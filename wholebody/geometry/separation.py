@@ -23,15 +23,10 @@ from wholebody.geometry.minkowski import OVERLAP, ObjectPair, Placed, Sides
 TOUCHING = 1e-7
 """Overlap that counts as none in the search, metres; the answer is verified to `OVERLAP`."""
 
-MOST_NODES = 400
-"""Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof."""
-
 
 MOST_DESCENTS, MOST_ROWS = 30, 40
 """Most rounds of a local search, and rows of its QP; both are far fewer unless rounding causes cycles."""
 
-DETOUR = 1.5
-"""Largest length of a start of a local search, relative to the best known: the search shortens it."""
 
 SHORTEST = 2e-4
 """Least step of a march along a ray, metres; narrower free gaps may be missed."""
@@ -103,7 +98,8 @@ def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:
     limit = np.inf if best is None else float(best @ best)
     queue: list[tuple[float, int, _Node]] = [(0.0, 0, _ROOT)]
     made = 0
-    for _ in range(MOST_NODES):
+    # Nodes branched before the best known translation is returned: time, about a millisecond a node, against proof.
+    for _ in range(400):
         if not queue:
             return best, best is not None
         _, _, node = heapq.heappop(queue)
@@ -178,7 +174,8 @@ def _descents(pairs: ObjectPair, best: Array, escapes: Array) -> Array:
     lengths = np.linalg.norm(escapes, axis=1)
     for escape, length in zip(escapes, lengths, strict=True):
         if length > 0.0:
-            reach = min(float(length), DETOUR * float(np.linalg.norm(best)))
+            # Largest length of a start of a local search, relative to the best known: the search shortens it.
+            reach = min(float(length), 1.5 * float(np.linalg.norm(best)))
             free = _first_free(pairs, escape / length, reach)
             if free is not None:
                 best = min(best, _descent(pairs, free), key=lambda t: float(t @ t))

@@ -24,9 +24,6 @@ from wholebody.geometry.meshes import GLTF, Y_UP, read_mesh
 from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
 from wholebody.geometry.placement import unit_vector
 
-MOST_CORNERS = 2**31
-"""Greatest index of a vertex."""
-
 SIDES = 64
 """Sides of the prism that stands for a cylinder: 64 are 0.12 % of the radius too far out; fewer are coarser."""
 
@@ -346,7 +343,7 @@ class Mesh(Shape):
         elif isinstance(self.source, (tuple, list)) and len(self.source) == 2:
             vertices = array(self.source[0], "Mesh vertices", "an array of shape (n, 3)")
             corners = array(self.source[1], "Mesh faces", "an array of shape (m, 3)")
-            if not (np.abs(corners) <= MOST_CORNERS).all():
+            if not (np.abs(corners) <= 2**31).all():  # Greatest index of a vertex.
                 raise InputError("Mesh faces: not every value is an index of a vertex; give whole numbers")
             faces = corners  # type: ignore[assignment]
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from wholebody.base.lazy import exported
+from wholebody.base.imports import exported
 
 if TYPE_CHECKING:
     from wholebody.methods.ccd.method import CCD

@@ -31,8 +31,7 @@ from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import Place, find_place
 from wholebody.tasks.point import Point
-from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, TwistRow
-from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.range_of_motion import CoupledRow, RangeOfMotion, ReachCones, TwistRow
 
 CLEAR = 1e-4  # m, rad: smaller differences are left to the search
 NEAREST = 1.02  # factor on the least possible goal error, up to which a posture counts as the nearest

@@ -17,7 +17,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.soles import GroundForces, Soles, ground_forces
-from wholebody.tasks.support import convex_polygon, edges
+from wholebody.tasks.balance import convex_polygon, edges
 
 ROOT = 6  # degrees of freedom of a free root
 LIGHT = 0.2

@@ -13,7 +13,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import FEET, StanceFeet, foot_points, standing
-from wholebody.tasks.support import low_points
+from wholebody.tasks.balance import low_points
 
 SPREAD_CORNERS = 12
 """Most points of one foot: the outermost ones in as many directions. Fewer cut off the ends of a rounded sole."""

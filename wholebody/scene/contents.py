@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from wholebody.figures.figure import Figure
 
-FARTHEST_LIKELY = 100.0  # m: a thing farther than this from the origin is probably placed in millimetres
 WIDEST_LIKELY, THICKEST_LIKELY = 100.0, 2.0  # m: a wider thing is probably in a smaller unit, unless it is a thin floor
 SHAPES = "give wb.Box, wb.Sphere, wb.Mesh or another"
 
@@ -318,7 +317,8 @@ class SceneContents(checks.FixedAttributes):
 
 def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> None:
     """Warn of a place and a size that are hardly metres."""
-    if (far := float(max(abs(place.translation)))) > FARTHEST_LIKELY:
+    # m: a thing farther than this from the origin is probably placed in millimetres
+    if (far := float(max(abs(place.translation)))) > 100.0:
         told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
         checks.warn(told)
     extent = _extent(shape)

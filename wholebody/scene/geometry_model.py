@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-RESTING = 1e-3  # m: a carried thing nearer than this to a segment in the first posture rests on it
-
 
 @dataclass(frozen=True)
 class Motion:
@@ -264,19 +262,7 @@ def _leaning(
     segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
     tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
     joint_of = dict(zip(segments, joints[:count], strict=True))
-    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
-    probe = geometry_model(pieces[: held[-1] + 1])
-    for second in held:
-        for first in range(count):
-            if joints[first] != joints[second]:
-                probe.addCollisionPair(pin.CollisionPair(first, second))
-    rest = figure.posture(figure.postures[0])
-    data = figure.model.createData()
-    pin.forwardKinematics(figure.model, data, rest)
-    touching = {
-        (owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), RESTING).pair
-    }
-
+    touching = _touching_at_rest(figure, pieces, body, joints, owners, carried)
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():
         # A thing rests on things that were attached before it, whose pieces come first.
@@ -289,3 +275,25 @@ def _leaning(
             elif (segment, name) in touching and not any(frozenset((segment, other)) in tested for other in near):
                 found[segment, name] = f"a neighbour of {thing.segment} that it leans on in {figure.postures[0]!r}"
     return found
+
+
+def _touching_at_rest(
+    figure: Figure,
+    pieces: list[pin.GeometryObject],
+    body: int,
+    joints: NDArray[np.int_],
+    owners: list[str],
+    carried: Mapping[str, SceneObject],
+) -> set[tuple[str, str]]:
+    """Pairs (segment, carried thing) that touch in the figure's first posture."""
+    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
+    probe = geometry_model(pieces[: held[-1] + 1])
+    for second in held:
+        for first in range(len(figure.geometry.geometryObjects)):
+            if joints[first] != joints[second]:
+                probe.addCollisionPair(pin.CollisionPair(first, second))
+    rest = figure.posture(figure.postures[0])
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, rest)
+    # m: a carried thing nearer than this to a segment in the first posture rests on it
+    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), 1e-3).pair}

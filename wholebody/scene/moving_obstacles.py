@@ -20,10 +20,6 @@ from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 
-APPROACH = 0.25
-"""Share of the width of two pieces by which one may come into the other before the figure gives way. More = fewer steps
-a frame; from a half on a figure may be pushed out on the far side."""
-
 LEAST_APPROACH, LARGEST_APPROACH = 5e-4, 0.02  # m: the same at least, and at most: rows are of first order only
 MOST_SHARES = 128  # of a frame; what is too fast for them comes in deeper, and is found by the sweep
 
@@ -115,7 +111,9 @@ class FrameMotion:
         """
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)
-        room = np.clip(APPROACH * table.widths[near.number], LEAST_APPROACH, LARGEST_APPROACH)
+        # Share of the width of two pieces by which one may come into the other before the figure gives way. More =
+        # fewer steps a frame; from a half on a figure may be pushed out on the far side.
+        room = np.clip(0.25 * table.widths[near.number], LEAST_APPROACH, LARGEST_APPROACH)
         room += np.maximum(near.distance, 0.0)
         least = float((room / np.maximum(coming, 1e-12)).min(initial=np.inf))
         step = min(least, (max(within, 0.0) + LEAST_APPROACH) / max(self._fastest, 1e-12))

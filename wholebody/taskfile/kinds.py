@@ -15,7 +15,7 @@ from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.proportions import DIMENSION
 from wholebody.geometry.placement import unit_vector
-from wholebody.scene.matter.joints import BallJoint, Hinge
+from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.taskfile.where import Where
 from wholebody.tasks import inputs
 from wholebody.tasks.inputs import FARTHEST

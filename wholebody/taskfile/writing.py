@@ -20,7 +20,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Mesh
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneObject
-from wholebody.scene.matter.joints import BallJoint
+from wholebody.scene.matter.body import BallJoint
 from wholebody.scene.scene import Scene
 from wholebody.taskfile.kinds import JOINTS
 from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES

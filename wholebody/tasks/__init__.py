@@ -6,19 +6,16 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.center_of_mass import CenterOfMass
 from wholebody.tasks.discomfort import Discomfort
-from wholebody.tasks.distance import Displacement, Effort
-from wholebody.tasks.frame import Frame, Orientation
+from wholebody.tasks.distance import Displacement, Effort, RotationEffort
+from wholebody.tasks.frame import Frame, Orientation, Relative
 from wholebody.tasks.grasp import Grasp
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.plane import Plane
 from wholebody.tasks.point import Point
 from wholebody.tasks.posture import Posture
 from wholebody.tasks.potential_energy import PotentialEnergy
-from wholebody.tasks.range_of_motion import RangeOfMotion
-from wholebody.tasks.reach_cones import ReachCones
-from wholebody.tasks.relative import Relative
+from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm
-from wholebody.tasks.rotation_effort import RotationEffort
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
 from wholebody.tasks.touch import Lean, Touch

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Annotated, TypeAlias
+from math import hypot
+from typing import Annotated, Any, TypeAlias
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
@@ -14,7 +16,121 @@ from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
-from wholebody.tasks.support import convex_polygon, edges, shrunk, standing_points
+from wholebody.tasks.surfaces import outermost
+
+STANDING_HEIGHT = 0.01
+"""Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
+
+
+NEAREST = 1e-5
+"""Distance [m] below which two points count as one corner."""
+
+
+def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:
+    """Points (n, 3) on which the feet stand at the posture q: the lowest corners of their pieces.
+
+    Child segments of a foot, such as toes, belong to it.
+
+    Raises:
+        UnknownNameError: the figure has no such foot.
+        InputError: a foot has no pieces.
+    """
+    state = State(scene.model).update(q)
+    points = []
+    for foot in feet:
+        joint = inputs.find_place(scene, foot, "Balance").joint
+        pieces = [piece for piece in scene.geometry.geometryObjects if joint in scene.model.supports[piece.parentJoint]]
+        if not pieces or joint == 0:
+            raise InputError(f"Balance: {foot!r} has no pieces to stand on; name segments with geometry as feet")
+        lows = np.vstack(
+            [low_points(piece.geometry, state.data.oMi[piece.parentJoint] * piece.placement) for piece in pieces]
+        )
+        points.append(lows[lows[:, 2] <= lows[:, 2].min() + STANDING_HEIGHT])
+    return np.vstack(points)
+
+
+def low_points(geometry: Any, placement: pin.SE3) -> Array:
+    """Candidates (n, 3) for the lowest points of a piece: all corners, or the lowest points of its balls.
+
+    Args:
+        geometry: a coal shape.
+        placement: of its origin in the world.
+    """
+    return outermost(geometry, placement, np.array((0.0, 0.0, -1.0)))
+
+
+def convex_polygon(points: Array) -> Array:
+    """Corners (k, 2) of the convex hull of points (n, 2), anticlockwise.
+
+    Raises:
+        InputError: the points lie on a line.
+    """
+    flat = np.round(points[:, :2], 6)
+    corners = flat[hull_corners(flat)].reshape(-1, 2)
+    if len(corners) < 3 or least_width(corners) < 1e-4:  # Width [m] below which a polygon counts as a line.
+        raise InputError(
+            "Balance: the feet stand on a line, not an area; name more feet, or load a figure with more detail"
+        )
+    return corners
+
+
+def hull_corners(points: Array) -> list[int]:
+    """Indices of the corners of the convex hull of points (n, 2), anticlockwise; none where they lie on a line.
+
+    Andrew's monotone chain (1979, "Another efficient algorithm for convex hulls in two dimensions"), on micrometres: an
+    edge between two points that differ by rounding alone would have no direction.
+    """
+    order = sorted(range(len(points)), key=lambda k: (round(float(points[k, 0]), 6), round(float(points[k, 1]), 6)))
+
+    def half(indices: list[int]) -> list[int]:
+        chain: list[int] = []
+        for k in indices:
+            while len(chain) > 1:
+                (ax, ay), (bx, by), (x, y) = points[chain[-2]], points[chain[-1]], points[k]
+                # Height [m] of a corner over the line through its neighbours below which it is no corner.
+                if (bx - ax) * (y - ay) - (by - ay) * (x - ax) > 1e-6 * hypot(x - ax, y - ay):
+                    break
+                chain.pop()
+            if not chain or hypot(*(points[k] - points[chain[-1]])) > NEAREST:
+                chain.append(k)
+        return chain
+
+    lower, upper = half(order), half(order[::-1])
+    corners = list(dict.fromkeys(lower[:-1] + upper[:-1]))
+    return corners if len(corners) > 2 else []
+
+
+def edges(corners: Array) -> tuple[Array, Array]:
+    """Inward unit normals (k, 2) and offsets (k,) of a convex polygon: inside, normals @ x >= offsets."""
+    along = np.roll(corners, -1, axis=0) - corners
+    normals = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+    return normals, np.einsum("ij,ij->i", normals, corners)
+
+
+def shrunk(corners: Array, margin: float) -> Array:
+    """Corners (m, 2) of the polygon with a margin cut off on every side; empty if nothing remains.
+
+    Clips by one edge after the other (Sutherland and Hodgman 1974, "Reentrant polygon clipping").
+    """
+    rest = corners
+    for normal, offset in zip(*edges(corners), strict=True):
+        inside = rest @ normal - offset - margin
+        kept = []
+        for i in range(len(rest)):
+            a, b = inside[i - 1], inside[i]
+            if (a >= 0.0) != (b >= 0.0):
+                kept.append(rest[i - 1] + (rest[i] - rest[i - 1]) * (a / (a - b)))
+            if b >= 0.0:
+                kept.append(rest[i])
+        rest = np.array(kept).reshape(-1, 2)
+    return rest
+
+
+def least_width(corners: Array) -> float:
+    """Least extent of a polygon over the directions of its normals."""
+    normals, offsets = edges(corners)
+    return float((corners @ normals.T - offsets).max(axis=0).min())
+
 
 Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
 Margin: TypeAlias = Annotated[float, Range(0.0, 1.0, "m")]

@@ -20,8 +20,6 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
-RING = 8  # least number of pieces of a ring
-STRAIGHT = 0.25  # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
 LEVEL = 0.1  # sine of the angle to a ring's axis below which a direction names no place of the rim
 
 
@@ -56,7 +54,7 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
         Its axes are the ring's own, the direction outwards in the ring's plane, and that of the rim; `half` the size of
         what counts as straight.
     """
-    if len(thing.shapes) < RING:
+    if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
     middles = []
     for k, shape in enumerate(thing.shapes):
@@ -80,7 +78,8 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
     e = level / np.linalg.norm(level)
     at = thing.placed(0, state)
     local = np.array([n, e, np.cross(n, e)]) @ at.rotation
-    return Face(thing, at.actInv(center + radius * e), local, np.array([0.0, 0.0, STRAIGHT * radius]))
+    # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
+    return Face(thing, at.actInv(center + radius * e), local, np.array([0.0, 0.0, 0.25 * radius]))
 
 
 class Crossing(NamedTuple):

@@ -22,7 +22,6 @@ from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, 
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance
-MOST_OF_PART = 3 * MOST_FACES  # planes: more than one part ever has
 PLANES_WITHIN = 0.02  # m: surfaces farther apart are not about to slide along each other
 
 
@@ -333,7 +332,8 @@ def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:
     for number, part in enumerate(parts):
         if isinstance(part, Bounded):
             planes = part.planes(state)
-            found.append(with_values(planes, key=planes.key + MOST_OF_PART * number, bend_row=planes.bend_row + row))
+            # planes: more than one part ever has
+            found.append(with_values(planes, key=planes.key + 3 * MOST_FACES * number, bend_row=planes.bend_row + row))
         row += len(part.in_radians)
     return SupportingPlanes(*(np.concatenate(each) for each in zip(*found, strict=True)))
 

@@ -10,22 +10,18 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
-from wholebody.tasks.balance import Balance
+from wholebody.tasks.balance import Balance, convex_polygon, least_width, standing_points
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings
 from wholebody.tasks.bounds import Freeze
 from wholebody.tasks.distance import Effort
 from wholebody.tasks.hold import Hold
-from wholebody.tasks.range_of_motion import RangeOfMotion
-from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 from wholebody.tasks.rhythm import Rhythm, girdles_of
 from wholebody.tasks.sit import Sit
 from wholebody.tasks.stand import Stand
-from wholebody.tasks.support import convex_polygon, least_width, standing_points
 from wholebody.tasks.touch import Lean
 
 FEET = ("left_foot", "right_foot")
-AS_AT_START = 1e-3
-"""m, rad: a foot held this near to its place at the start stands where the support polygon is computed."""
 
 STEADY = 0.15
 """Least distance of the centre of mass from the edges of the support polygon, as a share of the polygon's least width:
@@ -122,7 +118,8 @@ def stands(
         if not isinstance(term, Hold) or term.residual.base.frame:
             continue
         joint = term.residual.place.joint
-        if joint not in feet or np.abs(term.value(state)).max() > AS_AT_START:
+        # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
+        if joint not in feet or np.abs(term.value(state)).max() > 1e-3:
             return False
         held.add(joint)
     return held == feet

@@ -1,4 +1,4 @@
-"""Weighted squared distance of a posture from another, and the measures that are one: `Effort` and `Displacement`."""
+"""Weighted squared distance of a posture from another, and the measures that are one: efforts and `Displacement`."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
@@ -132,3 +133,150 @@ class Displacement(DistanceMeasure):
         """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
         return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
+
+
+SAME = 1e-9
+"""Metres between the centres of hinges, and cosine of the angle between their axes: rounding of a model's file."""
+
+
+class BallJoint(NamedTuple):
+    """Three hinges with one centre, whose axes are at right angles where all three angles are zero.
+
+    Attributes:
+        idx_q: places in the posture.
+        idx_v: the same in the tangent.
+        axes: (3, 3) a hinge's axis a row, in what carries the first hinge, where the angles are zero.
+        weights: (3,) of the rotation vector's part along each axis, not negative.
+        start: (3, 3) rotation of the last hinge against that of zero angles, at the start.
+    """
+
+    idx_q: tuple[int, int, int]
+    idx_v: tuple[int, int, int]
+    axes: Array
+    weights: Array
+    start: Array
+
+    def turn(self, q: Array) -> tuple[Array, Array]:
+        """Rotation (3, 3) at a posture, and the hinges' axes there (3, 3), an axis a column."""
+        rotation, axes = np.eye(3), np.empty((3, 3))
+        for k, place in enumerate(self.idx_q):
+            axes[:, k] = rotation @ self.axes[k]
+            rotation = rotation @ pin.exp3(self.axes[k] * float(q[place]))
+        return rotation, axes
+
+    def residuals(self, q: Array) -> tuple[Array, Array]:
+        """Weighted parts of the rotation vector (3,), and their derivatives (3, 3) by the three angles.
+
+        With v the rotation vector of the rotation from the start, dv = J_l^-1(v) sum_k axis_k dq_k; J_l^-1 is the
+        inverse left Jacobian of SO(3), the transpose of the right one (Chirikjian 2011, section 10.6).
+        """
+        rotation, axes = self.turn(q)
+        away = rotation @ self.start.T
+        share = np.sqrt(self.weights)[:, None] * self.axes
+        return share @ pin.log3(away), share @ pin.Jlog3(away).T @ axes
+
+
+@dataclass(frozen=True, eq=False)
+class RotationEffort(Measure):
+    """Squared displacement of every joint from the start, a ball joint's by its rotation vector [rad^2].
+
+    ``sum_i gamma_i d_i^2`` as in `Effort`, with the same weights; but of three hinges with one centre (shoulder, hip, a
+    level of the spine) d is the rotation vector ``log(R R_start')`` along the hinges' axes at zero angles. It depends
+    on the rotation alone: where two of the hinges' axes coincide, as in the T-pose, a turn of both that leaves the arm
+    where it is costs nothing. It has a kink where a joint is turned by 180 degrees from the start.
+
+    It is a sum of squares (see `Measure.squares`). For a figure without ball joints it is `Effort`.
+
+    Attributes:
+        weight: factor on the measure [1/rad^2].
+        balls: the ball joints, once resolved.
+        others: the start, and the weights of all other degrees of freedom; once resolved.
+    """
+
+    weight: inputs.Weight = 1.0
+    balls: tuple[BallJoint, ...] = field(init=False, repr=False)
+    others: SquaredDistance = field(init=False, repr=False)
+
+    def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:
+        """Find the ball joints, and store the start."""
+        weights = np.array(scene.figure.effort_weights, dtype=float)
+        balls = ball_joints(scene.model, start, weights)
+        for ball in balls:
+            weights[list(ball.idx_v)] = 0.0
+        return filled(self, balls=balls, others=SquaredDistance.build(scene.model, start, weights))
+
+    def value(self, state: State) -> float:
+        """The measure."""
+        total = self.others.value(state)
+        for ball in self.balls:
+            residuals = ball.residuals(state.q)[0]
+            total += float(residuals @ residuals)
+        return total
+
+    def gradient(self, state: State) -> Array:
+        """(nv,) derivative [rad]."""
+        result: Array = self.others.gradient(state).copy()
+        for ball in self.balls:
+            residuals, rows = ball.residuals(state.q)
+            result[list(ball.idx_v)] += 2.0 * residuals @ rows
+        return result
+
+    def curvature(self, state: State) -> Array:
+        """(nv,) that of the other joints, and row sums of the squares' second derivative of Gauss and Newton."""
+        result: Array = self.others.curvature.copy()
+        for ball in self.balls:
+            steep = np.abs(ball.residuals(state.q)[1])
+            result[list(ball.idx_v)] = 2.0 * steep.T @ steep.sum(axis=1) + LEAST_CURVATURE
+        return result
+
+    def squares(self, state: State) -> tuple[Array, Array]:
+        """Residuals (k,) and their derivatives (k, nv): of each ball joint, then of the other joints that count."""
+        residuals, rows = self.others.squares(state)
+        made = np.zeros((3 * len(self.balls), state.model.nv))
+        found = np.zeros(len(made))
+        for k, ball in enumerate(self.balls):
+            found[3 * k : 3 * k + 3], made[3 * k : 3 * k + 3, list(ball.idx_v)] = ball.residuals(state.q)
+        return np.concatenate([found, residuals]), np.vstack([made, rows])
+
+
+def ball_joints(model: Any, start: Array, weights: Array) -> tuple[BallJoint, ...]:
+    """The ball joints of a model: three hinges in a row with one centre and axes at right angles.
+
+    Args:
+        model: Pinocchio's model.
+        start: (nq,) posture from which rotations count.
+        weights: (nv,) of the degrees of freedom.
+    """
+    state = State(model).update(pin.neutral(model))
+    jacobian = pin.computeJointJacobians(model, state.data, state.q)
+    found: list[BallJoint] = []
+    taken: set[int] = set()
+    for first in range(1, model.njoints):
+        chain = _hinges_of_one_centre(model, first)
+        if len(chain) < 3 or taken & set(chain):
+            continue
+        joints = [model.joints[joint] for joint in chain]
+        carrier = state.data.oMi[model.parents[first]].rotation
+        axes = np.array([carrier.T @ jacobian[3:, joint.idx_v] for joint in joints])
+        if np.abs(axes @ axes.T - np.eye(3)).max() > SAME:
+            continue
+        taken |= set(chain)
+        a, b, c = joints
+        idx_q, idx_v = (a.idx_q, b.idx_q, c.idx_q), (a.idx_v, b.idx_v, c.idx_v)
+        ball = BallJoint(idx_q, idx_v, axes, weights[list(idx_v)], np.eye(3))
+        found.append(with_values(ball, start=ball.turn(start)[0]))
+    return tuple(found)
+
+
+def _hinges_of_one_centre(model: Any, first: int) -> list[int]:
+    """A hinge and at most two after it in a row, as long as all have one centre."""
+    chain: list[int] = []
+    after = [first]
+    while len(chain) < 3 and len(after) == 1:
+        joint = model.joints[after[0]]
+        centred = not chain or np.abs(model.jointPlacements[after[0]].translation).max() < SAME
+        if not centred or (joint.nq, joint.nv) != (1, 1) or "JointModelR" not in joint.shortname():
+            break
+        chain += after
+        after = [k for k in range(1, model.njoints) if model.parents[k] == chain[-1]]
+    return chain

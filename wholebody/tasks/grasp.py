@@ -27,10 +27,8 @@ from wholebody.tasks.touch import check_apart
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
-LONG = 2.0  # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
 CLOSING = 0.1  # m: distance of the farthest of fingertips from which they begin to oppose the thumb
 CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
-TILTED = pi / 4  # rad: of the palm from straight down, up or level, for the three ways of approach
 APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
 
@@ -129,7 +127,8 @@ class Grasp(ContactTerm):
         if self.approach is not None:
             height = APPROACHES[self.approach]
             up = np.array((0.0, 0.0, height or 1.0))
-            parts.append(Looking(place, up, TILTED, level=not height))
+            # rad: of the palm from straight down, up or level, for the three ways of approach
+            parts.append(Looking(place, up, pi / 4, level=not height))
         return filled(self, parts=tuple(parts), touches=owner_pairs(segments_beyond(scene, place.joint), thing.owners))
 
     def _palm(
@@ -200,7 +199,8 @@ class Grasp(ContactTerm):
             )
         )
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
-        if bar is not None and (self.along is not None or bar.half[2] > LONG * bar.half[1]):
+        # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
+        if bar is not None and (self.along is not None or bar.half[2] > 2.0 * bar.half[1]):
             low, high = self._room(float(bar.half[2]))
             lengthwise = with_values(bar, axes=bar.axes[::-1])
             tip = inputs.find_place(scene, f"{self._side}_index_tip", where)

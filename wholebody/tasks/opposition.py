@@ -23,7 +23,6 @@ from wholebody.tasks.contact_parts import Gap
 from wholebody.tasks.surfaces import Surface, between_pieces, nearest
 
 STEP = 1e-4  # m, rad: half of the differences that the derivative of a normal is made of
-ROUND = 0.9  # share of a box's least half size by which its edges are rounded, so that normals turn on its faces
 SHORTEST = 1e-6  # length of a mean normal, and sine of an angle, below which they have no direction
 
 AHEAD, BEHIND = ([pin.exp6(sign * STEP * axis) for axis in np.eye(6)] for sign in (1.0, -1.0))
@@ -103,7 +102,8 @@ def rounded(thing: Surface) -> Surface:
     for shape in thing.shapes:
         if isinstance(shape, coal.Box):
             half = np.asarray(shape.halfSide)
-            half = half - ROUND * half.min()
+            # share of a box's least half size by which its edges are rounded, so that normals turn on its faces
+            half = half - 0.9 * half.min()
             shapes.append(coal.Box(*(2.0 * half)))
         else:
             shapes.append(shape)

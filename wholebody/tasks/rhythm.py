@@ -17,12 +17,6 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
-CLAVICLE_RISE = math.radians(13.0)
-"""Elevation of the clavicle where the arm is level, and twice that where it is overhead, radians: 13 degrees times
-1 - cos(elevation), which stays within 4 degrees of 0.2 (elevation - 30 degrees). The scapula turns upward by 0.43
-degrees for each of the arm in its socket (Braman et al. 2009, Journal of Shoulder and Elbow Surgery 18(6)), about half
-of it at the inner end of the clavicle: ESTIMATE."""
-
 LUMBAR_MOST, LUMBAR_RATE = math.radians(46.0), 2.5
 """Flexion of the lumbar spine while the pelvis tips forward: 46 degrees times tanh(2.5 sin(tilt)). Lumbar to hip motion
 of 1.9, 0.9 and 0.4 in the three thirds of bending by 90 degrees (Esola et al. 1996, Spine 21(1)) is met to 3 degrees.
@@ -163,7 +157,11 @@ class Rhythm(Measure):
 def girdles_of(figure: Figure) -> tuple[Elevation, ...]:
     """The clavicles of a figure that has their arms too."""
     parts = ("clavicle_elevation", "shoulder_flexion", "shoulder_abduction")
-    return _elevations(figure, parts, CLAVICLE_WEIGHT, CLAVICLE_RISE, 0.0)
+    # Elevation of the clavicle where the arm is level, and twice that where it is overhead, radians: 13 degrees times 1
+    # - cos(elevation), which stays within 4 degrees of 0.2 (elevation - 30 degrees). The scapula turns upward by 0.43
+    # degrees for each of the arm in its socket (Braman et al. 2009, Journal of Shoulder and Elbow Surgery 18(6)), about
+    # half of it at the inner end of the clavicle: ESTIMATE.
+    return _elevations(figure, parts, CLAVICLE_WEIGHT, math.radians(13.0), 0.0)
 
 
 def _knees(figure: Figure, start: Array) -> tuple[Elevation, ...]:

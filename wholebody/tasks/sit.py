@@ -19,8 +19,6 @@ from wholebody.tasks.surfaces import Surface, face, joined, surface
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
-AT_BACK = 0.06  # m: how far the pelvis may be from the back; more, and the figure slouches
-DEEP = 0.01  # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +71,8 @@ class Sit(ContactTerm):
             raise InputError(f"{where}: {shown(self.pelvis)} has no pieces to sit on; name a segment with geometry")
         thing = surface(scene, self.on, where)
         edge = np.maximum(seat.half - np.minimum(MARGIN, 0.5 * seat.half), 0.0)
-        deep = _depth(scene, self.pelvis, place) + DEEP
+        # m: how much higher than on the deepest point of the pelvis and thighs the pelvis may sit
+        deep = _depth(scene, self.pelvis, place) + 0.01
         over = Over(place, seat, np.append(-edge, -np.inf), np.append(edge, deep))
         left = _rest(scene, place).T @ np.array((0.0, 1.0, 0.0))
         parts: list[Part] = [Gap(bottom, thing, seat), over]
@@ -87,7 +86,8 @@ class Sit(ContactTerm):
             rest = face(scene, self.back, _level(middle - _middle(at_back, state, middle, where), where), state, where)
             to_left = _level(np.cross(UP, rest.at(state)[1][2]), where)
             lower = joined(scene, self.pelvis, [self.pelvis])
-            parts += [Gap(upper, at_back, rest), Near(lower, at_back, AT_BACK, rest)]
+            # m: how far the pelvis may be from the back; more, and the figure slouches
+            parts += [Gap(upper, at_back, rest), Near(lower, at_back, 0.06, rest)]
             parts += [Facing(place, across(left), rest, rest.at(state)[1] @ to_left)]
             touches += owner_pairs([*upper.owners, *lower.owners], at_back.owners)
         return filled(self, parts=tuple(parts), touches=touches)
@@ -129,7 +129,7 @@ def _thighs(scene: Surroundings, pelvis: inputs.Place, trunk: inputs.Place) -> l
 
 def _depth(scene: Surroundings, name: str, place: inputs.Place) -> float:
     """How far the pelvis reaches below its origin when it is upright, metres."""
-    from wholebody.tasks.support import low_points
+    from wholebody.tasks.balance import low_points
 
     figure = scene.figure
     state = State(scene.model).update(figure.posture(figure.postures[0]))

@@ -14,11 +14,10 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
-from wholebody.tasks.balance import Feet, Margin
+from wholebody.tasks.balance import STANDING_HEIGHT, Feet, Margin, hull_corners, low_points
 from wholebody.tasks.base import Constraint, SupportingPlanes, Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs, planes_of
 from wholebody.tasks.sit import UP
-from wholebody.tasks.support import STANDING_HEIGHT, hull_corners, low_points
 from wholebody.tasks.surfaces import face, segments_beyond, surface
 
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon

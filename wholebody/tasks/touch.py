@@ -18,8 +18,6 @@ from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ROUND_DEPTH, ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
 from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
 
-ON_SURFACE = 1e-6  # m: a point this near to a surface of its own piece is on it
-
 
 @dataclass(frozen=True, eq=False)
 class Touch(ContactTerm):
@@ -134,7 +132,8 @@ def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
         there = place.actInv(point.fixed.translation)
         low, high = swept.points.min(axis=0), swept.points.max(axis=0)
         center = np.clip(there, low, high)  # a sphere's centre, or the segment of a capsule along its own axis
-        if abs(float(np.linalg.norm(there - center)) - swept.radius) <= ON_SURFACE:
+        # m: a point this near to a surface of its own piece is on it
+        if abs(float(np.linalg.norm(there - center)) - swept.radius) <= 1e-6:
             basis = across(place.rotation @ (there - center) / float(np.linalg.norm(there - center)))
             room = float(np.sqrt(ROUND_DEPTH * swept.radius))  # |rows| <= sqrt(2 r d), each the root of half of that
             return RoundEnd(place.act(center), basis[:2], room)

@@ -10,7 +10,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.tasks.base import Constraint
 from wholebody.terms.linearisation import NO_JOINTS, NO_LIMITS, NO_WRENCHES, compiled_kernel
-from wholebody.terms.plan import checked_count, make_plan
+from wholebody.terms.plan import Terms, checked_count, make_plan
 
 
 class ConstraintValues:
@@ -19,7 +19,7 @@ class ConstraintValues:
     def __init__(self, constraints: Sequence[Constraint], state: State) -> None:
         """Take resolved constraints; `state` tells how many rows terms of one's own have, and stays where it is."""
         self._kernel = compiled_kernel()
-        self._plan = plan = make_plan(NO_LIMITS, (), constraints, (), (), None, state)
+        self._plan = plan = make_plan(NO_LIMITS, Terms(constraints=constraints), None, state)
         self._model, rows, nv = state.model, plan.value_rows, state.model.nv
         self._wrench, self._jacobian = np.empty((rows, 6)), np.empty((rows, nv))
         self._value, self._box, self._measure = np.empty(rows), np.empty((2, nv)), np.empty((2, nv + 1))

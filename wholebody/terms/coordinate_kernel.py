@@ -179,7 +179,7 @@ def rhythms(
 
 @compiled(inner=True, error_model="numpy")
 def balls(tables: Array, places: Integers, q: Array, measure: Array, squares: Array, first: int) -> None:
-    """Ball joints, see `tasks.rotation_effort.BallJoint`; their squares begin at the row `first`."""
+    """Ball joints, see `tasks.distance.BallJoint`; their squares begin at the row `first`."""
     if not len(tables):
         return
     turn, axes, part, away = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))

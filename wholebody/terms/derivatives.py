@@ -20,7 +20,6 @@ STEP = 1e-6  # rad, m: half of the central difference's width
 AGREEMENT = 1e-5  # largest difference, as a share of 1 + the largest entry
 SPREAD = 0.3  # rad, m: standard deviation of the postures around the first
 INSIDE = 0.02  # share of its range that a joint stays away from its limits
-POSTURES = 5
 SEED = 0
 
 
@@ -85,7 +84,7 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
     resolved = term.resolve(scene, start)
     state, rng = State(model), np.random.default_rng(SEED)
     worst: tuple[float, int, int, float, float, Array, float] = (-1.0, 0, 0, 0.0, 0.0, start, 1.0)
-    for number in range(POSTURES):
+    for number in range(5):
         here = start if number == 0 else _inside(scene, pin.integrate(model, start, SPREAD * rng.normal(size=model.nv)))
         given = _derivative(resolved, state.update(here))
         measured, kink = _differences(resolved, state, here)

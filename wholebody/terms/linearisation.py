@@ -26,7 +26,7 @@ from wholebody.tasks.answers import is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Term
 from wholebody.tasks.bounds import StepLimit
 from wholebody.tasks.checks import undefined
-from wholebody.terms.plan import OtherTerm, TermPlan, checked_rows, make_plan
+from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_plan
 from wholebody.terms.planes import TermPlanes, term_planes
 
 MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
@@ -126,10 +126,7 @@ class Lineariser:
         self,
         workspace: Workspace,
         limits: Limits,
-        goals: Sequence[Goal],
-        constraints: Sequence[Constraint],
-        bounds: Sequence[Bound],
-        measures: Sequence[Measure],
+        terms: Terms,
         clearances: Array,
         dt: float | None = None,
         plan: TermPlan | None = None,
@@ -139,27 +136,24 @@ class Lineariser:
         Args:
             workspace: of this run alone.
             limits: of the figure's joints; see `Figure.limits`.
-            goals: resolved goals.
-            constraints: resolved constraints.
-            bounds: resolved bounds on the displacement.
-            measures: resolved measures.
+            terms: all resolved.
             clearances: (pairs,) least distance asked of every collision pair, metres.
             dt: step in seconds for bounds that need one.
             plan: of the same constraints, bounds, measures and step, and of any goals; None to make it here.
         """
         self.workspace, self.state, self._limits = workspace, workspace.state, limits
-        self.constraints, self.bounds, self.measures, self.dt = constraints, bounds, measures, dt
+        self.goals, self.constraints, self.bounds, self.measures = terms
+        self.dt = dt
         self._kernel = compiled_kernel()
         self._no_squares = np.zeros((0, self.state.model.nv))
-        self.goals: Sequence[Goal] = goals
-        self._plan = self._planned(goals) if plan is None else self._again(plan, goals)
+        self._plan = self._planned(self.goals) if plan is None else self._again(plan, self.goals)
         self._own = self._own_terms()
         self._term_wrench = np.empty((self._plan.goal_rows + self._plan.value_rows, 6))
         self._packed: PackedLinearisation | None = None
         self._grow(64)
         self._approach = self._largest_approach()
         self._most: Array | None = None
-        self.take(goals, clearances)
+        self.take(self.goals, clearances)
 
     def take(self, goals: Sequence[Goal], clearances: Array, constraints: Sequence[Constraint] | None = None) -> None:
         """Put other goals and clearances in the place of the present ones, and other constraints where they are given.
@@ -298,7 +292,7 @@ class Lineariser:
         return (q for q in postures if self.undefined(q) is None)
 
     def _planned(self, goals: Sequence[Goal]) -> TermPlan:
-        return make_plan(self._limits, goals, self.constraints, self.bounds, self.measures, self.dt, self.state)
+        return make_plan(self._limits, Terms(goals, self.constraints, self.bounds, self.measures), self.dt, self.state)
 
     def _again(
         self, plan: TermPlan, goals: Sequence[Goal], constraints: Sequence[Constraint] | None = None
@@ -365,7 +359,7 @@ def compiled_kernel() -> Any:
     from wholebody.terms import kernel as term_kernel
 
     state = State(pin.buildSampleModelManipulator())
-    plan = make_plan(NO_LIMITS, (), (), (), (), None, state)
+    plan = make_plan(NO_LIMITS, Terms(), None, state)
     nv = state.model.nv
     term_kernel.linearise(
         state.joints, state.columns, plan.support, state.q, plan.floats, plan.integers, plan.layout,

@@ -46,6 +46,15 @@ from wholebody.terms.entries import (
 )
 
 
+class Terms(NamedTuple):
+    """The goals, constraints, bounds and measures of a problem."""
+
+    goals: Sequence[Goal] = ()
+    constraints: Sequence[Constraint] = ()
+    bounds: Sequence[Bound] = ()
+    measures: Sequence[Measure] = ()
+
+
 class OtherTerm(NamedTuple):
     """A goal or constraint that is evaluated by its own methods.
 
@@ -139,27 +148,16 @@ class TermPlan(NamedTuple):
         return with_values(self, floats=floats, goals=goal_entries, constraints=kept, others=tuple(others))
 
 
-def make_plan(
-    limits: Limits,
-    goals: Sequence[Goal],
-    constraints: Sequence[Constraint],
-    bounds: Sequence[Bound],
-    measures: Sequence[Measure],
-    dt: float | None,
-    state: State,
-) -> TermPlan:
+def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> TermPlan:
     """The plan of resolved terms.
 
     Args:
         limits: of the figure's joints; see `Figure.limits`.
-        goals: resolved goals.
-        constraints: resolved constraints.
-        bounds: resolved bounds.
-        measures: resolved measures.
+        terms: all resolved.
         dt: seconds of a step, for bounds that need them; None for a whole solve.
         state: tells how many rows terms of other classes have; stays where it is.
     """
-    model = state.model
+    model, (goals, constraints, bounds, measures) = state.model, terms
     parts: dict[int, list[Row]] = {table: [] for table in range(EDGE + 1)}
     others: list[OtherTerm] = []
     row = 0

@@ -95,7 +95,7 @@ def _lowest(clip: Clip) -> float:
     """Height of the lowest point of the figure in any frame, metres: recordings do not all have their floor at 0."""
     import pinocchio as pin
 
-    from wholebody.tasks.support import low_points
+    from wholebody.tasks.balance import low_points
 
     model, pieces = clip.figure.model, clip.figure.geometry.geometryObjects
     data, lowest = model.createData(), 0.0

@@ -13,16 +13,6 @@ from wholebody.base.arrays import Array
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import RELAXED, Dimensions
 
-FACE = 0.75
-"""Radius of the face and jaw in half breadths of the head (estimate)."""
-
-YIELD = 0.4
-"""Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29 to
-41 mm from the small woman to the large man (estimate). These are tested against the core that is left."""
-
-CLAVICLE = 0.017
-"""Radius of the shoulder girdle as a fraction of stature (estimate)."""
-
 # Turns a capsule's own axis z into y.
 _ACROSS = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
@@ -41,7 +31,8 @@ def _trunk(size: Dimensions) -> Iterator[Solid]:
     neck = size.body.radius("neck")
     length = size.body.length("neck")
     yield _between("neck", "neck", neck, (0.0, 0.0, 0.1 * length), (0.0, 0.0, 0.9 * length))
-    skull, face = size.head_half_breadth, FACE * size.head_half_breadth
+    # Radius of the face and jaw in half breadths of the head (estimate).
+    skull, face = size.head_half_breadth, 0.75 * size.head_half_breadth
     half = size.head_half_length - skull
     top = size.head_top - skull
     yield _between("head:0", "head", skull, (size.head_x - half, 0.0, top), (size.head_x + half, 0.0, top))
@@ -81,7 +72,9 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
     front, out = high - person.fitted("seat"), sign * (person.fitted("hip_side") - high)
     name = f"{side}_thigh"
     yield _between(f"{name}:0", name, high, (front, out, -0.12 * thigh), (front, 0.3 * out, -0.42 * thigh))
-    core = (1.0 - YIELD) * high
+    # Share of the thigh's radius by which flesh gives way where the thigh presses on the belly or the other thigh: 29
+    # to 41 mm from the small woman to the large man (estimate). These are tested against the core that is left.
+    core = (1.0 - 0.4) * high
     yield _between(f"{name}:2", name, core, (front, 0.3 * out, -0.3 * thigh), (front, 0.3 * out, -0.42 * thigh))
     knee = person.fitted("knee_front")
     yield _down(f"{name}:1", name, knee, 0.6 * thigh, 0.98 * thigh)
@@ -94,7 +87,7 @@ def _leg(size: Dimensions, side: str, sign: float) -> Iterator[Solid]:
 def clavicle(size: Dimensions, side: str) -> Solid:
     """Shoulder girdle: a level capsule from beside the breastbone to the shoulder joint, as high as the acromion."""
     x, y, z = size.joint(f"{side}_shoulder_flexion")
-    radius = CLAVICLE * size.stature
+    radius = 0.017 * size.stature  # Radius of the shoulder girdle as a fraction of stature (estimate).
     height = z + size.body.fitted("shoulder_top") - radius
     return _between(
         f"{side}_clavicle", f"{side}_clavicle", radius, (0.25 * x, 0.25 * y, height), (0.9 * x, 0.9 * y, height)

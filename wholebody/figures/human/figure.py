@@ -23,10 +23,6 @@ from wholebody.figures.proportions import proportioned
 from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 
-ROOT_EFFORT = (5.0, 2.0)
-"""Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
-ESTIMATE: without it a person bows and walks away before an arm is lifted."""
-
 
 def human_figure(
     sex: str = "male",
@@ -79,6 +75,8 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         name: postures.Attitude({**held, **attitude.degrees}, attitude.pitch)
         for name, attitude in postures.HUMAN.items()
     }
+    # Weight of the root in a person's effort, beside 1 of an arm: of its position [rad^2/m^2] and of its rotation.
+    # ESTIMATE: without it a person bows and walks away before an arm is lifted.
     description = Description(
         groups=human_groups(joints),
         chains=human_chains(joints),
@@ -95,7 +93,7 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         person=spec.person,
         outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
-        root_effort=(0.0, 0.0) if sex is None else ROOT_EFFORT,
+        root_effort=(0.0, 0.0) if sex is None else (5.0, 2.0),
     )
     return Figure(spec.name, model, geometry, detail, description)
 
@@ -106,7 +104,10 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     groups = {"spine": tuple(name for name in names if name.startswith("spine"))}
     groups["neck"] = tuple(name for name in names if name.startswith("neck"))
     for side in ("left", "right"):
-        for limb, parts in _LIMBS.items():
+        for limb, parts in {
+            "arm": ("clavicle", "shoulder", "elbow", "wrist"),
+            "leg": ("hip", "knee", "ankle", "toe"),
+        }.items():
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
         for finger in FINGERS:
@@ -120,9 +121,6 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     groups["upper_body"] = groups["spine"] + groups["arms"]
     groups["lower_body"] = groups["legs"]
     return {name: members for name, members in groups.items() if members}
-
-
-_LIMBS = {"arm": ("clavicle", "shoulder", "elbow", "wrist"), "leg": ("hip", "knee", "ankle", "toe")}
 
 
 def human_chains(joints: set[str]) -> dict[str, Chain]:

@@ -13,12 +13,14 @@ from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
 from wholebody.figures.human import capsules
 
-_TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
-
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the pieces of a person, all of them convex polyhedra."""
-    rest = [solid for solid in capsules.solids(size) if solid.name not in _TRUNK]
+    rest = [
+        solid
+        for solid in capsules.solids(size)
+        if solid.name not in ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck")
+    ]
     return (*_trunk(size), *(hull_of(solid) for solid in rest))
 
 

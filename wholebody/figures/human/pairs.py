@@ -14,17 +14,6 @@ TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "ne
 Pairs = tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str, str], ...]]
 """Pairs that are tested, and (a, b, reason) of those that are not."""
 
-_TRUNK = "parts of the trunk and head meet along the spine"
-_NEIGHBOURS = "neighbours that overlap at their joint"
-_SHOULDER = "the shoulder lies on the ribs"
-_HIP = "the thigh presses on pelvis and belly"
-_CORE = "the core of the thigh is there for the belly and the other thigh"
-_FAR = "feet do not reach head and shoulders"
-_THIGHS = "the upper thighs press on each other; their cores are tested"
-_SAME = "same segment"
-
-_UPPER = ("thorax", "neck", "head", "left_clavicle", "right_clavicle")
-_FOOT = ("foot", "toes")
 
 _NEXT = {
     frozenset(pair)
@@ -71,30 +60,34 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
 def _reason(a: Solid, b: Solid) -> str | None:
     """Why the pair (a, b), in this order, is not tested; None if it is."""
     if a.segment == b.segment:
-        return _SAME
+        return "same segment"
     if a.segment in TRUNK and b.segment in TRUNK:
-        return _TRUNK
+        return "parts of the trunk and head meet along the spine"
     side_a, _, part_a = a.segment.partition("_")
     side_b, _, part_b = b.segment.partition("_")
     if side_a == side_b and frozenset((part_a, part_b)) in _NEXT:
-        return _NEIGHBOURS
+        return "neighbours that overlap at their joint"
     if side_a == side_b and (is_finger(part_a) or is_finger(part_b)):
         return finger_pair(part_a, part_b)
-    if part_b == "clavicle" and (part_a == "clavicle" or (a.segment in TRUNK and a.segment != "head")):
-        return _SHOULDER
-    if b.name.endswith("_upper_arm:0") and a.segment in TRUNK and a.segment != "head":
-        return _SHOULDER
-    if part_b == "thigh" and a.segment == "pelvis":
-        return _HIP
-    if b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar"):
-        return _HIP
-    if b.name.endswith("_thigh:2") and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))):
-        return _CORE
-    if (part_b in _FOOT or b.name.endswith("_shank:1")) and a.segment in _UPPER:
-        return _FAR
-    if a.name.endswith("_thigh:0") and b.name.endswith(("_thigh:0", "_thigh:1")):
-        return _THIGHS
-    return None
+    return _resting(a, b, part_a, part_b)
+
+
+def _resting(a: Solid, b: Solid, part_a: str, part_b: str) -> str | None:
+    """Why soft parts of two segments overlap, or cannot meet; None if they can touch."""
+    on_torso = a.segment in TRUNK and a.segment != "head"
+    resting = {
+        "the shoulder lies on the ribs": (part_b == "clavicle" and (part_a == "clavicle" or on_torso))
+        or (b.name.endswith("_upper_arm:0") and on_torso),
+        "the thigh presses on pelvis and belly": (part_b == "thigh" and a.segment == "pelvis")
+        or (b.name.endswith("_thigh:0") and a.segment in ("lower_lumbar", "upper_lumbar")),
+        "the core of the thigh is there for the belly and the other thigh": b.name.endswith("_thigh:2")
+        and not (a.segment == "upper_lumbar" or a.name.endswith(("_thigh:1", "_thigh:2"))),
+        "feet do not reach head and shoulders": (part_b in ("foot", "toes") or b.name.endswith("_shank:1"))
+        and a.segment in ("thorax", "neck", "head", "left_clavicle", "right_clavicle"),
+        "the upper thighs press on each other; their cores are tested": a.name.endswith("_thigh:0")
+        and b.name.endswith(("_thigh:0", "_thigh:1")),
+    }
+    return next((reason for reason, rests in resting.items() if rests), None)
 
 
 def collision_group(segment: str) -> str:

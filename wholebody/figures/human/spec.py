@@ -25,10 +25,6 @@ DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
 }
 
 
-OLDER = 45.0
-"""Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011)."""
-
-
 def human_spec(person: Person | None = None, detail: str = "capsules", hands: str = "rigid") -> BodySpec:
     """Return the specification of a person.
 
@@ -110,7 +106,8 @@ def joint_limits(person: Person, row: Mapping[str, str]) -> tuple[float, float]:
         row: the joint in the table "joints".
     """
     limits = {"lower": float(row["lower_deg"]), "upper": float(row["upper_deg"])}
-    if person.age is None or person.age < OLDER:
+    # Years from which on the ranges of motion are those of older people: the bands of Soucie et al. (2011).
+    if person.age is None or person.age < 45.0:
         return limits["lower"], limits["upper"]
     for change in table("age_ranges"):
         if row["name"].endswith(f"_{change['joint']}"):

@@ -17,15 +17,13 @@ from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid, place
 from wholebody.figures.dimensions import Dimensions
 
-_MEDIAN = {"M": 48.2, "F": 41.1}
-"""Mass per stature of the median man and woman of ANSUR II, kg / m, for which the table's radii hold: 84.6 kg by
-1.755 m, and 66.8 kg by 1.626 m (table "percentiles")."""
-
 
 def solids(size: Dimensions) -> tuple[Solid, ...]:
     """Return the 39 spheres of a person; the feet's are lifted to rest on the soles' plane."""
     person = size.body
-    build = math.sqrt(person.mass / person.stature / _MEDIAN[person.column])
+    # Mass per stature of the median man and woman of ANSUR II, kg / m, for which the table's radii hold: 84.6 kg by
+    # 1.755 m, and 66.8 kg by 1.626 m (table "percentiles").
+    build = math.sqrt(person.mass / person.stature / {"M": 48.2, "F": 41.1}[person.column])
     count: dict[str, int] = {}
     spheres = []
     for row in table("spheres39"):

@@ -58,8 +58,6 @@ from wholebody.figures.reach_cones import ReachCone
 from wholebody.figures.reduction import drop_rigid_pairs
 from wholebody.figures.urdf.xml_reading import numbers
 
-_RANGES = ("coupled_range", "elliptic_range", "twist_range")
-
 
 def extension_text(figure: Figure) -> str:
     """Return the element of a figure, indented for its URDF."""
@@ -157,7 +155,11 @@ class _Reader:
             },
             effort=efforts,
             excluded=excluded,
-            ranges={self._name(item): self._range(item) for tag in _RANGES for item in self._all(tag)},
+            ranges={
+                self._name(item): self._range(item)
+                for tag in ("coupled_range", "elliptic_range", "twist_range")
+                for item in self._all(tag)
+            },
             root_effort=self._root_effort(),
             notes=notes,
         )

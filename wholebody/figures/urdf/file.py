@@ -209,9 +209,6 @@ def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ..
     return LinkShape(link, placement(element, place, LARGEST), kind, size, file, name=element.get("name", ""))
 
 
-SCHEMES = ("package://", "model://")
-
-
 def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path:
     """Find a mesh.
 
@@ -242,7 +239,7 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
 
 def _found(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path | None:
     folder = Path(os.path.abspath(path)).parent
-    if name.startswith(SCHEMES):
+    if name.startswith(("package://", "model://")):
         parts = [part for part in name.split("://", 1)[1].split("/") if part not in ("", ".")]
         if not parts or ".." in parts[:1]:
             raise FileFormatError(f"{place}: the mesh {shown(name)} names no package; write package://<package>/<path>")

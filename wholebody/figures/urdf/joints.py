@@ -17,7 +17,6 @@ from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, uniq
 from wholebody.geometry.pieces import LARGEST
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
-FOLLOWING = ("revolute", "continuous", "prismatic")
 
 
 class Mimic(NamedTuple):
@@ -143,36 +142,42 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
         if kind != "continuous":
             notes.append(f"joint {shown(name)}: it has no <limit>, so it moves without limits")
         return free
-    lower, upper = -np.inf, np.inf
-    if kind != "continuous":
-        lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
-        if lower > upper:
-            raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
-        for end, value in (("lower", lower), ("upper", upper)) if kind == "revolute" else ():
-            warn_of_degrees(value, f"{place}: the {end} limit")
-        if limit.get("lower") is None and limit.get("upper") is None:
-            notes.append(f"joint {shown(name)}: its <limit> has neither lower nor upper, so it moves without limits")
-            lower, upper = -np.inf, np.inf
-        lower, upper = (lower if lower > -UNLIMITED else -np.inf), (upper if upper < UNLIMITED else np.inf)
-    speeds = []
-    for what in ("velocity", "effort"):
-        text = limit.get(what)
-        if text is None or text.strip().lower().lstrip("+") in ("inf", "infinity"):
-            speeds.append(np.inf)
-            continue
-        value = bounded(limit, what, place, 1, most=1e20)[0]
-        if value < 0.0:
-            raise FileFormatError(f"{place} has the {what} limit {value:g}; give a number that is not negative")
-        if what == "velocity" and value == 0.0:  # exporters write 0 where no speed was stated
-            notes.append(f"joint {shown(name)}: its velocity limit is 0, which is read as none")
-            value = np.inf
-        speeds.append(value)
-    return lower, upper, speeds[0], speeds[1]
+    lower, upper = (-np.inf, np.inf) if kind == "continuous" else _range(limit, kind, place, shown(name), notes)
+    velocity, effort = (_most(limit, what, place) for what in ("velocity", "effort"))
+    if velocity == 0.0:  # exporters write 0 where no speed was stated
+        notes.append(f"joint {shown(name)}: its velocity limit is 0, which is read as none")
+        velocity = np.inf
+    return lower, upper, velocity, effort
+
+
+def _range(limit: Element, kind: str, place: str, name: str, notes: list[str]) -> tuple[float, float]:
+    """Lower and upper limit; infinite for none."""
+    lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
+    if lower > upper:
+        raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
+    for end, value in (("lower", lower), ("upper", upper)) if kind == "revolute" else ():
+        warn_of_degrees(value, f"{place}: the {end} limit")
+    if limit.get("lower") is None and limit.get("upper") is None:
+        notes.append(f"joint {name}: its <limit> has neither lower nor upper, so it moves without limits")
+        return -np.inf, np.inf
+    return lower if lower > -UNLIMITED else -np.inf, upper if upper < UNLIMITED else np.inf
+
+
+def _most(limit: Element, what: str, place: str) -> float:
+    """Largest velocity or effort; infinite for none."""
+    text = limit.get(what)
+    if text is None or text.strip().lower().lstrip("+") in ("inf", "infinity"):
+        return np.inf
+    value = bounded(limit, what, place, 1, most=1e20)[0]
+    if value < 0.0:
+        raise FileFormatError(f"{place} has the {what} limit {value:g}; give a number that is not negative")
+    return value
 
 
 def _mimic(element: Element, kind: str, place: str) -> Mimic | None:
     mimic = element.find("mimic")
-    if mimic is None or kind not in FOLLOWING:  # it has no effect on a fixed joint, which robots with locked hands have
+    # it has no effect on a fixed joint, which robots with locked hands have
+    if mimic is None or kind not in ("revolute", "continuous", "prismatic"):
         return None
     multiplier = bounded(mimic, "multiplier", place, 1, "1")[0]
     return Mimic(mimic.get("joint", ""), multiplier, bounded(mimic, "offset", place, 1, "0", LARGEST)[0])

@@ -21,8 +21,6 @@ from wholebody.figures.urdf.file import UrdfFile
 from wholebody.figures.urdf.joints import Mimic, UrdfJoint
 from wholebody.figures.urdf.writing import ANY_LIMIT, add_joint
 
-_INERTIA = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
-
 
 class _Law(NamedTuple):
     """A joint's value as ``slope * leader + offset``."""
@@ -194,7 +192,11 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
 
 def _add_inertial(link: Element, given: Element) -> None:
     inertial = SubElement(link, "inertial")
-    for tag, names in (("origin", ("xyz", "rpy")), ("mass", ("value",)), ("inertia", _INERTIA)):
+    for tag, names in (
+        ("origin", ("xyz", "rpy")),
+        ("mass", ("value",)),
+        ("inertia", ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
+    ):
         element = given.find(tag)
         if element is not None:
             SubElement(inertial, tag, {name: element.get(name, "") for name in names if element.get(name)})

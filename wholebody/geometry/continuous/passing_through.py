@@ -26,11 +26,11 @@ if TYPE_CHECKING:
 
 
 ALLOWED_OVERLAP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
+HALVINGS = 3  # of a motion before doubtful pairs are swept
 OVERLAP = 2e-4  # m: overlap during a motion that is ignored; smaller than the width of any piece
 INSIDE = 1e-4  # m: overlap at the end of a motion that is ignored
 GRAZE = 5e-4  # m: a motion that gets deeper than this is blocked; held soles overlap a little between two postures
 SHORT = 0.03  # rad, m: a shorter motion whose every step was tested gets less deep than GRAZE
-HALVINGS = 3  # of a motion before doubtful pairs are swept
 
 
 class Queries(Protocol):

@@ -20,8 +20,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, read_result
+from wholebody.geometry.memory_views import Guesses, distance_view, read_result
 from wholebody.geometry.proximity import SINGLY
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 from wholebody.geometry.swept_points import swept_points
@@ -34,9 +33,6 @@ MOST_QUERIES = 4000
 
 TOGETHER = 0.05
 """Pairs due within this share of the motion are queried together: a query costs more than the pairs in it."""
-
-SLOW = 3
-"""Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide."""
 
 
 @dataclass(frozen=True)
@@ -154,7 +150,8 @@ class Sweep:
                 return self._found(now, q, int(index[due[worst]]), float(rows[worst, 0]), True)
             safe = room / speed[due]
             asked[due] += 1
-            for k in np.flatnonzero((asked[due] > SLOW) & (safe < TOGETHER)):
+            # Queries after which a pair is bounded to second order, which costs more and helps only if pieces slide.
+            for k in np.flatnonzero((asked[due] > 3) & (safe < TOGETHER)):
                 safe[k] = max(safe[k], self._second_order(int(index[due[k]]), rows[k], float(level[due[k]])))
             free[due] = np.maximum(free[due], now + safe)
         worst = int(np.argmin(free))

@@ -16,8 +16,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
-from wholebody.geometry.guesses import Guesses
-from wholebody.geometry.memory_views import distance_view, placement_view, read_result
+from wholebody.geometry.memory_views import Guesses, distance_view, placement_view, read_result
 from wholebody.geometry.proximity import AWAY, COAL_ACCURACY, PairTable
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
 
@@ -65,7 +64,7 @@ class SweptDepth:
         self._table, self._geometry, self._tolerance = table, geometry, tolerance
         self._bounds = MotionBounds(table.model, table.joint, table.reach)
         self._kernel = compiled_kernel()
-        self._shapes = _shapes(table)
+        self._shapes = self._kernel.Shapes(table.pairs, table.joint, table.reach, *_shapes(table))
         self._before, self._now, self._middle = (_Postures(table, geometry) for _ in range(3))
         count = len(table.pairs)
         self._extent, self._index = np.zeros((geometry.ngeoms, 3)), np.zeros(count, dtype=np.intp)
@@ -131,7 +130,7 @@ class SweptDepth:
         part: `which` of the pairs, and the places before and after it in `stack`.
         """
         assert self._q is not None
-        table, stack = self._table, _Stack(self._before.places, self._now.places)
+        stack = _Stack(self._before.places, self._now.places)
         rows0, rows1 = self._before.rows[doubtful], self._now.rows[doubtful]
         deepest = np.maximum(0.0, -np.minimum(rows0[:, 0], rows1[:, 0]))  # found
         bound = np.zeros(len(doubtful))  # proved
@@ -139,11 +138,9 @@ class SweptDepth:
         first, last = np.zeros(len(doubtful), dtype=np.intp), np.ones(len(doubtful), dtype=np.intp)
         while len(which):
             allowed, least, numbers = self._allowed(deepest)[which], np.empty(len(which)), doubtful[which]
-            self._kernel.lower_bounds(
-                numbers, table.pairs, stack.places, first, last, rows0, rows1, speed[numbers], -allowed, share,
-                ACCURACY, table.joint, self._bounds.turn, self._bounds.speed, self._bounds.carries, table.reach,
-                *self._shapes, least,
-            )  # fmt: skip
+            parts = self._kernel.Parts(numbers, first, last, rows0, rows1, speed[numbers], -allowed)
+            motion = self._kernel.Speeds(self._bounds.turn, self._bounds.speed, self._bounds.carries)
+            self._kernel.lower_bounds(parts, stack.places, self._shapes, motion, share, ACCURACY, least)
             kept = least >= -allowed if share > FINEST else np.ones(len(which), dtype=bool)
             np.maximum.at(bound, which[kept], -least[kept])
             going = np.flatnonzero(~kept)
@@ -285,8 +282,12 @@ def compiled_kernel() -> Any:
     pairs, rows, one = np.zeros((0, 2), dtype=np.intp), np.zeros((0, 4)), np.zeros(1, dtype=np.intp)
     swept_depth_kernel.screen(places, pairs, none, np.zeros((0, 3)), none, none, none, np.zeros((0, 3)), index)
     swept_depth_kernel.lower_bounds(
-        index, pairs, np.zeros((0, 0, 4, 3)), index, index, rows, rows, none, none, 1.0, 0.0, index, none,
-        np.zeros((0, 0)), np.zeros((0, 0), dtype=bool), none, np.zeros((0, 3)), one, none, np.zeros((0, 3)), rows,
-        one, none,
-    )  # fmt: skip
+        swept_depth_kernel.Parts(index, index, index, rows, rows, none, none),
+        np.zeros((0, 0, 4, 3)),
+        swept_depth_kernel.Shapes(pairs, index, none, np.zeros((0, 3)), one, none, np.zeros((0, 3)), rows, one),
+        swept_depth_kernel.Speeds(none, np.zeros((0, 0)), np.zeros((0, 0), dtype=bool)),
+        1.0,
+        0.0,
+        none,
+    )
     return swept_depth_kernel

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.geometry.proximity_kernel import bound_by_boxes, outer_gap
 
@@ -44,13 +46,66 @@ def screen(
     return count
 
 
+class Shapes(NamedTuple):
+    """The n pieces and p pairs of a geometry model.
+
+    Attributes:
+        pairs: (p, 2) the pieces of each pair.
+        joint: (n,) joint of each piece.
+        reach: (n,) radius of each piece about its origin; infinite for a half-space.
+        points: (m, 3) swept points of all pieces, those of piece i from `first_point[i]`.
+        first_point: (n + 1,)
+        radius: (n,) about these points.
+        radii: (n, 3) of ellipsoids; 0 for other pieces.
+        faces: (f, 4) outward planes of all pieces, those of piece i from `first_face[i]`.
+        first_face: (n + 1,)
+    """
+
+    pairs: Indices
+    joint: Indices
+    reach: Array
+    points: Array
+    first_point: Indices
+    radius: Array
+    radii: Array
+    faces: Array
+    first_face: Indices
+
+
+class Speeds(NamedTuple):
+    """`turn`, `speed` and `carries` of `MotionBounds`, for one motion."""
+
+    turn: Array
+    speed: Array
+    carries: Mask
+
+
+class Parts(NamedTuple):
+    """Pairs, each during a part of a motion.
+
+    Attributes:
+        number: (k,) places of the pairs.
+        first: (k,) the time, of `places`, at which the part begins.
+        last: (k,) the time at which it ends.
+        rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
+        rows1: (k, 4) the same at the end.
+        speed: (k,) by how much a pair can come nearer during the whole motion.
+        wanted: (k,) a bound that is sufficient.
+    """
+
+    number: Indices
+    first: Indices
+    last: Indices
+    rows0: Array
+    rows1: Array
+    speed: Array
+    wanted: Array
+
+
 @compiled()
 def lower_bounds(
-    asked: Indices, pairs: Indices, places: Array, first_place: Indices, last_place: Indices, rows0: Array,
-    rows1: Array, speed: Array, wanted: Array, share: float, accuracy: float, joint: Indices, turn: Array,
-    speeds: Array, carries: NDArray[np.bool_], reach: Array, points: Array, first_point: Indices, radius: Array,
-    radii: Array, faces: Array, first_face: Indices, bound: Array,
-) -> None:  # fmt: skip
+    parts: Parts, places: Array, shapes: Shapes, motion: Speeds, share: float, accuracy: float, bound: Array
+) -> None:
     """Bound the distances of pairs from below, over a part of a motion.
 
     A distance changes by at most `speed` over the whole motion. And it is at least the height of one piece above a
@@ -58,30 +113,18 @@ def lower_bounds(
     chord by at most its acceleration times the squared time over eight.
 
     Args:
-        asked: (k,) places of the pairs.
-        pairs: (p, 2) the pieces of each pair.
+        parts: the pairs.
         places: (m, n, 4, 3) where the pieces are at some times.
-        first_place: (k,) the time, of `places`, at which the part begins.
-        last_place: (k,) the time at which it ends.
-        rows0: (k, 4) distance and normal, from the first piece to the second, at the beginning.
-        rows1: (k, 4) the same at the end.
-        speed: (k,) by how much a pair can come nearer during the whole motion.
-        wanted: (k,) a bound that is sufficient.
+        shapes: of the pieces.
+        motion: bounds of the whole motion.
         share: length of each part, of the whole motion.
         accuracy: metres to which the distances are known.
-        joint: (n,) joint of each piece.
-        turn: (njoints,) see `MotionBounds`.
-        speeds: (n, njoints) see `MotionBounds.speed`.
-        carries: (njoints, njoints) see `MotionBounds`.
-        reach: (n,) radius of each piece about its origin.
-        points: (m, 3) swept points of all pieces, those of piece i from `first_point[i]`.
-        first_point: (n + 1,)
-        radius: (n,) about these points.
-        radii: (n, 3) of ellipsoids; 0 for other pieces.
-        faces: (f, 4) outward planes of all pieces, those of piece i from `first_face[i]`.
-        first_face: (n + 1,)
         bound: (k,) room for the answer.
     """
+    # a record is taken apart once: in a loop each array that is read from it would be counted again
+    asked, first_place, last_place, rows0, rows1, speed, wanted = parts
+    pairs, joint, reach, points, first_point, radius, radii, faces, first_face = shapes
+    turn, speeds, carries = motion
     normal, sags = np.empty(3), np.empty(2)
     for k in range(len(asked)):
         first, second = pairs[asked[k], 0], pairs[asked[k], 1]

@@ -19,8 +19,7 @@ from wholebody.tasks.frame import Frame, Orientation
 from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
-from wholebody.tasks.range_of_motion import RangeOfMotion
-from wholebody.tasks.reach_cones import ReachCones
+from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
 HELD = 1e-6  # m, rad: a hold that is met to this at the start is kept by joints that do not move
 

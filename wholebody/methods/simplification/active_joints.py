@@ -23,9 +23,8 @@ from wholebody.problem import Problem
 from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.checks import defined
 from wholebody.tasks.discomfort import Discomfort
-from wholebody.tasks.distance import Displacement, Effort
+from wholebody.tasks.distance import Displacement, Effort, RotationEffort
 from wholebody.tasks.rhythm import Rhythm
-from wholebody.tasks.rotation_effort import RotationEffort
 
 SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints; `Rhythm` is one over its squares
 SAMPLES = 6  # postures at which the dependence of rows that are no wrenches on joints is tested

@@ -10,9 +10,6 @@ from typing import NamedTuple
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 
-MOST_FRICTION = 10.0
-"""Greatest coefficient of friction; rubber on dry concrete has about 1."""
-
 
 class Surface(NamedTuple):
     """What happens where two materials touch.
@@ -65,9 +62,10 @@ class Material:
 
 def _surface(pair: object, what: str) -> Surface:
     values = checks.numbers(pair, (2,), f"{what}: (restitution, friction)")
+    # Greatest coefficient of friction; rubber on dry concrete has about 1.
     return Surface(
         checks.number(float(values[0]), f"{what}: restitution", 0.0, 1.0),
-        checks.number(float(values[1]), f"{what}: friction", 0.0, MOST_FRICTION),
+        checks.number(float(values[1]), f"{what}: friction", 0.0, 10.0),
     )
 
 

@@ -1,0 +1,58 @@
+"""Names of a package that are loaded when they are first used (PEP 562), and Ctrl-C while the command is imported."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from collections.abc import Callable, Mapping
+from importlib import import_module
+
+
+def exported(package: str, modules: Mapping[str, str]) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
+    """Return a package's `__getattr__` and `__dir__`.
+
+    Args:
+        package: its name.
+        modules: names that it exports, separated by blanks, by the module that has them; a module for itself has none.
+    """
+    home = {name: module for module, names in modules.items() for name in names.split()}
+
+    def load(name: str) -> object:
+        if name not in home:
+            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+        value = getattr(import_module(home[name]), name)
+        setattr(sys.modules[package], name, value)
+        return value
+
+    def listed() -> list[str]:
+        return sorted(home)
+
+    return load, listed
+
+
+def end_quietly() -> None:
+    """From here on Ctrl-C ends the process at once, if it is that of the command; a handler of somebody else stays.
+
+    Libraries that are half imported make other errors of a KeyboardInterrupt, or print its traceback.
+    """
+    if _is_command(sys.orig_argv) and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+def raise_again() -> None:
+    """From here on Ctrl-C raises a KeyboardInterrupt, as Python has it, if `end_quietly` changed that."""
+    if _is_command(sys.orig_argv) and signal.getsignal(signal.SIGINT) is signal.SIG_DFL:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def _is_command(words: list[str]) -> bool:
+    """Whether a process was started by ``wholebody`` or ``python -m wholebody``, with these words."""
+    rest = iter(words[1:])
+    for word in rest:
+        if word == "-m":
+            return next(rest, "") == "wholebody"
+        if word in ("-X", "-W"):
+            next(rest, "")
+        elif not word.startswith("-"):
+            return word.replace("\\", "/").rpartition("/")[2] in ("wholebody", "wholebody.exe", "wholebody-script.py")
+    return False
