@@ -17,7 +17,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
@@ -96,7 +96,7 @@ class RigidBodies:
         self._find_near(SUBSTEP)
         self._check_start()
         # given velocities may part joints
-        self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
+        self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
 
     def _check_start(self) -> None:
         if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:
@@ -121,7 +121,7 @@ class RigidBodies:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        return np.array(self.state.twist[self._number(name)])
+        return np.array(self.state.bodies.twist[self._number(name)])
 
     def velocity_at(self, name: str, point: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
@@ -131,7 +131,7 @@ class RigidBodies:
             InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        return self._velocity(number, point - self.state.position[number])
+        return self._velocity(number, point - self.state.bodies.position[number])
 
     def _velocity(self, number: int, lever: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) seen from its centre of mass, m/s."""
@@ -145,13 +145,13 @@ class RigidBodies:
             InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        lever = pin.skew(point - self.state.position[number])
+        lever = pin.skew(point - self.state.bodies.position[number])
         inverse = self._inverse_inertia(number)
-        if not self._joints.jointed[number]:
+        if not self.state.bodies.jointed[number]:
             return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ inverse @ lever)
-        found, movable = np.empty((3, 3)), self.state.moving | self._joints.linked(number)
+        found, movable = np.empty((3, 3)), self.state.bodies.moving | self._joints.linked(number)
         for axis in range(3):
-            twist = np.zeros_like(self.state.twist)
+            twist = np.zeros_like(self.state.bodies.twist)
             twist[number, axis] = 1.0 / self._pieces.mass[number]
             twist[number, 3:] = inverse @ lever[:, axis]
             self._joints.project_velocities(self.state, twist, movable)
@@ -170,20 +170,20 @@ class RigidBodies:
         impulse = _bounded(impulse, STRONGEST_PUSH, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        lever, jointed = point - self.state.position[number], self._joints.jointed[number]
+        lever, jointed = point - self.state.bodies.position[number], self.state.bodies.jointed[number]
         before = self.energy() if jointed else 0.5 * float(impulse @ self._velocity(number, lever))
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
-        self.state.moving |= self._joints.linked(number)
+        self.state.bodies.moving[self._joints.linked(number)] = True
         if jointed:
-            self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
+            self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
             self._pushed += self.energy() - before
         else:  # along the mean of the velocities before and after
             self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
     def _inverse_inertia(self, number: int) -> Array:
-        rotation = self.state.rotation[number]
-        return np.asarray(rotation @ self.state.inverse[number] @ rotation.T)
+        rotation = self.state.bodies.rotation[number]
+        return np.asarray(rotation @ self.state.bodies.inverse[number] @ rotation.T)
 
     def energy(self) -> float:
         """Kinetic and potential energy of the bodies that move by themselves, joules."""
@@ -226,8 +226,8 @@ class RigidBodies:
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)
-            state.twist[number] = 0.0
-        state.given[:] = False
+            state.bodies.twist[number] = 0.0
+        state.bodies.given[:] = False
         self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
@@ -236,7 +236,7 @@ class RigidBodies:
 
     def _stops(self) -> int:
         """Early ends of steps that a frame may have."""
-        return STOPS * FEW // max(FEW, int(self.state.moving.sum()))
+        return STOPS * FEW // max(FEW, int(self.state.bodies.moving.sum()))
 
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
@@ -284,7 +284,7 @@ class RigidBodies:
         self._old = program.remembered(time)
         work = program.work()
         record.work += float(work.sum())
-        self._joints.project_velocities(state, state.twist, state.moving)
+        self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
@@ -311,7 +311,7 @@ class RigidBodies:
         for closing in range(CLOSINGS):
             program.solve(time, together, start, hold)
             pushed = program.pushed()
-            self._drift(time, pushed)
+            motion_kernel.drift(state.bodies, pushed, self.gravity, time)
             self._falling = ~pushed
             if not len(joints) or time < FINE or closing == CLOSINGS - 1:
                 return
@@ -340,8 +340,8 @@ class RigidBodies:
             record.impulse[second] += row[2:]
             record.impulse[first] -= row[2:]
             for body, sign in ((first, 1.0), (second, -1.0)):
-                if self.state.given[body]:
-                    lever = points.point[number] - self.state.position[body]
+                if self.state.bodies.given[body]:
+                    lever = points.point[number] - self.state.bodies.position[body]
                     record.work += sign * float(
                         row[2:] @ (self.state.velocity[body] + np.cross(self.state.spin[body], lever))
                     )
@@ -349,27 +349,19 @@ class RigidBodies:
             names = self.names[first], self.names[second]
             record.events.append(Event(record.time, *names, *place, float(row[1]), row[2:]))
 
-    def _drift(self, time: float, pushed: Mask) -> None:
-        state = self.state
-        motion_kernel.drift(
-            state.position, state.rotation, state.twist, self._pieces.inertia, state.inverse,
-            state.moving, state.given, pushed, self.gravity, time,
-        )  # fmt: skip
-
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""
         state = self.state
-        active = state.moving | state.given
         way = self._travel(time)
         self._margin = 1.5 * way + MARGIN
-        self._near = self._finder.near(state.position, state.rotation, self._margin, active)
+        self._near = self._finder.near(state.bodies.position, state.bodies.rotation, self._margin, state.active)
         return float(self._near.distance.min(initial=np.inf))
 
     def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
         state = self.state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
-        return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
+        return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> tuple[float, float]:
         """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
@@ -377,16 +369,16 @@ class RigidBodies:
         Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
         """
         state = self.state
-        before, position = self.energy(), state.position.copy()
+        before, position = self.energy(), state.bodies.position.copy()
         for _ in range(SEPARATIONS):
             program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
-            motion_kernel.displace(state.position, state.rotation, program.separation(0.5 * SKIN), state.moving)
+            motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
             least = self._find_near(SUBSTEP)
             if least >= LEAST_GAP:
                 break
         gain = self.energy() - before
         if gain > 0.0:
-            state.slow(state.moving & (state.position != position).any(axis=1), gain)
+            state.slow(state.bodies.moving & (state.bodies.position != position).any(axis=1), gain)
         return least, max(0.0, self.energy() - before)
 
 

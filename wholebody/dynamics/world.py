@@ -18,8 +18,7 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array
 from wholebody.base.checks import array, instance, time_step
 from wholebody.base.errors import InputError
-from wholebody.dynamics.coupling import Coupling, Spring
-from wholebody.dynamics.driven_impulses import TOUCH, PushedContacts
+from wholebody.dynamics.coupling import TOUCH, Coupling, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
