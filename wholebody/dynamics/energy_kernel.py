@@ -107,9 +107,10 @@ def restrain(
                 lifted -= bodies.mass[b] * fall[k] * twist[b, k]
             after = _kinetic(b, bodies, bodies.rotation[b], twist[b], turning)
             gain[root[b]] += after + lifted - _kinetic(b, bodies, bodies.rotation[b], before[b], turning)
+    inside = np.empty(count, dtype=np.bool_)
     for island in range(count):
         if gain[island] > 0.0:
-            inside = pushed & (root == island)
+            _choose(pushed, root, island, inside)
             _take(inside, kind[island] == FREE, gain[island], 1.0, bodies, fall)
 
 
@@ -152,11 +153,11 @@ def settle(
             gain[root[b]] -= _kinetic(b, bodies, rotation[b], twist[b], turning)
             for k in range(3):
                 gain[root[b]] -= bodies.mass[b] * gravity[k] * (bodies.position[b, k] - position[b, k])
-    still = np.zeros(3)
+    still, inside = np.zeros(3), np.empty(count, dtype=np.bool_)
     for island in range(count):
         keeps = linked[island] and not touched[island]
         if keeps or (gain[island] > 0.0 and (linked[island] or kind[island] == DRIVEN)):
-            inside = moving & (root == island)
+            _choose(moving, root, island, inside)
             _take(inside, kind[island] == FREE, gain[island], LARGEST if keeps else 1.0, bodies, still)
 
 
@@ -175,6 +176,13 @@ def _find_jammed(
 
 
 @compiled(inner=True)
+def _choose(among: Mask, root: Indices, island: int, inside: Mask) -> None:
+    """Write which bodies (n,) of an island are among others."""
+    for b in range(len(root)):  # in loops: numba's array functions load scipy.linalg
+        inside[b] = among[b] and root[b] == island
+
+
+@compiled(inner=True)
 def _take(inside: Mask, free: bool, excess: float, most: float, bodies: Bodies, fall: Array) -> None:
     """Take an energy from an island, the bodies `inside` (n,), by a share `s` of at most `most`."""
     whole, centre = np.zeros(6), np.zeros(3)
@@ -183,7 +191,9 @@ def _take(inside: Mask, free: bool, excess: float, most: float, bodies: Bodies, 
     # the energy of s is that of w, and with the other part of the velocities: s^2 square + s linear
     square, linear = 0.0, 0.0
     own, turning = np.empty(6), np.empty(3)
-    for b in np.flatnonzero(inside):
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
         _seen(b, bodies, centre, whole, own)
         square += _kinetic(b, bodies, bodies.rotation[b], own, turning)
         for k in range(3):
@@ -192,7 +202,9 @@ def _take(inside: Mask, free: bool, excess: float, most: float, bodies: Bodies, 
     share, root_of = 0.0, linear * linear - 4.0 * square * rest
     if square > 0.0 and root_of > 0.0:
         share = min(most, max(0.0, (-linear + np.sqrt(root_of)) / (2.0 * square)))
-    for b in np.flatnonzero(inside):
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
         _seen(b, bodies, centre, whole, own)
         for k in range(6):
             bodies.twist[b, k] -= (1.0 - share) * own[k]
@@ -214,7 +226,9 @@ def _seen(b: int, bodies: Bodies, centre: Array, whole: Array, own: Array) -> No
 def _as_one(inside: Mask, bodies: Bodies, centre: Array, whole: Array) -> None:
     """Write the centre of mass (3,) of an island, and its motion (6,) as one body with the same momentum."""
     total, turning, column, spin = 0.0, np.zeros(3), np.empty(3), np.zeros(3)
-    for b in np.flatnonzero(inside):
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
         total += bodies.mass[b]
         for k in range(3):
             centre[k] += bodies.mass[b] * bodies.position[b, k]
@@ -223,7 +237,9 @@ def _as_one(inside: Mask, bodies: Bodies, centre: Array, whole: Array) -> None:
         centre[k] /= total
         whole[k] /= total
     gathered, inverse, lever = np.zeros((3, 3)), np.empty((3, 3)), np.empty(3)
-    for b in np.flatnonzero(inside):
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
         mass, twist = bodies.mass[b], bodies.twist[b]
         angular_momentum(bodies.rotation[b], bodies.inertia[b], twist[3:], column)
         square = 0.0

@@ -23,6 +23,8 @@ from wholebody.dynamics.rows_kernel import Rows, push
 JOINT_PRECISION = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
 NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their target than this belong to their island
 ISLAND_SWEEPS = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
+ROUGH = 30.0  # tolerances: an island whose last sweep changes more has EXTRA_SWEEPS times as many sweeps
+EXTRA_SWEEPS = 6
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
@@ -173,7 +175,7 @@ def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: 
         laws: of all points.
         twist: (n, 6) as in `solve`, and so `impulse`.
         impulse: (m, 3).
-        limits: of each island.
+        limits: of each island, see `ROUGH`.
     """
     count, bodies = len(rows.bodies), len(twist)
     listed, changes = np.empty(count, dtype=np.intp), np.zeros(count)
@@ -194,7 +196,9 @@ def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: 
         points, first, worst = _by_island(listed[:bearing], rows, root, changes)
         solved = True
         for island in range(bodies):
-            if worst[island] >= limits.tolerance and swept[island] < limits.sweeps:
+            rough = worst[island] >= ROUGH * limits.tolerance
+            most = EXTRA_SWEEPS * limits.sweeps if rough else limits.sweeps
+            if worst[island] >= limits.tolerance and swept[island] < most:
                 solved = False
                 chosen = points[first[island] : first[island + 1]]
                 swept[island] += solve(chosen, rows, laws, twist, impulse, part)

@@ -20,7 +20,7 @@ SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its 
 TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
 TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
 UNSOLVED = 1.2e-4  # m/s: of points that push against what is moved; their impulses are not started from again
-VISITS = 120_000  # points times sweeps of a program, of which ...
+VISITS = 20_000  # points times sweeps of a program, of which ...
 SWEEPS = 1000  # ... there are at most so many: more is exacter and slower
 MOST_EVENTS = 1000  # at one stop
 

@@ -15,17 +15,16 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
-from wholebody.methods.newton.multistart import SHARPER, Search, Settings
+from wholebody.methods.newton.multistart import Search, Settings
+from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-
-FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 
 
 class NewtonStep(NamedTuple):
@@ -83,7 +82,7 @@ class NewtonTracker(NotCopyable):
         self._alone = OneAtATime("tracker")
         self._lay_out()
 
-    def step(self, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+    def step(self, q: Array, tolerance: float = FRAMES.tolerance) -> NewtonStep:
         """The same as `frame`; what things that moved meanwhile met is named.
 
         Raises:
@@ -100,14 +99,16 @@ class NewtonTracker(NotCopyable):
 
         Args:
             q: posture at the beginning of the frame.
-            tolerance: of the goals, metres and radians; `FRAME_TOLERANCE` where None.
+            tolerance: of the goals, metres and radians; 1e-4 where None.
 
         Raises:
             InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
                 is within a call of this tracker.
         """
         q = posture(q, self.workspace.model.nq)
-        enough = FRAME_TOLERANCE if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        enough = FRAMES.tolerance
+        if tolerance is not None:
+            enough = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
         with self._alone:
             active_system = self._renewed()
             active_system.objective.anchor(q)
@@ -118,9 +119,9 @@ class NewtonTracker(NotCopyable):
             found = satisfy(
                 active_system,
                 active_system.variables(q),
-                tolerance=SHARPER * self._settings.tolerance,
+                tolerance=STARTS.sharper * self._settings.tolerance,
                 goal_tolerance=enough,
-                iterations=FRAME_ITERATIONS,
+                iterations=FRAMES.iterations,
                 kind=self._settings.inequalities,
                 early_exit=True,
             )
