@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import minimize
 
 import wholebody as wb
+from tests.freeing import freed_by
 from wholebody.cli import main
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
@@ -97,7 +98,7 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
             found[range(frames), range(frames), joint] = (gaps(flat + step) - gaps(flat - step)) / (2.0 * size)
         return found.reshape(frames, 2 * frames)
 
-    found = (method.avoid(clip, scene, (), None).q - q).ravel()
+    found = (freed_by(method, clip, scene).q - q).ravel()
     assert gaps(found).min() > -1e-5
     for start in (found, np.zeros_like(found)):
         free = {"type": "ineq", "fun": gaps, "jac": slopes}
@@ -319,7 +320,7 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
 def test_all_solvers_give_the_same_clip(name: str, planar_arm: Callable[..., Figure]) -> None:
     pytest.importorskip(name)
     clip, scene = arm_and_ball(planar_arm, 30)
-    one, other = (wb.motion.Trajectory(solver=each).avoid(clip, scene, (), None).q for each in (None, name))
+    one, other = (freed_by(wb.motion.Trajectory(solver=each), clip, scene).q for each in (None, name))
     np.testing.assert_allclose(one, other, atol=2e-3)
 
 

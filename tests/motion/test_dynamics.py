@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.load_change import LoadChange
+from wholebody.motion.clip_torques import LoadChange
 from wholebody.motion.trajectory.loads import standing_frames
 
 WHEEL = """<robot name="wheel"><link name="base"/>

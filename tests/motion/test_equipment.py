@@ -7,8 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.ready_equipment import READY, equipment
-from wholebody.motion.worn_equipment import Equipment, bounds, group_of
+from wholebody.motion.worn_equipment import READY, Equipment, bounds, equipment, group_of
 
 
 @pytest.fixture(scope="module", params=["capsules", "spheres"])

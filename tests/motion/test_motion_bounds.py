@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ import wholebody as wb
 from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
-from wholebody.motion.avoider import AvoidProgress, MethodResult
+from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.motion_bounds import excess, resolved
 
@@ -85,11 +84,10 @@ class Jumps:
     clearance: float = 0.0
     dynamics: None = None
 
-    def avoid(self, clip: wb.Clip, scene: wb.Scene, constraints: Iterable[Any], progress: Any) -> MethodResult:
-        q = np.array(clip.q)
+    def avoid(self, run: Run) -> MethodResult:
+        q = np.array(run.clip.q)
         q[self.first : self.end, 1] += self.by
-        if progress is not None:
-            progress(AvoidProgress(1.0, "done"))
+        run.watch.tell(1.0, "done")
         return MethodResult(q)
 
 

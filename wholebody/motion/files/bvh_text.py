@@ -11,13 +11,11 @@ from dataclasses import dataclass, field
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.motion.files.text import number as read_number
-from wholebody.motion.files.text import table
+from wholebody.motion.files.base import number as read_number
+from wholebody.motion.files.base import table
 from wholebody.tracking.tracks import MOST_FRAMES
 
-CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 MOST_JOINTS = 1000
-DEEPEST = 200  # braces within braces
 
 
 @dataclass
@@ -124,7 +122,7 @@ class _Hierarchy:
         if word in ("ROOT", "JOINT", "END"):
             self._begin(where, number, word, rest)
         elif line == "{":
-            if not self.joints or len(self._open) > DEEPEST:
+            if not self.joints or len(self._open) > 200:
                 raise FileFormatError(f"{where}: a brace that opens no joint")
         elif line == "}":
             if not self._open:
@@ -161,7 +159,7 @@ class _Hierarchy:
                 raise FileFormatError(f"{where}: an OFFSET has three numbers, once for each joint")
             joint.offset = tuple(read_number(value, where) for value in words)
             return
-        found = [CHANNEL.fullmatch(value) for value in words[1:]]
+        found = [re.fullmatch(r"([XYZ])(position|rotation)", value, re.IGNORECASE) for value in words[1:]]
         if not words or joint.channels or words[0] != str(len(found)) or None in found:
             raise FileFormatError(
                 f"{where}: CHANNELS are a count and as many names, such as 3 Zrotation Xrotation Yrotation"
