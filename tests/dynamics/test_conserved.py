@@ -14,7 +14,7 @@ from wholebody.bench.measure.world.drops import drops
 from wholebody.bench.measure.world.engines import ENGINES
 from wholebody.bench.measure.world.measuring import Judge
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.step_program import SKIN
+from wholebody.dynamics.settings import SKIN
 
 G = 9.81
 AWAY = 5.0

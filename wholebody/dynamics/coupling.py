@@ -22,6 +22,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, number, posture, settle, time_step
 from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.dynamics.settings import PUSH
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.materials import Surface
@@ -30,12 +31,7 @@ LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
 STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
 MASS = DAMPING**2 / (4.0 * STIFFNESS)  # kg: a hand's 0.4, with which the spring is critically damped
-BLOCKED = 1e-3  # rad, m: by which contact keeps a joint from where the spring wants it; less is the method's accuracy
 NEAR_CRITICAL = 1e-6  # share of the squared rate within which the two roots count as one
-TOUCH = 1.5e-3  # m: nearer pieces touch; a figure stops short of things by less
-ROUNDS = 10  # of impulses over all contacts: with several contacts one undoes a part of another
-SLOW = 0.05  # m/s: slower approaches do not bounce, so that what is held lies still
-LEAST = 1e-6  # m/s: slower approaches are none
 
 
 @dataclass(frozen=True)
@@ -134,7 +130,7 @@ class Coupling:
         model = self._model
         missed = np.abs(pin.difference(model, wanted, shown))
         done = pin.difference(model, self._shown, shown) / dt
-        self.velocity = np.where(missed > BLOCKED, done, self.velocity)
+        self.velocity = np.where(missed > PUSH.blocked, done, self.velocity)
         self._shown = np.array(shown)
 
 
@@ -150,7 +146,7 @@ class PushedContacts:
             engine: with the things.
             state: of the figure where it was stopped.
             table: pieces and pairs of the scene.
-            near: pairs nearer than `TOUCH` there.
+            near: pairs nearer than `PUSH.touch` there.
             bodies: piece to the thing it is part of, of things that move by themselves.
         """
         self._engine, self._state = engine, state
@@ -180,7 +176,7 @@ class PushedContacts:
             engine.mobility(thing, point) + self._mobility(joint, point) for joint, thing, _, point, _ in self.rows
         ]
         given: dict[str, Array] = {}
-        for _ in range(ROUNDS):
+        for _ in range(PUSH.rounds):
             moved = False
             for (_, thing, piece, point, normal), hand, mobility in zip(self.rows, hands, mobilities, strict=True):
                 relative = engine.velocity_at(thing, point) - hand
@@ -213,15 +209,15 @@ def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Su
         surface: restitution and friction.
     """
     approach = -float(normal @ relative)
-    if approach <= LEAST:
+    if approach <= PUSH.least:
         return None
-    bounce = surface.restitution if approach > SLOW else 0.0
+    bounce = surface.restitution if approach > PUSH.slow else 0.0
     size = (1.0 + bounce) * approach / float(normal @ mobility @ normal)
     impulse = size * normal
     sliding = relative + mobility @ impulse
     sliding = sliding - (normal @ sliding) * normal
     speed = float(np.linalg.norm(sliding))
-    if speed > LEAST:
+    if speed > PUSH.least:
         along = sliding / speed
         impulse = impulse - min(surface.friction * size, speed / float(along @ mobility @ along)) * along
     return np.asarray(impulse)

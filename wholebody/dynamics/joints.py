@@ -18,7 +18,6 @@ from wholebody.dynamics.solve_kernel import Laws, Limits
 from wholebody.scene.matter.joints import BallJoint, Hinge
 from wholebody.scene.scene import Scene
 
-CLOSED = 1e-9  # m: by which joint points may be apart at the end of a step
 KEPT = 1e-9  # m/s: to which velocities keep joints
 SHORTEST_AXIS = 1e-3  # m: between the two points of a hinge
 

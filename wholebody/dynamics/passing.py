@@ -19,12 +19,10 @@ from wholebody.base.compiled import compiled
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.pieces import SweptPoints
+from wholebody.dynamics.settings import PASSING_PAIRS
 from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
-MOST_LOOKS = 64  # places of one pair on the way; what would need more is doubtful
-DOUBTS = 50  # pairs that are looked at on their way, at most
-EARLIEST = 0.1  # share of a step: of meetings before it, the points are taken there
 
 
 class StepStart:
@@ -53,8 +51,8 @@ class PassingCheck(NamedTuple):
 
     Attributes:
         free: whether no pieces can have been deeper than `PASSING` in each other.
-        meetings: shares of the step at which pieces meet or may meet, at least `EARLIEST`; none where there are too
-            many doubts.
+        meetings: shares of the step at which pieces meet or may meet, at least `PASSING_PAIRS.earliest`; none where
+            there are too many doubts.
     """
 
     free: bool
@@ -115,10 +113,10 @@ def check_passing(
         np.linalg.norm(state.spin, axis=1) * time, pieces.lever, gravity * time**2 / 8.0,
     )  # fmt: skip
     doubts = np.zeros(len(near.pair), dtype=bool)
-    if doubtful(way, pieces.swept, doubts) > DOUBTS:
+    if doubtful(way, pieces.swept, doubts) > PASSING_PAIRS.doubts:
         return PassingCheck(False)
     met = [_meeting(state, before, pair, way) for pair in near.pair[doubts].tolist()]
-    shares = tuple(sorted({max(share, EARLIEST) for share in met if share is not None}))
+    shares = tuple(sorted({max(share, PASSING_PAIRS.earliest) for share in met if share is not None}))
     return PassingCheck(not shares, shares)
 
 
@@ -156,7 +154,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
         while True:
             place(at + part)
             looks += 1
-            if looks > MOST_LOOKS:
+            if looks > PASSING_PAIRS.places:
                 return at
             if any(
                 min(distance, float(apart(first, second, along, placed, pieces.swept))) - part * part * bend > -PASSING

@@ -14,15 +14,8 @@ from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.impact_kernel import SLOW
 from wholebody.dynamics.joints import Joints
 from wholebody.dynamics.rows_kernel import Rows
+from wholebody.dynamics.settings import PROGRAM, SKIN
 from wholebody.dynamics.solve_kernel import Laws, Limits
-
-SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
-TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
-TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
-UNSOLVED = 1.2e-4  # m/s: of points that push against what is moved; their impulses are not started from again
-VISITS = 20_000  # points times sweeps of a program, of which ...
-SWEEPS = 1000  # ... there are at most so many: more is exacter and slower
-MOST_EVENTS = 1000  # at one stop
 
 
 class Impulses(NamedTuple):
@@ -69,7 +62,7 @@ class StepProgram:
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
-        self._touching = points.gap <= SKIN + TOUCH
+        self._touching = points.gap <= SKIN + PROGRAM.touch
         self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
         self._rows = self._point_rows(state.bodies.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
@@ -103,7 +96,7 @@ class StepProgram:
         return rows
 
     def _limits(self, tolerance: float) -> Limits:
-        return Limits(tolerance, min(SWEEPS, VISITS // max(len(self._rows.bodies), 1) + 1))
+        return Limits(tolerance, min(PROGRAM.sweeps, PROGRAM.visits // max(len(self._rows.bodies), 1) + 1))
 
     def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
         """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
@@ -120,7 +113,7 @@ class StepProgram:
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
         self._jammed = np.zeros(count + len(gap), dtype=bool)
-        self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
+        self._touching = np.concatenate([self._touching, gap <= SKIN + PROGRAM.touch])
         self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
@@ -146,7 +139,7 @@ class StepProgram:
         state, points = self.state, self.points
         weighed = state.bodies.given & np.isfinite(state.pieces.mass)
         rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.bodies.twist.copy(), np.zeros((MOST_EVENTS, 5))
+        twist, events = state.bodies.twist.copy(), np.zeros((PROGRAM.events, 5))
         laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
@@ -191,7 +184,7 @@ class StepProgram:
     def _restrain(self, began: Array, time: float, target: Array) -> None:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
         bodies, points = self.state.bodies, self._rows.bodies
-        off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > UNSOLVED
+        off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > PROGRAM.unsolved
         energy_kernel.restrain(points, self.impulse, off, bodies, began, time * self.gravity, self._jammed)
 
     def work(self) -> Array:
@@ -220,7 +213,7 @@ class StepProgram:
         self.impulse[len(target) :] = start.joint
         self.residuals = solve_kernel.solve_from(
             old, new, self._rows, Laws(self._friction, target, hold), self.state.bodies.twist, self.impulse,
-            self._limits(TOLERANCE),
+            self._limits(PROGRAM.tolerance),
         )  # fmt: skip
 
     def world_impulse(self) -> Array:
