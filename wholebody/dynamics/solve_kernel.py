@@ -25,6 +25,7 @@ NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their targe
 ISLAND_SWEEPS = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
 ROUGH = 30.0  # tolerances: an island whose last sweep changes more has EXTRA_SWEEPS times as many sweeps
 EXTRA_SWEEPS = 6
+SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
@@ -310,7 +311,10 @@ def solve_from(
 
 @compiled(inner=True)
 def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
-    """Add the impulse of each old point to the nearest new one of its pair: witness points jump from corner to corner.
+    """Write the impulses of the nearest old points of the same pair.
+
+    An old point that is not the nearest of any new one within `SAME_POINT` gives its impulse to the nearest new one, as
+    witness points jump from corner to corner.
 
     Args:
         old: pair (k,) of each, the point (k, 3) in the first body's axes, and its impulse (k, 3) in the world.
@@ -321,24 +325,50 @@ def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], a
     pair, local, world = old
     new_pair, new_local = new
     most = -1
+    for number in range(len(pair)):
+        most = max(most, pair[number])
     for c in range(len(new_pair)):
         most = max(most, new_pair[c])
-    head, following = np.full(most + 1, -1, dtype=np.intp), np.full(len(new_pair), -1, dtype=np.intp)
-    for c in range(len(new_pair)):  # the points of each pair, as a list
-        following[c] = head[new_pair[c]]
-        head[new_pair[c]] = c
+    head, following = np.full(most + 1, -1, dtype=np.intp), np.full(len(pair), -1, dtype=np.intp)
+    new_head, new_following = np.full(most + 1, -1, dtype=np.intp), np.full(len(new_pair), -1, dtype=np.intp)
+    for number in range(len(pair)):  # the points of each pair, as lists
+        following[number] = head[pair[number]]
+        head[pair[number]] = number
+    for c in range(len(new_pair)):
+        new_following[c] = new_head[new_pair[c]]
+        new_head[new_pair[c]] = c
+    used, none = np.zeros(len(pair), dtype=np.bool_), np.zeros(len(new_pair), dtype=np.bool_)
+    for c in range(len(new_pair)):
+        number = _nearest(head[new_pair[c]], following, local, new_local[c], used, SAME_POINT)
+        if number >= 0:
+            used[number] = True
+            _add(world[number], axes[c], impulse[c])
     for number in range(len(pair)):
-        best, least = -1, np.inf
-        c = head[pair[number]] if pair[number] <= most else -1
-        while c >= 0:
+        if not used[number]:
+            c = _nearest(new_head[pair[number]], new_following, new_local, local[number], none, np.inf)
+            if c >= 0:
+                _add(world[number], axes[c], impulse[c])
+
+
+@compiled(inner=True)
+def _nearest(first: int, following: Indices, points: Array, at: Array, left_out: Mask, within: float) -> int:
+    """The point of a list that is nearest to a place (3,), within a distance; -1 if there is none."""
+    best, least, number = -1, within * within, first
+    while number >= 0:
+        if not left_out[number]:
             square = 0.0
             for k in range(3):
-                square += (local[number, k] - new_local[c, k]) ** 2
+                square += (points[number, k] - at[k]) ** 2
             if square < least:
-                best, least = c, square
-            c = following[c]
-        if best >= 0:
-            for row in range(3):
-                for k in range(3):
-                    impulse[best, row] += axes[best, row, k] * world[number, k]
-            impulse[best, 0] = max(impulse[best, 0], 0.0)
+                best, least = number, square
+        number = following[number]
+    return best
+
+
+@compiled(inner=True)
+def _add(world: Array, axes: Array, impulse: Array) -> None:
+    """Add an impulse (3,) in the world to one (3,) along axes; its normal part is not negative."""
+    for row in range(3):
+        for k in range(3):
+            impulse[row] += axes[row, k] * world[k]
+    impulse[0] = max(impulse[0], 0.0)
