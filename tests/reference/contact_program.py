@@ -51,7 +51,7 @@ def solve(
     answer = inverse_mass @ jacobian.T
     rows = [slice(3 * c, 3 * c + 3) for c in range(m)]
     gram = [jacobian[r] @ answer[:, r] for r in rows]
-    way, last = np.zeros((m, 3)), np.inf
+    way, last, calm = np.zeros((m, 3)), np.inf, 0
     for sweep in range(most):
         before, change, square = p.copy(), 0.0, 0.0
         order = list(range(contacts))
@@ -73,7 +73,8 @@ def solve(
                 change, square = max(change, np.abs(scale * step).max()), square + scale @ step**2
             twist += answer[:, rows[c]] @ step
             p[c] += step
-        if change < tolerance or sweep == most - 1:
+        calm = calm + 1 if change < tolerance else 0
+        if calm == 2 or sweep == most - 1:
             return p, twist, sweep + 1
         share, last = (square / last if last else np.nan), square
         farther = share * way if share < 1.0 else np.zeros_like(way)

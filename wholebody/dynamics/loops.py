@@ -30,7 +30,7 @@ def compiled_kernel() -> Any:
     rows_kernel.contact_rows(ContactPoints(none, pairs, vectors, vectors, some), bodies, rows)
     rows_kernel.joint_rows(joints, bodies, rows)
     rows_kernel.joint_gaps(joints, bodies, vectors)
-    rows_kernel.rates(rows, twist, vectors)
+    rows_kernel.rates(pairs, rows.jacobian, twist, vectors)
     laws = Laws(some, some, vectors)
     solve_kernel.solve(none, rows, laws, twist, vectors, Limits(1.0, 1))
     solve_kernel.solve_islands(rows, laws, twist, vectors, Limits(1.0, 1))

@@ -214,8 +214,15 @@ def push(c: int, row: int, impulse: float, rows: Rows, twist: Array) -> None:
 
 
 @compiled()
-def rates(rows: Rows, twist: Array, result: Array) -> None:
-    """Write the relative velocities (m, 3) along the axes of all points."""
-    for c in range(len(rows.bodies)):
+def rates(bodies: Indices, jacobian: Array, twist: Array, result: Array) -> None:
+    """Write the relative velocities (m, 3) along the axes of all points.
+
+    It takes arrays of `Rows`, not the record: numba needs four microseconds to recognise a record from Python.
+    """
+    for c in range(len(bodies)):
+        a, b = bodies[c, 0], bodies[c, 1]
         for row in range(3):
-            result[c, row] = relative(c, row, rows, twist)
+            total = 0.0
+            for k in range(6):
+                total += jacobian[c, row, k] * twist[a, k] + jacobian[c, row, 6 + k] * twist[b, k]
+            result[c, row] = total

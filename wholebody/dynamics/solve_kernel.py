@@ -47,7 +47,7 @@ class Limits(NamedTuple):
     """Where a program ends.
 
     Attributes:
-        tolerance: of u, m/s: a sweep that changes none by more ends it.
+        tolerance: of u, m/s: two sweeps, one each way, that change none by more end it.
         sweeps: most of them.
     """
 
@@ -139,6 +139,7 @@ def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array,
     last, contacts = np.inf, 0
     for c in chosen:
         contacts += c < len(laws.target)
+    calm = 0  # sweeps that changed less than the tolerance; one is not enough: islands would be taken up again
     for sweep in range(limits.sweeps):
         change, square = 0.0, 0.0
         for number in range(count):
@@ -148,7 +149,8 @@ def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array,
                 before[place, row] = impulse[c, row]
             largest, moved, _ = _visit(c, rows, laws, twist, impulse)
             change, square = max(change, largest), square + moved
-        if change < limits.tolerance or sweep == limits.sweeps - 1:
+        calm = calm + 1 if change < limits.tolerance else 0
+        if calm == 2 or sweep == limits.sweeps - 1:
             return sweep + 1
         share, last = square / last, square
         for place in range(count):

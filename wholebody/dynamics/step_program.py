@@ -83,7 +83,7 @@ class StepProgram:
     def _rates(self, twist: Array) -> Array:
         """Relative velocities (m + j, 3) along the axes of the points."""
         found = np.empty((len(self._rows.bodies), 3))
-        rows_kernel.rates(self._rows, twist, found)
+        rows_kernel.rates(self._rows.bodies, self._rows.jacobian, twist, found)
         return found
 
     def _point_rows(self, movable: Mask) -> Rows:
