@@ -115,14 +115,6 @@ def test_bounds_of_a_mesh_are_those_of_its_vertices() -> None:
     assert np.allclose(high, (0.3, 0.2, 0.1), atol=1e-9)
 
 
-def test_real_props_are_filled_and_worn(capsules: Figure, shared_data: object) -> None:
-    quiver = wb.Mesh(f"{shared_data}/props/quiver.obj", up="y", scale=0.5)
-    worn = Equipment.worn(quiver, capsules, name="quiver", to="thorax", side="back").filled(6, envelope=True)
-    assert worn.filling is not None
-    assert worn.filling.uncovered < 0.1
-    assert "quiver" in worn.attach(wb.Scene(capsules)).objects
-
-
 def test_mistakes_are_named(capsules: Figure) -> None:
     with pytest.raises(wb.UnknownNameError, match="pack"):
         equipment("back_pack", capsules)

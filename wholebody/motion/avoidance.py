@@ -14,7 +14,9 @@ from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
+import pinocchio as pin
 
+from wholebody.base.arrays import Array
 from wholebody.base.checks import a, flag, function, instance, listed, shown
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.base.records import with_values
@@ -135,7 +137,8 @@ def avoid(
                 result = freed(chosen, run)
             seconds, report = time.perf_counter() - began, judge.report(result, run)
         except UndefinedTermError as error:  # terms of one's own are finite at the original postures, if nowhere else
-            result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {error}")
+            why = str(error) if error.q is None else error.told_of(f"near frame {_nearest(clip, error.q)}")
+            result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {why}")
             seconds, report = time.perf_counter() - began, replace(judge.report(result, run), solved=False)
         # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
         if report.rough and result.times is None and chosen.dynamics is None and not run.ended:
@@ -150,6 +153,11 @@ def avoid(
                     result, report = smooth, replace(other, smoothed=found.windows)
             seconds += time.perf_counter() - began
     return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
+
+
+def _nearest(clip: Clip, q: Array) -> int:
+    """The frame whose posture is nearest to one (nq,)."""
+    return int(np.argmin([np.linalg.norm(pin.difference(clip.figure.model, frame, q)) for frame in clip.q]))
 
 
 class _Judge:

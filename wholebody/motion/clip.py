@@ -102,6 +102,9 @@ def _along(own: Array, other: Array) -> float:
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
 
+BLOCK = 10_000
+"""Frames that are normalised at once: an array for each of a million takes more than their values."""
+
 
 @dataclass(frozen=True, eq=False)
 class Clip:
@@ -138,24 +141,26 @@ class Clip:
                 f"{self.figure.name}"
             )
         check_frames(q, self.name, lambda column: column_name(self.figure, column))
-        q = self._normalised(q)
+        self._normalise(q)
         self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
 
-    def _normalised(self, q: Array) -> Array:
-        """The postures with quaternions, and cosines and sines of unlimited joints, of unit length."""
+    def _normalise(self, q: Array) -> None:
+        """Make quaternions, and cosines and sines of unlimited joints, of unit length."""
         model = self.figure.model
-        unit = np.array([pin.normalize(model, frame) for frame in q])
-        off = ~(np.abs(unit - q) <= UNIT_TOLERANCE)
-        off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
-        if off.any():
-            frame, column = (int(k) for k in np.argwhere(off)[0])
-            raise InputError(
-                f"{self.name}: frame {frame}, {column_name(self.figure, column)} belongs to a quaternion or a "
-                "direction that is not of unit length; normalise it"
-            )
-        return unit
+        for first in range(0, len(q), BLOCK):
+            block = q[first : first + BLOCK]
+            unit = np.array([pin.normalize(model, frame) for frame in block])
+            off = ~(np.abs(unit - block) <= UNIT_TOLERANCE)
+            off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
+            if off.any():
+                frame, column = (int(k) for k in np.argwhere(off)[0])
+                raise InputError(
+                    f"{self.name}: frame {first + frame}, {column_name(self.figure, column)} belongs to a quaternion "
+                    "or a direction that is not of unit length; normalise it"
+                )
+            block[:] = unit
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from types import SimpleNamespace
@@ -17,7 +17,6 @@ from scipy.optimize import minimize
 import wholebody as wb
 from tests.freeing import Found, begun, freed_by
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress
@@ -25,11 +24,10 @@ from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import AvoidProgress, Run, Watch
 from wholebody.motion.bisection import method as method_module
 from wholebody.motion.bisection.method import Bisection
-from wholebody.motion.bisection.prediction import Predictor, path_planes
+from wholebody.motion.bisection.prediction import Predictor
 from wholebody.motion.bisection.recursion import hold_between
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import frame_terms
-from wholebody.motion.measures import deviation
 from wholebody.motion.windows import runs
 from wholebody.motion.worn_equipment import equipment
 
@@ -82,7 +80,7 @@ def depths(scene: wb.Scene, q: Array) -> Array:
     return np.array(found)
 
 
-def between(scene: wb.Scene, q: Array, parts: int = 6) -> float:
+def between(scene: wb.Scene, q: Array, parts: int = 3) -> float:
     """Deepest overlap at postures between those of a clip."""
     steps = [pin.interpolate(scene.model, a, b, k / parts) for a, b in pairwise(q) for k in range(parts)]
     return float(depths(scene, np.array(steps)).max())
@@ -92,8 +90,7 @@ def changed(clip: Clip, result: Found) -> Array:
     return np.flatnonzero((result.q != clip.q).any(axis=1))
 
 
-@pytest.mark.parametrize("kind", ["linear", "quadratic"])
-@pytest.mark.parametrize("gear", ["side_sphere", "pack"])
+@pytest.mark.parametrize(("gear", "kind"), [("side_sphere", "linear"), ("pack", "quadratic")])
 def test_every_frame_is_free_and_frames_outside_of_the_groups_stay(swing: Clip, gear: str, kind: str) -> None:
     scene = dressed(swing.figure, gear)
     before = depths(scene, swing.q) > DEEP
@@ -164,15 +161,6 @@ def test_feet_that_are_held_side_by_side_are_asked_for_no_more_room(person: Figu
         np.testing.assert_allclose(state.frame(person.frame_id(foot.frame)).translation, held, atol=2e-4)
 
 
-def test_evaluation_points_that_went_far_follow_from_the_next_one_where_that_is_nearer(person: Figure) -> None:
-    """A squat with pouches: from the points before them two went to 0.215 rad, with those after them it is 0.196."""
-    whole, scene = synthetic("squat", person), dressed(person, "pouches")
-    clip = Clip(person, whole.q[::2], 2.0 * whole.dt)
-    result = freed_by(Bisection(), clip, scene, (wb.motion.StanceFeet(),))
-    assert depths(scene, result.q).max() <= DEEP
-    assert deviation(clip, clip.with_q(result.q)).angle < 0.205
-
-
 def test_in_the_sphere_mode_no_spheres_of_two_groups_intersect(swing: Clip) -> None:
     """Self-collision of the thesis: 39 spheres, and a pouch filled with spheres."""
     figure = wb.load("human", detail="spheres")
@@ -207,22 +195,6 @@ def test_the_root_moves_where_a_frame_cannot_be_freed_with_it_frozen(swing: Clip
     assert 0.04 < np.linalg.norm(result.q[:, :3] - still.q[:, :3], axis=1).min() < 0.07
 
 
-def test_a_foot_that_stands_has_no_plane_of_its_path(swing: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The held foot says where it is; the ankle of the other one, and both elbows, keep theirs."""
-    figure, q = swing.figure, swing.q[:20].copy()
-    knee = figure.model.joints[figure.joint_id("left_knee_flexion")].idx_q
-    q[:, knee] += np.linspace(0.2, 1.2, len(q))  # the left foot is lifted
-    clip, scene, asked = Clip(figure, q, swing.dt), dressed(figure, "side_sphere"), set[tuple[str, ...]]()
-
-    def noted(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[wb.Plane]:
-        asked.add(tuple(joints))
-        return path_planes(figure, q, frame, joints, state)
-
-    monkeypatch.setattr("wholebody.motion.bisection.recursion.path_planes", noted)
-    freed_by(Bisection(), clip, scene, [wb.motion.StanceFeet()])
-    assert asked == {("left_elbow", "right_elbow", "left_ankle")}
-
-
 def test_a_constraint_freezes_as_the_setting_does(swing: Clip) -> None:
     scene = dressed(swing.figure, "side_sphere")
     column = swing.figure.model.joints[swing.figure.joint_id("left_elbow_flexion")].idx_q
@@ -240,7 +212,7 @@ def test_the_second_hand_keeps_its_place_on_the_weapon_in_every_frame(person: Fi
         constraints=[wb.Freeze("root", "lower_body", "spine")],
     )
     base = wb.solve(held).q
-    ways = 0.1 * np.sin(2 * np.pi * np.arange(24) / 24)
+    ways = 0.1 * np.sin(2 * np.pi * np.arange(10) / 10)
     q = [
         wb.solve(
             wb.Problem(
@@ -305,7 +277,7 @@ def test_the_ends_of_the_clip_are_freed(swing: Clip) -> None:
     assert {0, 19} <= set(changed(clip, result).tolist())
 
 
-@pytest.mark.parametrize("frames", [1, 2, 3])
+@pytest.mark.parametrize("frames", [1, 3])
 def test_short_clips_are_freed(swing: Clip, frames: int) -> None:
     scene = dressed(swing.figure, "side_sphere")
     clip = swing[:frames]
@@ -324,9 +296,7 @@ def test_a_middle_that_cannot_be_freed_ends_with_a_sentence(swing: Clip) -> None
     assert np.array_equal(result.q, swing.q)
 
 
-@pytest.mark.parametrize("own", [False, True])
-def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: pytest.MonkeyPatch, own: bool) -> None:
-    """That of a method of one's own is as long as its settings say: what an iteration of it brings is not known."""
+def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: pytest.MonkeyPatch) -> None:
     lengths, short = list[int](), Bisection().short
 
     class Endless(wb.QP):
@@ -340,9 +310,8 @@ def test_a_search_that_other_starts_may_end_is_short(swing: Clip, monkeypatch: p
             return found
 
     monkeypatch.setattr(method_module, "QP", Endless)
-    asked = Bisection(method=Endless(restarts=0) if own else "qp")
-    freed_by(asked, swing, dressed(swing.figure, "torus"))
-    assert max(lengths) < short if not own else min(lengths) == 10 * short
+    freed_by(Bisection(), swing, dressed(swing.figure, "torus"))
+    assert max(lengths) < short
 
 
 def test_the_search_goes_on_where_no_start_leads_to_a_free_posture_soon(swing: Clip) -> None:

@@ -22,7 +22,7 @@ from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 SKELETON = Path(__file__).parents[1] / "data" / "smpl.csv"
 """Joints of SMPL, their parents and offsets."""
 
-RATES = ("mocap_framerate", "mocap_frame_rate")
+RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""
 
@@ -32,7 +32,7 @@ TEMPLATE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 def is_amass(arrays: dict[str, np.ndarray]) -> bool:
     """Whether an archive's arrays are those of AMASS."""
-    return "poses" in arrays and "trans" in arrays
+    return "trans" in arrays and ("poses" in arrays or {"root_orient", "pose_body"} <= arrays.keys())
 
 
 def read_motion(path: Path) -> SkeletonMotion:
@@ -68,7 +68,17 @@ def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, flo
     if not is_amass(arrays) or rate is None:
         missing = [key for key in ("poses", "trans") if key not in arrays] or [RATES[0]]
         raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
-    poses, places = _numbers(arrays["poses"], f"{name}: poses"), _numbers(arrays["trans"], f"{name}: trans")
+    if "poses" in arrays:
+        poses = _numbers(arrays["poses"], f"{name}: poses")
+    else:
+        parts = [_numbers(arrays[part], f"{name}: {part}") for part in ("root_orient", "pose_body")]
+        if any(part.ndim != 2 or len(part) != len(parts[0]) for part in parts):
+            raise FileFormatError(
+                f"{name}: root_orient and pose_body have shapes {parts[0].shape} and {parts[1].shape}; "
+                "give (frames, 3) and (frames, 63)"
+            )
+        poses = np.hstack(parts)
+    places = _numbers(arrays["trans"], f"{name}: trans")
     frequency = _numbers(rate, f"{name}: frame rate")
     if frequency.size != 1 or not 1.0 / TIME_STEP[1] <= float(frequency.ravel()[0]) <= 1.0 / TIME_STEP[0]:
         raise FileFormatError(

@@ -8,11 +8,12 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import Scratch, read_text, title_of
+from wholebody.base.files import Scratch, read_foreign_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
@@ -50,8 +51,9 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         MissingPackageError: pybvh is not installed.
     """
     library = pybvh()
-    found = parsed(read_text(path, "motion", LARGEST_FILE), path.name)
+    found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
     offsets, root, notes = _offsets(found)
+    notes = [*found.notes, *notes]
     made = _pybvh_motion(library, found, offsets, root)
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
@@ -72,19 +74,70 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     moving = np.array([bool(joint.channels) for joint in found.joints])
     local = np.tile(np.eye(3), (len(found.table) - first, len(parents), 1, 1))
     local[:, moving] = turn @ made.to_rotmat()[1][first:] @ turn.T
+    names = tuple(joint.name for joint in found.joints)
+    top = _moved_joint(found, parents, offsets)
+    places = scale * root[first:] @ turn.T
+    if top:
+        places, local = _from_the_world(
+            top, places, scale * _positions(found, top)[first:] @ turn.T, parents, local, offsets, scale * turn
+        )
+        notes = [note for note in notes if f"the bone to {names[top]} changes" not in note]
+        notes.append(f"{names[top]} moves below {names[0]}, which is left out")
+        kept = _below(top, parents)
+        names, offsets, local = tuple(names[k] for k in kept), offsets[kept], local[:, kept]
+        offsets[0] = 0.0
+        parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
     try:
         return SkeletonMotion.moved(
-            tuple(joint.name for joint in found.joints),
-            parents,
-            scale * offsets @ turn.T,
-            local,
-            scale * root[first:] @ turn.T,
-            made.frame_time,
-            title_of(path),
-            tuple(notes),
+            names, parents, scale * offsets @ turn.T, local, places, made.frame_time, title_of(path), tuple(notes)
         )
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _positions(found: BvhText, joint: int) -> Array:
+    """Positions of a joint in its parent (n, 3): its channels, and its offset where it has none."""
+    columns = _columns(found)[joint]
+    still = np.zeros(len(found.table))
+    offset = found.joints[joint].offset
+    return np.stack([columns.get(("XYZ"[axis], "position"), still + offset[axis]) for axis in range(3)], axis=1)
+
+
+def _moved_joint(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> int:
+    """The joint whose positions move the skeleton below a root that carries nothing else; 0 for the root itself."""
+    size, at = longest_way(parents, offsets), 0
+    while True:
+        below = [k for k in range(len(parents)) if parents[k] == at and found.joints[k].channels]
+        if len(below) != 1:
+            return 0
+        at = below[0]
+        if np.ptp(_positions(found, at), axis=0).max() > 0.01 * size:
+            return at
+
+
+def _below(top: int, parents: NDArray[np.intp]) -> list[int]:
+    kept = [top]
+    for k in range(top + 1, len(parents)):
+        if parents[k] in kept:
+            kept.append(k)
+    return kept
+
+
+def _from_the_world(
+    top: int, root: Array, position: Array, parents: NDArray[np.intp], local: Array, offsets: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Places of a joint in the world (n, 3), and the local rotations with those above it in its own."""
+    above = [top]
+    while parents[above[-1]] >= 0:
+        above.append(int(parents[above[-1]]))
+    places, turned = root, local[:, above[-1]]
+    for joint in reversed(above[:-1]):
+        step = position if joint == top else np.broadcast_to(scale @ offsets[joint], root.shape)
+        places = places + np.einsum("nij,nj->ni", turned, step)
+        turned = turned @ local[:, joint]
+    changed = local.copy()
+    changed[:, top] = turned
+    return places, changed
 
 
 def _begins_with_rest(angles: Array) -> bool:
@@ -124,14 +177,16 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
     columns = _columns(found)
     size = longest_way(np.array([joint.parent for joint in found.joints]), offsets)
     notes = []
+    # positions that are zero in every frame are those of a program that adds them to the offsets
+    still = [not any(values.any() for (_, kind), values in each.items() if kind == "position") for each in columns]
     for k, joint in enumerate(found.joints[1:], 1):
         for axis in range(3):
             values = columns[k].get(("XYZ"[axis], "position"))
-            if values is not None:
+            if values is not None and not still[k]:
                 offsets[k, axis] = values.mean()
                 if np.ptp(values) > 0.01 * size:
                     notes.append(f"the length of the bone to {joint.name} changes; its mean is taken")
-    root = np.stack([columns[0]["XYZ"[axis], "position"] for axis in range(3)], axis=1)
+    root = _positions(found, 0)
     offsets[0] = 0.0  # the root's channels are its place in the world
     return offsets, root, notes
 
