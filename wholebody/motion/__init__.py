@@ -10,11 +10,12 @@ if TYPE_CHECKING:
     from wholebody.motion.batch import BatchProgress, avoid_many, read_many
     from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
+    from wholebody.motion.bones import bone_errors
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip_torques import Torques, torques
     from wholebody.motion.fade import Fade
     from wholebody.motion.judging import AvoidanceReport, Avoided
-    from wholebody.motion.motion_bounds import MotionBounds
+    from wholebody.motion.measures import MotionBounds
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.skeleton import SkeletonMotion
@@ -40,6 +41,7 @@ __all__ = [
     "Torques",
     "Trajectory",
     "avoid_many",
+    "bone_errors",
     "equipment",
     "read_many",
     "read_skeleton",
@@ -53,10 +55,11 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.batch": "BatchProgress avoid_many read_many",
         "wholebody.motion.batch_table": "AvoidedCase",
         "wholebody.motion.bisection.method": "Bisection",
+        "wholebody.motion.bones": "bone_errors",
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
         "wholebody.motion.fade": "Fade",
-        "wholebody.motion.motion_bounds": "MotionBounds",
+        "wholebody.motion.measures": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",
         "wholebody.motion.skeleton": "SkeletonMotion",

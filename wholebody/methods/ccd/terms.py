@@ -63,13 +63,13 @@ class Request:
     ranges: tuple[str, ...]
 
 
-def read(problem: Problem) -> Request:
-    """Convert a problem.
+def read(problem: Problem, state: State | None = None) -> Request:
+    """Convert a problem; `state`, if given, is moved to the problem's start.
 
     Raises:
         UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
     """
-    reader = _Reader(problem)
+    reader = _Reader(problem, State(problem.scene.model) if state is None else state)
     goals = reader.goals()
     cones, ranges = reader.constraints()
     reader.others()
@@ -87,8 +87,8 @@ class _Reader:
         fixed: that must not move.
     """
 
-    def __init__(self, problem: Problem) -> None:
-        self._problem, self._figure = problem, problem.scene.figure
+    def __init__(self, problem: Problem, state: State) -> None:
+        self._problem, self._figure, self._state = problem, problem.scene.figure, state
         self.refused: list[str] = []
         self.joints: set[int] = set()
         self.fixed = {
@@ -137,7 +137,7 @@ class _Reader:
             carried = carried - support[_joint(self._figure, term.relative_to)]
         if carried[_dofs(self._figure, self.joints)].any():
             self.refused.append(f"{where}, which the joints that reach move too")
-        elif np.abs(term.value(State(model).update(self._problem.start))).max() > HELD:
+        elif np.abs(term.value(self._state.update(self._problem.start))).max() > HELD:
             self.refused.append(f"{where}, which is elsewhere at the start")
         self.fixed |= {int(joint) for joint in range(1, model.njoints) if _moves(self._figure, joint, carried)}
 

@@ -84,6 +84,7 @@ class Iteration:
         """Use the present equations at x."""
         self.active_system.arrive(x)
         self.system, self.algebra = self.active_system.system, self.active_system.algebra
+        self.share = np.ones(len(self.system.goal)) if self.active_system.even else self.system.share
         self.goal_rows = np.flatnonzero(self.system.goal)
         self.objective = np.flatnonzero(self.system.objective)
         self.one_sided = np.flatnonzero(self.system.inequality)
@@ -241,7 +242,7 @@ class Iteration:
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
         diagonal = np.full(len(asked), STEPS.hard_damping + STEPS.hard_share * damping * damping)
         softness = (STEPS.goal_damping if goal_share else STEPS.restoring_damping) + damping if goals else FREE
-        diagonal[self.goal_rows] = softness / self.system.share[self.goal_rows] ** 2
+        diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":
             asked[self.objective] = self.residual[self.objective] / (1.0 + damping / STEPS.first_damping)
@@ -281,7 +282,7 @@ class Iteration:
     def _norms(self, residual: Array) -> tuple[float, float]:
         """Norms of the errors of the constraints, and of the goals."""
         error = self._error(residual)
-        goal = error[self.goal_rows] * self.system.share[self.goal_rows]
+        goal = error[self.goal_rows] * self.share[self.goal_rows]
         error[self.goal_rows] = 0.0
         return sqrt(float(error @ error)), sqrt(float(goal @ goal))
 
