@@ -32,9 +32,9 @@ from wholebody.bench.report import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.iteration import HARD_DAMPING
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.settings import STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.tracking import NewtonTracker
 
@@ -84,7 +84,7 @@ def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[LinearRow]:
             task = LinearSystem(
                 system.values(made.variables()),
                 system.weight,
-                np.full(pattern.height, HARD_DAMPING),
+                np.full(pattern.height, STEPS.hard_damping),
                 np.zeros(pattern.width),
                 rng.normal(size=pattern.height),
             )

@@ -51,15 +51,15 @@ def way_between(scene: wb.Scene, steps: dict[str, tuple[pin.SE3, float]], margin
     state, finder = BodiesState(scene, pieces), ContactFinder(pieces)
     count = len(pieces.names)
     margins, travel = np.full(count, margin), np.zeros(count)
-    near = finder.near(state.position, state.rotation, margins, pieces.dynamic)
+    near = finder.near(state.bodies.position, state.bodies.rotation, margins, pieces.dynamic)
     before = StepStart(state, near, margins, finder)
     for name, (step, way) in steps.items():
         number = pieces.index[name]
         at = step * state.placement(number)
-        state.spin[number] = pin.log3(at.rotation @ state.rotation[number].T)
+        state.spin[number] = pin.log3(at.rotation @ state.bodies.rotation[number].T)
         state.put(number, at)
         travel[number] = way
-    after = finder.near(state.position, state.rotation, margins, pieces.dynamic)
+    after = finder.near(state.bodies.position, state.bodies.rotation, margins, pieces.dynamic)
     return check_passing(state, before, after, margins, travel, 1.0, 0.0)
 
 

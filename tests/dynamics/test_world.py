@@ -7,7 +7,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.dynamics.driven_impulses import contact_impulse
+from wholebody.dynamics.coupling import contact_impulse
 from wholebody.dynamics.overlaps import overlaps
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.scene.matter.materials import Surface

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from wholebody.dynamics.solve_kernel import EXTRA_VISITS, FULL_SWEEP_PERIOD, JOINT_PRECISION, NEAR_TARGET, UNCONVERGED
+from wholebody.dynamics.solve_kernel import JOINT_PRECISION, Laws
 
 Array = np.ndarray
 
@@ -43,62 +43,44 @@ def whole(bodies: Array, blocks: Array, count: int) -> Array:
 
 
 def solve(
-    jacobian: Array, inverse_mass: Array, friction: Array, target: Array, hold: Array, twist: Array, impulse: Array,
-    tolerance: float, visits: int, most: int,
-) -> tuple[Array, Array, int]:  # fmt: skip
-    """Impulses (m, 3), velocities (6n,) and number of sweeps; `jacobian` (3m, 6n), `inverse_mass` (6n, 6n).
-
-    The first points are contacts, those of `hold` (j, 3) joints.
-    """
-    m, joints = len(impulse), len(hold)
+    jacobian: Array, inverse_mass: Array, laws: Laws, twist: Array, impulse: Array, tolerance: float, most: int
+) -> tuple[Array, Array, int]:
+    """Impulses (m, 3), velocities (6n,) and number of sweeps; `jacobian` (3m, 6n), `inverse_mass` (6n, 6n)."""
+    m, contacts = len(impulse), len(laws.target)
     twist, p = twist.copy(), impulse.copy()
     answer = inverse_mass @ jacobian.T
     rows = [slice(3 * c, 3 * c + 3) for c in range(m)]
     gram = [jacobian[r] @ answer[:, r] for r in rows]
-    listed: list[int] = []
-    way, last, full, left = np.zeros((m, 3)), np.inf, True, visits
+    way, last, calm = np.zeros((m, 3)), np.inf, 0
     for sweep in range(most):
         before, change, square = p.copy(), 0.0, 0.0
-        chosen = list(range(m - joints)) if full else listed
-        bearing = []
-        for c in chosen if sweep % 2 == 0 else reversed(chosen):
-            u, side = jacobian[rows[c]] @ twist, np.linalg.eigvalsh(gram[c][1:, 1:])[1]
-            normal = max(0.0, p[c, 0] - (u[0] - target[c]) / gram[c][0, 0])
-            if normal == 0.0 and not p[c].any():
-                if u[0] - target[c] < NEAR_TARGET:
-                    bearing.append(c)
-                continue
-            bearing.append(c)
-            slid = u[1:] + gram[c][1:, 0] * (normal - p[c, 0])
-            along = p[c, 1:] - slid / side
-            size = np.linalg.norm(along)
-            along *= min(1.0, friction[c] * normal / size) if size > 0.0 else 1.0
-            step = np.array([normal, *along]) - p[c]
+        order = list(range(contacts))
+        for c in (order if sweep % 2 == 0 else order[::-1]) + list(range(contacts, m)):
+            u = jacobian[rows[c]] @ twist
+            if c >= contacts:
+                off = laws.hold[c - contacts] - u
+                step = np.linalg.solve(gram[c], off)
+                change, square = max(change, JOINT_PRECISION * np.abs(off).max()), square + step @ off
+            else:
+                side = np.linalg.eigvalsh(gram[c][1:, 1:])[1]
+                normal = max(0.0, p[c, 0] - (u[0] - laws.target[c]) / gram[c][0, 0])
+                slid = u[1:] + gram[c][1:, 0] * (normal - p[c, 0])
+                along = p[c, 1:] - slid / side
+                size = np.linalg.norm(along)
+                along *= min(1.0, laws.friction[c] * normal / size) if size > 0.0 else 1.0
+                step = np.array([normal, *along]) - p[c]
+                scale = np.array([gram[c][0, 0], side, side])
+                change, square = max(change, np.abs(scale * step).max()), square + scale @ step**2
             twist += answer[:, rows[c]] @ step
             p[c] += step
-            scale = np.array([gram[c][0, 0], side, side])
-            change, square = max(change, np.abs(scale * step).max()), square + scale @ step**2
-        for number in range(joints):
-            c = m - joints + number
-            off = hold[number] - jacobian[rows[c]] @ twist
-            step = np.linalg.solve(gram[c], off)
-            twist += answer[:, rows[c]] @ step
-            p[c] += step
-            change, square = max(change, JOINT_PRECISION * np.abs(off).max()), square + step @ off
-        left -= len(chosen) + joints
-        spent = left <= 0 and (change < UNCONVERGED * tolerance or left <= (1 - EXTRA_VISITS) * visits)
-        if full:
-            listed = sorted(bearing)
-            way[[c for c in range(m - joints) if c not in listed]] = 0.0
-            if change < tolerance or sweep >= most - 1 or spent:
-                return p, twist, sweep + 1
-        full = change < tolerance or spent or sweep >= most - 2 or sweep % FULL_SWEEP_PERIOD == FULL_SWEEP_PERIOD - 1
+        calm = calm + 1 if change < tolerance else 0
+        if calm == 2 or sweep == most - 1:
+            return p, twist, sweep + 1
         share, last = (square / last if last else np.nan), square
-        for c in [*listed, *range(m - joints, m)]:
-            farther = share * way[c] if share < 1.0 else np.zeros(3)
-            way[c] = farther + p[c] - before[c] if share < 1.0 else 0.0
-            twist += answer[:, rows[c]] @ farther
-            p[c] += farther
+        farther = share * way if share < 1.0 else np.zeros_like(way)
+        way = farther + p - before if share < 1.0 else farther
+        twist += answer @ farther.ravel()
+        p += farther
     return p, twist, most
 
 

@@ -4,10 +4,15 @@ x is where the driven posture is, seen from the tracked one, in the tangent spac
 degree of freedom. During a frame the tracked posture moves with constant velocity, and x' is relative to that, so a
 figure that follows a steady motion does not lag behind. The equation is solved exactly for a frame, so any mass is
 stable at any frame time.
+
+Overlap removal stops a hand at the surface of a thing that is in its way, and what the spring between tracker and hand
+still wants there becomes an impulse on the thing: equations 7 to 10. The hand's side of equation 9 is the joint's mass
+and inertia, with what it carries; friction is capped where sliding ends.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from math import cos, exp, sin, sqrt
 from typing import Annotated
@@ -18,12 +23,16 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, number, posture, time_step
 from wholebody.base.fields import Checked, Range
+from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.dynamics.settings import PUSH
+from wholebody.figures.state import State
+from wholebody.geometry.proximity import Contacts, PairTable
+from wholebody.scene.matter.materials import Surface
 
 LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
 SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
 STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
 MASS = DAMPING**2 / (4.0 * STIFFNESS)  # kg: a hand's 0.4, with which the spring is critically damped
-BLOCKED = 1e-3  # rad, m: by which contact keeps a joint from where the spring wants it; less is the method's accuracy
 NEAR_CRITICAL = 1e-6  # share of the squared rate within which the two roots count as one
 
 
@@ -117,5 +126,94 @@ class Coupling:
         model = self._model
         missed = np.abs(pin.difference(model, wanted, shown))
         done = pin.difference(model, self._shown, shown) / dt
-        self.velocity = np.where(missed > BLOCKED, done, self.velocity)
+        self.velocity = np.where(missed > PUSH.blocked, done, self.velocity)
         self._shown = np.array(shown)
+
+
+class PushedContacts:
+    """The contacts of one frame in which the figure touches things that move by themselves."""
+
+    def __init__(
+        self, engine: RigidBodies, state: State, table: PairTable, near: Contacts, bodies: Mapping[int, str]
+    ) -> None:
+        """Gather them.
+
+        Args:
+            engine: with the things.
+            state: of the figure where it was stopped.
+            table: pieces and pairs of the scene.
+            near: pairs nearer than `PUSH.touch` there.
+            bodies: piece to the thing it is part of, of things that move by themselves.
+        """
+        self._engine, self._state = engine, state
+        self.rows: list[tuple[int, str, int, Array, Array]] = []
+        """Joint, thing, piece of the figure or what it carries, point (3,), normal (3,) towards the thing."""
+        for (first, second), normal, a, b in zip(
+            near.pair.tolist(), near.normal, near.point_a, near.point_b, strict=True
+        ):
+            for own, other, out in ((first, second, normal), (second, first, -normal)):
+                if other in bodies and table.joint[own] > 0:
+                    self.rows.append((int(table.joint[own]), bodies[other], own, 0.5 * (a + b), out))
+
+    def push(self, velocity: Array, surfaces: Mapping[tuple[int, str], Surface]) -> dict[str, Array]:
+        """Give the things the impulses of a figure that wants to move.
+
+        Args:
+            velocity: (nv,) of the figure.
+            surfaces: piece and thing to restitution and friction.
+
+        Returns:
+            Thing to its impulse (3,), N s.
+        """
+        engine, state = self._engine, self._state
+        twists = (state.support * state.spread(velocity)) @ state.columns
+        hands = [twists[joint, :3] + pin.skew(twists[joint, 3:]) @ point for joint, _, _, point, _ in self.rows]
+        mobilities = [
+            engine.mobility(thing, point) + self._mobility(joint, point) for joint, thing, _, point, _ in self.rows
+        ]
+        given: dict[str, Array] = {}
+        for _ in range(PUSH.rounds):
+            moved = False
+            for (_, thing, piece, point, normal), hand, mobility in zip(self.rows, hands, mobilities, strict=True):
+                relative = engine.velocity_at(thing, point) - hand
+                impulse = contact_impulse(relative, normal, mobility, surfaces[piece, thing])
+                if impulse is not None:
+                    engine.push(thing, impulse, point)
+                    given[thing] = given.get(thing, np.zeros(3)) + impulse
+                    moved = True
+            if not moved:
+                break
+        return given
+
+    def _mobility(self, joint: int, point: Array) -> Array:
+        """Change of velocity (3, 3) of a point of a joint's own mass by an impulse there; zero without mass."""
+        inertia, place = self._state.model.inertias[joint], self._state.data.oMi[joint]
+        if not (inertia.mass > 0.0 and np.linalg.eigvalsh(inertia.inertia).min() > 0.0):
+            return np.zeros((3, 3))
+        arm = pin.skew(point - place.act(inertia.lever))
+        turned = place.rotation @ np.linalg.inv(inertia.inertia) @ place.rotation.T
+        return np.asarray(np.eye(3) / inertia.mass - arm @ turned @ arm)
+
+
+def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Surface) -> Array | None:
+    """Impulse (3,) on body B of a contact, N s: equation 9, with friction of equation 10; None if they do not approach.
+
+    Args:
+        relative: (3,) velocity of B's point relative to A's.
+        normal: (3,) from A to B.
+        mobility: (3, 3) change of that velocity by an impulse on B, and its opposite on A.
+        surface: restitution and friction.
+    """
+    approach = -float(normal @ relative)
+    if approach <= PUSH.least:
+        return None
+    bounce = surface.restitution if approach > PUSH.slow else 0.0
+    size = (1.0 + bounce) * approach / float(normal @ mobility @ normal)
+    impulse = size * normal
+    sliding = relative + mobility @ impulse
+    sliding = sliding - (normal @ sliding) * normal
+    speed = float(np.linalg.norm(sliding))
+    if speed > PUSH.least:
+        along = sliding / speed
+        impulse = impulse - min(surface.friction * size, speed / float(along @ mobility @ along)) * along
+    return np.asarray(impulse)

@@ -25,293 +25,237 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.dynamics.contact_kernel import join
-from wholebody.dynamics.motion_kernel import angular_momentum, invert
+from wholebody.dynamics.motion_kernel import Bodies, angular_momentum, invert
+from wholebody.dynamics.solve_kernel import join
 
 LARGEST = 1.05  # of s: an island with joints that hardly moves is not made to move by what rounding left
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
 @compiled(inner=True)
-def _kinetic(mass: float, rotation: Array, inertia: Array, twist: Array, turning: Array) -> float:
-    angular_momentum(rotation, inertia, twist[3:], turning)
+def _kinetic(b: int, bodies: Bodies, rotation: Array, twist: Array, turning: Array) -> float:
+    """Kinetic energy of a body with a rotation (3, 3) and velocities (6,), joules."""
+    angular_momentum(rotation, bodies.inertia[b], twist[3:], turning)
     total = 0.0
     for k in range(3):
-        total += mass * twist[k] * twist[k] + twist[3 + k] * turning[k]
+        total += bodies.mass[b] * twist[k] * twist[k] + twist[3 + k] * turning[k]
     return 0.5 * total
 
 
 @compiled(inner=True)
-def _islands(
-    bodies: Indices,
-    impulse: Array,
-    contacts: int,
-    moving: Mask,
-    given: Mask,
-    pushed: Mask,
-    root: Indices,
-    kind: Indices,
-) -> None:
-    """Write which bodies a contact pushes, the island of each, and what the islands touch; see `restrain`."""
-    bearing, count = np.empty(len(bodies), dtype=np.intp), 0
-    kind[:], pushed[:] = FREE, False
-    for c in range(len(bodies)):
+def _islands(points: Indices, impulse: Array, contacts: int, bodies: Bodies) -> tuple[Indices, Indices, Mask]:
+    """The island (n,) of each body, what that touches, and which bodies a contact pushes; see `restrain`."""
+    count = len(bodies.mass)
+    root, kind = np.empty(count, dtype=np.intp), np.full(count, FREE, dtype=np.intp)
+    pushed, moving = np.zeros(count, dtype=np.bool_), bodies.moving
+    bearing, number = np.empty(len(points), dtype=np.intp), 0
+    for c in range(len(points)):
         if c < contacts and impulse[c, 0] <= 0.0:
             continue
-        bearing[count] = c
-        count += 1
+        bearing[number] = c
+        number += 1
         if c < contacts:
             for side in range(2):
-                pushed[bodies[c, side]] = moving[bodies[c, side]]
-    join(bearing[:count], bodies, moving, root)
-    for c in bearing[:count]:
+                pushed[points[c, side]] = moving[points[c, side]]
+    join(bearing[:number], points, moving, root)
+    for c in bearing[:number]:
         for side in range(2):
-            own, other = bodies[c, side], bodies[c, 1 - side]
+            own, other = points[c, side], points[c, 1 - side]
             if moving[own] and not moving[other]:
-                kind[root[own]] = max(kind[root[own]], DRIVEN if given[other] else FIXED)
+                kind[root[own]] = max(kind[root[own]], DRIVEN if bodies.given[other] else FIXED)
             elif moving[own] and own == other:  # a joint to the world
                 kind[root[own]] = max(kind[root[own]], FIXED)
+    return root, kind, pushed
+
+
+@compiled(inner=True)
+def _owner(points: Indices, c: int, bodies: Bodies, root: Indices) -> int:
+    """The island of a point."""
+    a, b = points[c, 0], points[c, 1]
+    return int(root[a if bodies.moving[a] else b])
 
 
 @compiled()
 def restrain(
-    bodies: Indices,
-    impulse: Array,
-    rate: Array,
-    target: Array,
-    unsolved: float,
-    moving: Mask,
-    given: Mask,
-    jointed: Mask,
-    mass: Array,
-    inertia: Array,
-    position: Array,
-    rotation: Array,
-    before: Array,
-    twist: Array,
-    fall: Array,
-    jammed: Mask,
+    points: Indices, impulse: Array, off: Mask, bodies: Bodies, before: Array, fall: Array, jammed: Mask
 ) -> None:
-    """Scale velocities down where an island gained energy.
+    """Scale velocities down where an island gained energy, and write which points are jammed.
 
     Islands with joints, and those that something moved pushes, are settled after they have moved: see `settle`.
 
     Args:
-        bodies: (m, 2) of all points, those of joints at the end.
+        points: (m, 2) bodies of all points, those of joints at the end.
         impulse: (m, 3) of the program.
-        rate: (m, 3) of the points after it, m/s.
-        target: (k,) least rates along the normals of the contact points, m/s.
-        unsolved: how much a rate may be off, m/s.
-        moving: (n,) bodies that move by themselves and do not sleep.
-        given: (n,) bodies that are moved.
-        jointed: (n,) bodies with joints.
-        mass: (n,).
-        inertia: (n, 3, 3) in the bodies.
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3).
+        off: (k,) contact points whose rates the program did not reach.
+        bodies: after the program; their velocities are changed in place.
         before: (n, 6) velocities before the step.
-        twist: (n, 6) after its program; changed in place.
         fall: (3,) gravity times the time of the step, m/s.
-        jammed: (k,) room: points that bear something of islands that something moved pushes, where a rate is off.
+        jammed: (k,) room: contact points that bear something of islands that something moved pushes, where a rate is
+            off.
     """
-    count, contacts = len(moving), len(target)
-    root, kind = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
-    chosen, off = np.empty(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    _islands(bodies, impulse, contacts, moving, given, chosen, root, kind)
-    for c in range(contacts):
-        jammed[c] = False
-        if impulse[c, 0] > 0.0 and abs(rate[c, 0] - target[c]) > unsolved:
-            off[root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]] = True
-    for c in range(contacts):
-        if impulse[c, 0] > 0.0:
-            island = root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]
-            jammed[c] = off[island] and kind[island] == DRIVEN
+    root, kind, pushed = _islands(points, impulse, len(off), bodies)
+    _find_jammed(points, impulse, off, bodies, root, kind, jammed)
+    count, twist = len(root), bodies.twist
     for b in range(count):
-        if jointed[b]:
+        if bodies.jointed[b]:
             kind[root[b]] = DRIVEN
     gain, turning = np.zeros(count), np.empty(3)
     for b in range(count):
-        if chosen[b] and kind[root[b]] != DRIVEN:
+        if pushed[b] and kind[root[b]] != DRIVEN:
             lifted = 0.0
             for k in range(3):
-                lifted -= mass[b] * fall[k] * twist[b, k]
-            after = _kinetic(mass[b], rotation[b], inertia[b], twist[b], turning)
-            gain[root[b]] += after + lifted - _kinetic(mass[b], rotation[b], inertia[b], before[b], turning)
+                lifted -= bodies.mass[b] * fall[k] * twist[b, k]
+            after = _kinetic(b, bodies, bodies.rotation[b], twist[b], turning)
+            gain[root[b]] += after + lifted - _kinetic(b, bodies, bodies.rotation[b], before[b], turning)
+    inside = np.empty(count, dtype=np.bool_)
     for island in range(count):
         if gain[island] > 0.0:
-            _scale(
-                island, kind[island] == FREE, gain[island], 1.0, root, chosen, mass, inertia, position, rotation, twist,
-                fall,
-            )  # fmt: skip
+            _choose(pushed, root, island, inside)
+            _take(inside, kind[island] == FREE, gain[island], 1.0, bodies, fall)
 
 
 @compiled()
 def settle(
-    bodies: Indices,
+    points: Indices,
     impulse: Array,
     work: Array,
     contacts: int,
-    moving: Mask,
-    given: Mask,
-    jointed: Mask,
-    mass: Array,
-    inertia: Array,
-    position: Array,
-    rotation: Array,
-    twist: Array,
-    old_position: Array,
-    old_rotation: Array,
-    old_twist: Array,
+    bodies: Bodies,
+    before: tuple[Array, Array, Array],
     gravity: Array,
 ) -> None:
     """Scale the velocities of islands with joints, and of those that something moved pushes, after a step.
 
-    Afterwards they have no more energy than before the step and the work on them, and joints without contacts neither
-    less.
+    Afterwards they have no more energy than before the step and the work on them, and joints without contacts no less.
 
     Args:
-        bodies: (m, 2) of all points, those of joints after the `contacts` of contacts.
+        points: (m, 2) bodies of all points, those of joints after the `contacts` of contacts.
         impulse: (m, 3) of the program.
         work: (m,) of what is moved at each point, joules.
         contacts: how many points are those of contacts.
-        moving: (n,) bodies that move by themselves and do not sleep.
-        given: (n,) bodies that are moved.
-        jointed: (n,) bodies with joints.
-        mass: (n,).
-        inertia: (n, 3, 3) in the bodies.
-        position: (n, 3) centres of mass after the step.
-        rotation: (n, 3, 3).
-        twist: (n, 6) changed in place.
-        old_position: (n, 3) before the step.
-        old_rotation: (n, 3, 3).
-        old_twist: (n, 6).
+        bodies: after the step; their velocities are changed in place.
+        before: positions (n, 3), rotations (n, 3, 3) and velocities (n, 6) before it.
         gravity: (3,) m/s2.
     """
-    count = len(moving)
-    root, kind = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
-    pushed, linked = np.empty(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
-    _islands(bodies, impulse, contacts, moving, given, pushed, root, kind)
-    gain, touched, turning = np.zeros(count), np.zeros(count, dtype=np.bool_), np.empty(3)
-    for c in range(len(bodies)):
+    root, kind, pushed = _islands(points, impulse, contacts, bodies)
+    count, moving = len(root), bodies.moving
+    linked, touched = np.zeros(count, dtype=np.bool_), np.zeros(count, dtype=np.bool_)
+    gain, turning = np.zeros(count), np.empty(3)
+    position, rotation, twist = before
+    for c in range(len(points)):
         if c >= contacts or impulse[c, 0] > 0.0:
-            gain[root[bodies[c, 0] if moving[bodies[c, 0]] else bodies[c, 1]]] -= work[c]
+            gain[_owner(points, c, bodies, root)] -= work[c]
     for b in range(count):
         if moving[b]:
-            linked[root[b]] |= jointed[b]
+            linked[root[b]] |= bodies.jointed[b]
             touched[root[b]] |= pushed[b]
-            gain[root[b]] += _kinetic(mass[b], rotation[b], inertia[b], twist[b], turning)
-            gain[root[b]] -= _kinetic(mass[b], old_rotation[b], inertia[b], old_twist[b], turning)
+            gain[root[b]] += _kinetic(b, bodies, bodies.rotation[b], bodies.twist[b], turning)
+            gain[root[b]] -= _kinetic(b, bodies, rotation[b], twist[b], turning)
             for k in range(3):
-                gain[root[b]] -= mass[b] * gravity[k] * (position[b, k] - old_position[b, k])
-    still = np.zeros(3)
+                gain[root[b]] -= bodies.mass[b] * gravity[k] * (bodies.position[b, k] - position[b, k])
+    still, inside = np.zeros(3), np.empty(count, dtype=np.bool_)
     for island in range(count):
         keeps = linked[island] and not touched[island]
         if keeps or (gain[island] > 0.0 and (linked[island] or kind[island] == DRIVEN)):
-            _scale(
-                island, kind[island] == FREE, gain[island], LARGEST if keeps else 1.0, root, moving, mass, inertia,
-                position, rotation, twist, still,
-            )  # fmt: skip
+            _choose(moving, root, island, inside)
+            _take(inside, kind[island] == FREE, gain[island], LARGEST if keeps else 1.0, bodies, still)
 
 
 @compiled(inner=True)
-def _scale(
-    island: int,
-    free: bool,
-    excess: float,
-    most: float,
-    root: Indices,
-    chosen: Mask,
-    mass: Array,
-    inertia: Array,
-    position: Array,
-    rotation: Array,
-    twist: Array,
-    fall: Array,
+def _find_jammed(
+    points: Indices, impulse: Array, off: Mask, bodies: Bodies, root: Indices, kind: Indices, jammed: Mask
 ) -> None:
-    """Take an energy from an island, by a share `s` of at most `most`; other arguments as in `restrain`."""
-    whole, centre, spin = np.zeros(6), np.zeros(3), np.zeros(3)
+    """See `restrain`."""
+    unsolved = np.zeros(len(root), dtype=np.bool_)
+    for c in range(len(off)):
+        if impulse[c, 0] > 0.0 and off[c]:
+            unsolved[_owner(points, c, bodies, root)] = True
+    for c in range(len(off)):
+        island = _owner(points, c, bodies, root)
+        jammed[c] = impulse[c, 0] > 0.0 and unsolved[island] and kind[island] == DRIVEN
+
+
+@compiled(inner=True)
+def _choose(among: Mask, root: Indices, island: int, inside: Mask) -> None:
+    """Write which bodies (n,) of an island are among others."""
+    for b in range(len(root)):  # in loops: numba's array functions load scipy.linalg
+        inside[b] = among[b] and root[b] == island
+
+
+@compiled(inner=True)
+def _take(inside: Mask, free: bool, excess: float, most: float, bodies: Bodies, fall: Array) -> None:
+    """Take an energy from an island, the bodies `inside` (n,), by a share `s` of at most `most`."""
+    whole, centre = np.zeros(6), np.zeros(3)
     if free:
-        _as_one(island, root, chosen, mass, inertia, position, rotation, twist, centre, whole, spin)
+        _as_one(inside, bodies, centre, whole)
     # the energy of s is that of w, and with the other part of the velocities: s^2 square + s linear
     square, linear = 0.0, 0.0
     own, turning = np.empty(6), np.empty(3)
-    for b in range(len(root)):
-        if chosen[b] and root[b] == island:
-            _seen(b, free, position, twist, centre, whole, own)
-            square += _kinetic(mass[b], rotation[b], inertia[b], own, turning)
-            for k in range(3):
-                linear -= mass[b] * fall[k] * own[k]
-    rest = excess - square - linear  # s^2 square + s linear + rest is to be zero, and is `excess` for s = 1
-    share = 0.0
-    if square > 0.0:
-        root_of = linear * linear - 4.0 * square * rest
-        if root_of > 0.0:
-            share = min(most, max(0.0, (-linear + np.sqrt(root_of)) / (2.0 * square)))
-    for b in range(len(root)):
-        if chosen[b] and root[b] == island:
-            _seen(b, free, position, twist, centre, whole, own)
-            for k in range(6):
-                twist[b, k] -= (1.0 - share) * own[k]
-
-
-@compiled(inner=True)
-def _seen(b: int, free: bool, position: Array, twist: Array, centre: Array, whole: Array, own: Array) -> None:
-    """Write the velocities (6,) of a body seen from the island that moves as one."""
-    for k in range(6):
-        own[k] = twist[b, k]
-    if free:
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
+        _seen(b, bodies, centre, whole, own)
+        square += _kinetic(b, bodies, bodies.rotation[b], own, turning)
         for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            carried = whole[3 + i] * (position[b, j] - centre[j]) - whole[3 + j] * (position[b, i] - centre[i])
-            own[k] -= whole[k] + carried
-            own[3 + k] -= whole[3 + k]
+            linear -= bodies.mass[b] * fall[k] * own[k]
+    rest = excess - square - linear  # s^2 square + s linear + rest is to be zero, and is `excess` for s = 1
+    share, root_of = 0.0, linear * linear - 4.0 * square * rest
+    if square > 0.0 and root_of > 0.0:
+        share = min(most, max(0.0, (-linear + np.sqrt(root_of)) / (2.0 * square)))
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
+        _seen(b, bodies, centre, whole, own)
+        for k in range(6):
+            bodies.twist[b, k] -= (1.0 - share) * own[k]
 
 
 @compiled(inner=True)
-def _as_one(
-    island: int,
-    root: Indices,
-    chosen: Mask,
-    mass: Array,
-    inertia: Array,
-    position: Array,
-    rotation: Array,
-    twist: Array,
-    centre: Array,
-    whole: Array,
-    spin: Array,
-) -> None:
+def _seen(b: int, bodies: Bodies, centre: Array, whole: Array, own: Array) -> None:
+    """Write the velocities (6,) of a body less those of the motion `whole` (6,) about `centre` (3,)."""
+    for k in range(3):
+        i, j = (k + 1) % 3, (k + 2) % 3
+        carried = whole[3 + i] * (bodies.position[b, j] - centre[j]) - whole[3 + j] * (
+            bodies.position[b, i] - centre[i]
+        )
+        own[k] = bodies.twist[b, k] - whole[k] - carried
+        own[3 + k] = bodies.twist[b, 3 + k] - whole[3 + k]
+
+
+@compiled(inner=True)
+def _as_one(inside: Mask, bodies: Bodies, centre: Array, whole: Array) -> None:
     """Write the centre of mass (3,) of an island, and its motion (6,) as one body with the same momentum."""
-    total, turning, column = 0.0, np.zeros(3), np.empty(3)
-    for b in range(len(root)):
-        if chosen[b] and root[b] == island:
-            total += mass[b]
-            for k in range(3):
-                centre[k] += mass[b] * position[b, k]
-                whole[k] += mass[b] * twist[b, k]
+    total, turning, column, spin = 0.0, np.zeros(3), np.empty(3), np.zeros(3)
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
+        total += bodies.mass[b]
+        for k in range(3):
+            centre[k] += bodies.mass[b] * bodies.position[b, k]
+            whole[k] += bodies.mass[b] * bodies.twist[b, k]
     for k in range(3):
         centre[k] /= total
         whole[k] /= total
-    gathered = np.zeros((3, 3))
-    lever = np.empty(3)
-    for b in range(len(root)):
-        if chosen[b] and root[b] == island:
-            angular_momentum(rotation[b], inertia[b], twist[b, 3:], column)
-            square = 0.0
+    gathered, inverse, lever = np.zeros((3, 3)), np.empty((3, 3)), np.empty(3)
+    for b in range(len(inside)):
+        if not inside[b]:
+            continue
+        mass, twist = bodies.mass[b], bodies.twist[b]
+        angular_momentum(bodies.rotation[b], bodies.inertia[b], twist[3:], column)
+        square = 0.0
+        for k in range(3):
+            lever[k] = bodies.position[b, k] - centre[k]
+            square += lever[k] * lever[k]
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            turning[k] += column[k] + mass * (lever[i] * twist[j] - lever[j] * twist[i])
+        for i in range(3):
+            spin[:] = 0.0
+            spin[i] = 1.0
+            angular_momentum(bodies.rotation[b], bodies.inertia[b], spin, column)
             for k in range(3):
-                lever[k] = position[b, k] - centre[k]
-                square += lever[k] * lever[k]
-            for k in range(3):
-                i, j = (k + 1) % 3, (k + 2) % 3
-                turning[k] += column[k] + mass[b] * (lever[i] * twist[b, j] - lever[j] * twist[b, i])
-            for i in range(3):
-                spin[:] = 0.0
-                spin[i] = 1.0
-                angular_momentum(rotation[b], inertia[b], spin, column)
-                for k in range(3):
-                    gathered[k, i] += column[k] - mass[b] * lever[k] * lever[i]
-                gathered[i, i] += mass[b] * square
-    inverse = np.empty((3, 3))
+                gathered[k, i] += column[k] - mass * lever[k] * lever[i]
+            gathered[i, i] += mass * square
     invert(gathered, inverse)
     for row in range(3):
         for k in range(3):

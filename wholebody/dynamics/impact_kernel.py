@@ -17,128 +17,87 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.dynamics.contact_kernel import coupling, push, relative
-from wholebody.dynamics.solve_kernel import solve
+from wholebody.dynamics.rows_kernel import Rows, coupling, push, relative
+from wholebody.dynamics.solve_kernel import Laws, Limits, solve
 
+SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
 EXACT = 1e-10  # m/s: to which the program of one pair is solved
 SWEEPS = 200  # of it
-VISITS = 20_000  # of its points
-JOINTED = 50  # times as many of both with joints: one that is near the contact converges slowly
+JOINTED = 50  # times as many with joints: one that is near the contact converges slowly
 
 
 @compiled()
 def resolve(
-    touching: Indices,
-    pair: Indices,
-    bodies: Indices,
-    axes: Array,
-    jacobian: Array,
-    response: Array,
-    mobility: Array,
-    restitution: Array,
-    friction: Array,
-    effective_mass: Array,
-    jointed: Mask,
-    twist: Array,
-    slow: float,
-    most: int,
-    impulse: Array,
+    touching: Indices, pair: Indices, rows: Rows, restitution: Array, laws: Laws, jointed: Mask, twist: Array,
     events: Array,
-) -> tuple[int, bool]:
-    """Resolve impacts until none is left, at most `most`.
+) -> tuple[int, bool]:  # fmt: skip
+    """Resolve impacts until none is left.
 
     Args:
         touching: (k,) contact points that touch.
-        pair: (m - j,) pair of each contact point; the other arrays are as in `contact_kernel`.
-        bodies: (m, 2).
-        axes: (m - j, 3, 3).
-        jacobian: (m, 3, 2, 6).
-        response: (m, 3, 2, 6).
-        mobility: (m, 2).
+        pair: (m - j,) pair of each contact point.
+        rows: of all points.
         restitution: (m - j,).
-        friction: (m - j,).
-        effective_mass: (j, 3, 3) as in `solve_kernel.solve`; the last j points are those of joints.
+        laws: of all points; its targets are room.
         jointed: (n,) bodies that have joints.
         twist: (n, 6) changed in place.
-        slow: approach that is no impact, m/s.
-        most: events.
-        impulse: (m, 3) room for the impulses of one event.
         events: (most, 5) room for the point, the approach [m/s] and the impulse [N s] along the world's axes.
 
     Returns:
         How many events there were, and whether all are resolved.
     """
-    joints = len(effective_mass)
-    chosen, before = np.empty(len(touching) + joints, dtype=np.intp), np.zeros((len(touching) + joints, 3))
-    target, hold = np.zeros(len(pair)), np.zeros((joints, 3))
-    for event in range(most):
-        worst, speed = -1, -slow
+    count = len(touching) + len(laws.hold)
+    chosen, before, impulse = np.empty(count, dtype=np.intp), np.zeros((count, 3)), np.zeros((len(rows.bodies), 3))
+    for event in range(len(events)):
+        worst, speed = -1, -SLOW
         for c in touching:
-            u = relative(c, 0, bodies, jacobian, twist)
-            if u < speed and mobility[c, 0] > 0.0:
+            u = relative(c, 0, rows, twist)
+            if u < speed and rows.mobility[c, 0] > 0.0:
                 worst, speed = c, u
         if worst < 0:
             return event, True
         count = 0
         for c in touching:
             if pair[c] == pair[worst]:
-                chosen[count] = c
-                for row in range(3):
-                    before[count, row] = relative(c, row, bodies, jacobian, twist)
-                    impulse[c, row] = 0.0
-                target[c] = -restitution[c] * before[count, 0]
-                count += 1
-        points, times = count, 1
-        if jointed[bodies[worst, 0]] or jointed[bodies[worst, 1]]:
-            for c in range(len(pair), len(bodies)):
                 chosen[count], impulse[c] = c, 0.0
-                before[count] = 0.0
+                for row in range(3):
+                    before[count, row] = relative(c, row, rows, twist)
+                laws.target[c] = -restitution[c] * before[count, 0]
                 count += 1
-            times = JOINTED
+        points, sweeps = count, SWEEPS
+        if jointed[rows.bodies[worst, 0]] or jointed[rows.bodies[worst, 1]]:
+            for c in range(len(pair), len(rows.bodies)):
+                chosen[count], impulse[c], before[count] = c, 0.0, 0.0
+                count += 1
+            sweeps = JOINTED * SWEEPS
         if count == 1:
-            _single(
-                worst, bodies, jacobian, response, mobility, restitution[worst], friction[worst], twist, before[0],
-                impulse[worst],
-            )  # fmt: skip
+            _single(worst, rows, restitution[worst], laws.friction[worst], twist, before[0], impulse[worst])
         else:
-            solve(
-                chosen[:count], bodies, jacobian, response, mobility, friction, target, effective_mass, hold, twist,
-                impulse, EXACT, times * VISITS, times * SWEEPS,
-            )  # fmt: skip
-            _remove_gain(chosen[:count], bodies, jacobian, response, twist, before, impulse)
+            solve(chosen[:count], rows, laws, twist, impulse, Limits(EXACT, sweeps))
+            _remove_gain(chosen[:count], rows, twist, before, impulse)
         events[event, 0], events[event, 1] = worst, -speed
-        events[event, 2:] = 0.0
-        for number in range(points):
+        for c in chosen[:points]:
             for row in range(3):
                 for k in range(3):
-                    events[event, 2 + k] += impulse[chosen[number], row] * axes[chosen[number], row, k]
-    return most, False
+                    events[event, 2 + k] += impulse[c, row] * rows.axes[c, row, k]
+    return len(events), False
 
 
 @compiled(inner=True)
 def _single(
-    c: int,
-    bodies: Indices,
-    jacobian: Array,
-    response: Array,
-    mobility: Array,
-    restitution: float,
-    friction: float,
-    twist: Array,
-    before: Array,
-    impulse: Array,
+    c: int, rows: Rows, restitution: float, friction: float, twist: Array, before: Array, impulse: Array
 ) -> None:
     """The impulse at one point; eqs. 8 to 10."""
-    normal = -(1.0 + restitution) * before[0] / mobility[c, 0]
-    push(c, 0, normal, bodies, response, twist)
+    normal = -(1.0 + restitution) * before[0] / rows.mobility[c, 0]
+    push(c, 0, normal, rows, twist)
     impulse[0] = normal
     sliding = np.sqrt(before[1] ** 2 + before[2] ** 2)
     if sliding < 1e-12 or friction == 0.0:
         return
     one, two = before[1] / sliding, before[2] / sliding
-    along = one * one * coupling(c, 1, 1, jacobian, response) + two * two * coupling(c, 2, 2, jacobian, response)
-    along += 2.0 * one * two * coupling(c, 1, 2, jacobian, response)
-    now = one * relative(c, 1, bodies, jacobian, twist) + two * relative(c, 2, bodies, jacobian, twist)
+    along = one * one * coupling(c, 1, 1, rows) + two * two * coupling(c, 2, 2, rows)
+    along += 2.0 * one * two * coupling(c, 1, 2, rows)
+    now = one * relative(c, 1, rows, twist) + two * relative(c, 2, rows, twist)
     size = min(friction * normal, max(0.0, now / along))
     # energy added by the share f of friction: lost + f linear + f^2 square
     lost = 0.5 * normal * before[0] * (1.0 - restitution)
@@ -146,26 +105,18 @@ def _single(
     if lost + linear + square > 0.0:
         size *= max(0.0, (-linear + np.sqrt(max(linear * linear - 4.0 * square * lost, 0.0))) / (2.0 * square))
     for row, part in ((1, -size * one), (2, -size * two)):
-        push(c, row, part, bodies, response, twist)
+        push(c, row, part, rows, twist)
         impulse[row] = part
 
 
 @compiled(inner=True)
-def _remove_gain(
-    chosen: Indices,
-    bodies: Indices,
-    jacobian: Array,
-    response: Array,
-    twist: Array,
-    before: Array,
-    impulse: Array,
-) -> None:
+def _remove_gain(chosen: Indices, rows: Rows, twist: Array, before: Array, impulse: Array) -> None:
     """Scale the impulses of a pair down to what adds no kinetic energy."""
     linear, square = 0.0, 0.0
     for number in range(len(chosen)):
         c = chosen[number]
         for row in range(3):
-            now = relative(c, row, bodies, jacobian, twist)
+            now = relative(c, row, rows, twist)
             linear += impulse[c, row] * before[number, row]
             square += impulse[c, row] * (now - before[number, row])
     if linear + 0.5 * square <= 0.0 or square <= 0.0:
@@ -173,5 +124,5 @@ def _remove_gain(
     share = max(0.0, -2.0 * linear / square)
     for c in chosen:
         for row in range(3):
-            push(c, row, (share - 1.0) * impulse[c, row], bodies, response, twist)
+            push(c, row, (share - 1.0) * impulse[c, row], rows, twist)
             impulse[c, row] *= share

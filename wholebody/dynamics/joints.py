@@ -7,39 +7,26 @@ them together (as RATTLE does; Andersen, 1983), which only takes energy.
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.dynamics import contact_kernel, joint_kernel, solve_kernel
+from wholebody.dynamics import rows_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.pieces import Pieces
+from wholebody.dynamics.rows_kernel import JointPoints, Rows
+from wholebody.dynamics.solve_kernel import Laws, Limits
 from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.scene.scene import Scene
 
-CLOSED = 1e-9  # m: by which joint points may be apart at the end of a step
 KEPT = 1e-9  # m/s: to which velocities keep joints
-SWEEPS = 2000  # of joints alone
-VISITS = 100_000  # likewise, joint points times sweeps
 SHORTEST_AXIS = 1e-3  # m: between the two points of a hinge
-
-
-class JointRows(NamedTuple):
-    """What the program needs of joints; see `joint_kernel.write_rows`."""
-
-    jacobian: Array
-    response: Array
-    mobility: Array
-    effective_mass: Array
 
 
 class Joints:
     """All joints of a scene.
 
     Attributes:
-        bodies: (j, 2) A and B of each joint point; twice B for a joint to the world.
-        jointed: (n,) bodies that have a joint.
+        points: of all joints.
     """
 
     def __init__(self, scene: Scene, pieces: Pieces) -> None:
@@ -59,15 +46,12 @@ class Joints:
                     bodies.append((other, number))
                     anchors.append((place, point - pieces.centre[number]))
                     world.append(joint.to is None)
-        self.bodies: Indices = np.array(bodies, dtype=np.intp).reshape(-1, 2)
-        self._anchor = np.array(anchors, dtype=float).reshape(-1, 2, 3)
-        self._world: Mask = np.array(world, dtype=bool)
-        self.jointed: Mask = np.zeros(len(pieces.names), dtype=bool)
-        self.jointed[self.bodies] = True
-        self._island = np.empty(len(pieces.names), dtype=np.intp)
-        contact_kernel.join(
-            np.arange(len(self.bodies)), self.bodies, pieces.dynamic, self._island
+        self.points = JointPoints(
+            np.array(bodies, dtype=np.intp).reshape(-1, 2), np.array(anchors, dtype=float).reshape(-1, 2, 3),
+            np.array(world, dtype=bool),
         )  # fmt: skip
+        self._island = np.empty(len(pieces.names), dtype=np.intp)
+        solve_kernel.join(np.arange(len(self)), self.points.bodies, pieces.dynamic, self._island)
 
     def _points(self, number: int, joint: BallJoint) -> list[Array]:
         """Points of a joint in the thing's axes."""
@@ -81,7 +65,7 @@ class Joints:
 
     def __len__(self) -> int:
         """How many joint points there are."""
-        return len(self.bodies)
+        return len(self.points.bodies)
 
     def linked(self, number: int) -> Mask:
         """Bodies (n,) that move by themselves and are linked with one by joints, itself among them."""
@@ -90,36 +74,26 @@ class Joints:
 
     def together(self) -> Indices:
         """(k, 2) bodies that joints hold together, one of which moves by itself at least."""
-        return self.bodies[~self._world]
+        return self.points.bodies[~self.points.world]
 
     def gaps(self, state: BodiesState) -> Array:
         """(j, 3) point of B seen from that of A, metres."""
-        return self._place(state)[1]
-
-    def _place(self, state: BodiesState) -> tuple[Array, Array]:
-        lever, off = np.empty((len(self), 2, 3)), np.empty((len(self), 3))
-        joint_kernel.place(self.bodies, self._anchor, self._world, state.position, state.rotation, lever, off)
-        return lever, off
-
-    def write_rows(self, state: BodiesState, movable: Mask, rows: JointRows) -> None:
-        """Write the rows of all joint points; `movable` (n,) are the bodies that joints move."""
-        inverse_mass = np.where(movable, 1.0 / state.pieces.mass, 0.0)
-        lever = self._place(state)[0]
-        joint_kernel.write_rows(
-            self.bodies, self._world, lever, inverse_mass, state.inverse_inertia(movable), *rows
-        )  # fmt: skip
+        found = np.empty((len(self), 3))
+        rows_kernel.joint_gaps(self.points, state.bodies, found)
+        return found
 
     def project_velocities(self, state: BodiesState, twist: Array, movable: Mask) -> None:
-        """Change velocities (n, 6) by impulses of the joints, so that all joint points stay together."""
+        """Change velocities (n, 6) by impulses of the joints, so that all joint points stay together.
+
+        Args:
+            state: where the bodies are.
+            twist: (n, 6) changed in place.
+            movable: (n,) the bodies that joints move.
+        """
         count = len(self)
-        if not count:
-            return
-        rows = JointRows(
-            np.empty((count, 3, 2, 6)), np.empty((count, 3, 2, 6)), np.empty((count, 2)), np.empty((count, 3, 3))
-        )
-        self.write_rows(state, movable, rows)
-        none = np.zeros(0)
-        solve_kernel.solve(
-            np.arange(count), self.bodies, rows.jacobian, rows.response, rows.mobility, none, none, rows.effective_mass,
-            np.zeros((count, 3)), twist, np.zeros((count, 3)), KEPT * solve_kernel.JOINT_PRECISION, VISITS, SWEEPS,
-        )  # fmt: skip
+        if count:
+            rows = Rows.room(self.points.bodies, count, movable)
+            rows_kernel.joint_rows(self.points, state.bodies, rows)
+            laws = Laws(np.zeros(0), np.zeros(0), np.zeros((count, 3)))
+            limits = Limits(KEPT * solve_kernel.JOINT_PRECISION, 2000)
+            solve_kernel.solve(np.arange(count), rows, laws, twist, np.zeros((count, 3)), limits)

@@ -7,13 +7,40 @@ kinetic energy, so that momentum and energy of free bodies are constant to round
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 
 LARGEST_TURN = 0.1  # rad: of one midpoint step; smaller is more accurate and slower
-STILL = 1e-12  # rad/s: slower than this a body does not turn
+
+
+class Bodies(NamedTuple):
+    """The bodies of a scene.
+
+    Attributes:
+        mass: (n,) kg; infinite where nothing is known.
+        inertia: (n, 3, 3) about the centre of mass, along the body's axes.
+        inverse: (n, 3, 3) inverses of these.
+        position: (n, 3) centres of mass.
+        rotation: (n, 3, 3).
+        twist: (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s.
+        moving: (n,) bodies that move by themselves, and do not sleep.
+        given: (n,) bodies whose motion is given.
+        jointed: (n,) bodies that have joints.
+    """
+
+    mass: Array
+    inertia: Array
+    inverse: Array
+    position: Array
+    rotation: Array
+    twist: Array
+    moving: Mask
+    given: Mask
+    jointed: Mask
 
 
 @compiled(inner=True)
@@ -76,7 +103,7 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
         time: seconds.
     """
     speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
-    if speed < STILL:
+    if speed < 1e-12:  # rad/s: no motion, whose axis would be 0 / 0
         return
     momentum, turn, middle, now = np.empty(3), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     pull = np.empty(3)
@@ -150,77 +177,42 @@ def _orthonormal(rotation: Array) -> None:
 
 
 @compiled()
-def drift(
-    position: Array,
-    rotation: Array,
-    twist: Array,
-    inertia: Array,
-    inverse: Array,
-    moving: Mask,
-    given: Mask,
-    pushed: Mask,
-    gravity: Array,
-    time: float,
-) -> None:
+def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
     """Move all bodies for a time; positions, rotations and angular velocities change in place.
 
     Args:
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3) of the bodies.
-        twist: (n, 6) velocities at the end of the time and angular velocities, m/s and rad/s.
-        inertia: (n, 3, 3) in the body.
-        inverse: (n, 3, 3) their inverses.
-        moving: (n,) which bodies move by themselves.
-        given: (n,) which ones move with constant velocity and angular velocity.
+        bodies: with the velocities at the end of the time.
         pushed: (n,) bodies on which a contact acts: they move with the velocity at the end, the others with the mean
             of those at the start and at the end.
         gravity: (3,) m/s2.
         time: seconds.
     """
     now, turn = np.empty((3, 3)), np.empty(3)
-    for b in range(len(position)):
-        if not moving[b] and not given[b]:
+    for b in range(len(bodies.mass)):
+        if not bodies.moving[b] and not bodies.given[b]:
             continue
-        half = 0.0 if pushed[b] or given[b] else 0.5 * time * time
+        half = 0.0 if pushed[b] or bodies.given[b] else 0.5 * time * time
         for k in range(3):
-            position[b, k] += time * twist[b, k] - half * gravity[k]
-        if moving[b]:
-            turn_freely(rotation[b], inertia[b], inverse[b], twist[b, 3:], time)
+            bodies.position[b, k] += time * bodies.twist[b, k] - half * gravity[k]
+        if bodies.moving[b]:
+            turn_freely(bodies.rotation[b], bodies.inertia[b], bodies.inverse[b], bodies.twist[b, 3:], time)
         else:
             for k in range(3):
-                turn[k] = time * twist[b, 3 + k]
-            _turned(turn, rotation[b], now)
-            _write(now, rotation[b])
+                turn[k] = time * bodies.twist[b, 3 + k]
+            _turned(turn, bodies.rotation[b], now)
+            _write(now, bodies.rotation[b])
 
 
 @compiled()
-def displace(position: Array, rotation: Array, way: Array, moving: Mask) -> None:
+def displace(bodies: Bodies, way: Array) -> None:
     """Displace the bodies that move by themselves by (n, 6) metres and radians, in place."""
     now = np.empty((3, 3))
-    for b in range(len(position)):
-        if moving[b]:
+    for b in range(len(way)):
+        if bodies.moving[b]:
             for k in range(3):
-                position[b, k] += way[b, k]
-            _turned(way[b, 3:], rotation[b], now)
-            _write(now, rotation[b])
-
-
-@compiled()
-def world_inverses(rotation: Array, inverse: Array, moving: Mask, result: Array) -> None:
-    """Write the inverse inertias (n, 3, 3) along the world's axes; zero for bodies that do not move by themselves."""
-    for b in range(len(rotation)):
-        for i in range(3):
-            for j in range(3):
-                result[b, i, j] = 0.0
-        if not moving[b]:
-            continue
-        for i in range(3):  # in loops: numba's matrix products load scipy.linalg
-            for k in range(3):
-                half = 0.0
-                for m in range(3):
-                    half += rotation[b, i, m] * inverse[b, m, k]
-                for j in range(3):
-                    result[b, i, j] += half * rotation[b, j, k]
+                bodies.position[b, k] += way[b, k]
+            _turned(way[b, 3:], bodies.rotation[b], now)
+            _write(now, bodies.rotation[b])
 
 
 @compiled()

@@ -1,4 +1,10 @@
-"""Whether pieces can have been in each other on the way of a step, where both ends of it are free."""
+"""Whether pieces can have been in each other on the way of a step, where both ends of it are free.
+
+Along a fixed direction the heights of all points of two pieces change linearly while the pieces move straight, and by
+no more than the sag of an arc while they turn. So if the direction parts them before and after a step, it parts them
+all the time, but for the sags. The normals at both ends settle most pairs so (`doubtful`). The others are followed on
+their way in parts, along each of which the direction at its start parts the pieces.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +14,15 @@ import coal
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
-from wholebody.dynamics import passing_kernel
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
+from wholebody.dynamics.pieces import SweptPoints
+from wholebody.dynamics.settings import PASSING_PAIRS
 from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
-MOST_LOOKS = 64  # places of one pair on the way; what would need more is doubtful
-DOUBTS = 50  # pairs that are looked at on their way, at most
-EARLIEST = 0.1  # share of a step: of meetings before it, the points are taken there
 
 
 class StepStart:
@@ -32,7 +37,7 @@ class StepStart:
     def __init__(self, state: BodiesState, near: Contacts, margin: Array, finder: ContactFinder) -> None:
         """Keep it."""
         self.near, self.margin, self.kept = near, margin, state.copies()
-        self._finder, self._active = finder, state.moving | state.given
+        self._finder, self._active = finder, state.active
 
     def widen(self, travel: Array) -> None:
         """Let the margins be at least the travel (n,) of the bodies, metres: a blow may have made them faster."""
@@ -46,21 +51,44 @@ class PassingCheck(NamedTuple):
 
     Attributes:
         free: whether no pieces can have been deeper than `PASSING` in each other.
-        meetings: shares of the step at which pieces meet or may meet, at least `EARLIEST`; none where there are too
-            many doubts.
+        meetings: shares of the step at which pieces meet or may meet, at least `PASSING_PAIRS.earliest`; none where
+            there are too many doubts.
     """
 
     free: bool
     meetings: tuple[float, ...] = ()
 
 
+class Way(NamedTuple):
+    """How bodies moved during a step, and the near pairs at both ends of it.
+
+    Attributes:
+        pair: (k, 2) pieces.
+        body: (pieces,) the body of each piece.
+        gap: (2, k) their distances before the step, and at least those after it.
+        normal: (2, k, 3) from the first to the second; after it zero where none is known.
+        placement: (2, pieces, 4, 3) of all pieces.
+        shift: (n, 3) ways of the centres of mass, metres.
+        angle: (n,) by which each has turned, radians.
+        lever: (n,) greatest distance of a point from its centre of mass, metres.
+        fall: sag of the relative way because of gravity, metres.
+    """
+
+    pair: Indices
+    body: Indices
+    gap: Array
+    normal: Array
+    placement: Array
+    shift: Array
+    angle: Array
+    lever: Array
+    fall: float
+
+
 def check_passing(
     state: BodiesState, before: StepStart, after: Contacts, margin: Array, travel: Array, time: float, gravity: float
 ) -> PassingCheck:
     """Whether pieces can have been deeper than `PASSING` in each other on the way, and where.
-
-    A direction that has kept a pair apart all the time settles most pairs (`passing_kernel`). Others are looked at on
-    their way in the same manner, at as many places as that takes.
 
     Args:
         state: where the bodies are after the step.
@@ -73,56 +101,43 @@ def check_passing(
     """
     before.widen(travel)
     pieces, near = state.pieces, before.near
-    bodies = pieces.body[near.pair]
     found = np.full(len(pieces.table.pairs), -1, dtype=np.intp)
     found[after.number] = np.arange(len(after.number))
     found = found[near.number]
     listed = found >= 0
-    gap, normal = margin[bodies].sum(axis=1), np.zeros((len(listed), 3))
+    gap, normal = margin[pieces.body[near.pair]].sum(axis=1), np.zeros((len(listed), 3))
     gap[listed], normal[listed] = after.distance[found[listed]], after.normal[found[listed]]
-    angle, fall = np.linalg.norm(state.spin, axis=1) * time, gravity * time**2 / 8.0
-    doubts = np.zeros(len(near.pair), dtype=bool)
-    count = passing_kernel.doubtful(
-        near.pair, np.ascontiguousarray(near.distance), np.ascontiguousarray(near.normal), gap, normal,
-        near.placements, after.placements, pieces.body, state.position - before.kept[0], angle, pieces.lever, fall,
-        PASSING, *pieces.heights, doubts,
+    way = Way(
+        near.pair, pieces.body, np.stack([near.distance, gap]), np.stack([near.normal, normal]),
+        np.stack([near.placements, after.placements]), state.bodies.position - before.kept[0],
+        np.linalg.norm(state.spin, axis=1) * time, pieces.lever, gravity * time**2 / 8.0,
     )  # fmt: skip
-    if count > DOUBTS:
+    doubts = np.zeros(len(near.pair), dtype=bool)
+    if doubtful(way, pieces.swept, doubts) > PASSING_PAIRS.doubts:
         return PassingCheck(False)
-    met = [
-        _meeting(state, before, int(first), int(second), near.placements, angle, fall)
-        for first, second in near.pair[doubts]
-    ]
-    shares = tuple(sorted({max(share, EARLIEST) for share in met if share is not None}))
+    met = [_meeting(state, before, pair, way) for pair in near.pair[doubts].tolist()]
+    shares = tuple(sorted({max(share, PASSING_PAIRS.earliest) for share in met if share is not None}))
     return PassingCheck(not shares, shares)
 
 
-def _meeting(
-    state: BodiesState, before: StepStart, first: int, second: int, placements: Array, angle: Array, fall: float
-) -> float | None:
-    """The share of a step at which two pieces meet, or up to which they surely do not; None if they do not meet.
-
-    The way is followed in parts, along each of which the direction at its start parts the pieces.
-    """
-    pieces = state.pieces
-    pair = (first, second)
+def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -> float | None:
+    """The share of a step at which two pieces meet, or up to which they surely do not; None if they do not meet."""
+    pieces, placements = state.pieces, way.placement[0]
+    first, second = pair
     a, b = (int(pieces.body[k]) for k in pair)
-    shift = state.position - before.kept[0]
-    turns = [pin.log3(state.rotation[k] @ before.kept[1][k].T) for k in (a, b)]
+    turns = [pin.log3(state.bodies.rotation[k] @ before.kept[1][k].T) for k in (a, b)]
     shapes = [pieces.table.geometry.geometryObjects[k].geometry for k in pair]
-    sag = 0.125 * float(angle[a] ** 2 * pieces.lever[a] + angle[b] ** 2 * pieces.lever[b]) + fall
-    both, way = float(angle[a] + angle[b]), float(np.linalg.norm(shift[b] - shift[a]))
+    sag = float(_sag(way, a, b))
+    both, shift = float(way.angle[a] + way.angle[b]), float(np.linalg.norm(way.shift[b] - way.shift[a]))
     size = float(pieces.lever[a] + pieces.lever[b])
     placed = placements.copy()
 
     def place(at: float) -> None:
         for piece, body, turn in zip(pair, (a, b), turns, strict=True):
             rotation, start = pin.exp3(at * turn), placements[piece]
+            centre = before.kept[0][body]
             placed[piece, :3] = start[:3] @ rotation.T
-            placed[piece, 3] = rotation @ (start[3] - before.kept[0][body]) + before.kept[0][body] + at * shift[body]
-
-    def height(piece: int, direction: Array, sign: float) -> float:
-        return float(passing_kernel.highest(piece, placed, direction, sign, *pieces.heights))
+            placed[piece, 3] = rotation @ (start[3] - centre) + centre + at * way.shift[body]
 
     request, at, looks, part = coal.DistanceRequest(), 0.0, 0, 1.0
     while at < 1.0:
@@ -135,14 +150,14 @@ def _meeting(
         normal, part = np.array(result.normal), min(2.0 * part, 1.0 - at)
         # seen from a body that turns by w, a point at r with velocity v has at most the acceleration
         # |w|^2 |r| + 2 |w| |v| beside its own; a path sags by an eighth of that
-        carried = sag + 0.125 * both**2 * (size + max(distance, 0.0) + way) + 0.25 * both * way
+        carried = sag + 0.125 * both**2 * (size + max(distance, 0.0) + shift) + 0.25 * both * shift
         while True:
             place(at + part)
             looks += 1
-            if looks > MOST_LOOKS:
+            if looks > PASSING_PAIRS.places:
                 return at
             if any(
-                min(distance, -height(second, along, -1.0) - height(first, along, 1.0)) - part * part * bend > -PASSING
+                min(distance, float(apart(first, second, along, placed, pieces.swept))) - part * part * bend > -PASSING
                 for along, bend in (
                     (normal, sag),
                     *((pin.exp3(part * turn) @ normal, carried) for turn in turns),
@@ -152,3 +167,115 @@ def _meeting(
             part *= 0.5
         at += part
     return None
+
+
+@compiled()
+def highest(piece: int, placement: Array, direction: Array, sign: float, swept: SweptPoints) -> float:
+    """Greatest height of a piece along a direction, times `sign`.
+
+    Args:
+        piece: its index.
+        placement: (pieces, 4, 3).
+        direction: (3,) unit vector in the world.
+        sign: 1.0 or -1.0.
+        swept: points of all pieces.
+    """
+    base = 0.0
+    local = np.empty(3)
+    for k in range(3):
+        base += sign * direction[k] * placement[piece, 3, k]
+    for i in range(3):
+        local[i] = 0.0
+        for k in range(3):
+            local[i] += sign * direction[k] * placement[piece, i, k]
+    start, plane, axes = swept.start[piece], swept.plane[piece], swept.axes[piece]
+    if swept.number[piece] > 0:
+        best, points = -np.inf, swept.points
+        for p in range(start, start + swept.number[piece]):
+            best = max(best, points[p, 0] * local[0] + points[p, 1] * local[1] + points[p, 2] * local[2])
+        return float(base + best + swept.radius[piece])
+    aligned = plane[0] * local[0] + plane[1] * local[1] + plane[2] * local[2]
+    if aligned > 0.5:
+        return float(base + plane[3]) if aligned > 1.0 - 1e-9 else np.inf
+    if axes[0] > 0.0:
+        square = 0.0
+        for i in range(3):
+            square += (axes[i] * local[i]) ** 2
+        return float(base + np.sqrt(square))
+    return np.inf
+
+
+@compiled()
+def apart(first: int, second: int, direction: Array, placement: Array, swept: SweptPoints) -> float:
+    """By how much a direction parts two pieces, metres."""
+    low = -highest(second, placement, direction, -1.0, swept)
+    return float(low - highest(first, placement, direction, 1.0, swept))
+
+
+@compiled()
+def _sag(way: Way, a: int, b: int) -> float:
+    """Most by which the way of a point of one body, seen from the other, leaves the straight line, metres."""
+    turned = way.angle[a] ** 2 * way.lever[a] + way.angle[b] ** 2 * way.lever[b]
+    return float(0.125 * turned + way.fall)
+
+
+@compiled()
+def doubtful(way: Way, swept: SweptPoints, found: Mask) -> int:
+    """How many of the near pairs may have been deeper in each other than `PASSING` during a step.
+
+    Args:
+        way: of the step.
+        swept: points of all pieces.
+        found: (k,) room for which they are; all false.
+    """
+    doubts = 0
+    for c in range(len(way.pair)):
+        p, q = way.pair[c, 0], way.pair[c, 1]
+        a, b = way.body[p], way.body[q]
+        shift = 0.0
+        for k in range(3):
+            shift += (way.shift[b, k] - way.shift[a, k]) ** 2
+        shift = np.sqrt(shift)
+        turn = way.angle[a] * way.lever[a] + way.angle[b] * way.lever[b]
+        sag, gap, gap_after = _sag(way, a, b), way.gap[0, c], way.gap[1, c]
+        # to be in each other on the way, and out again, they move by both gaps at least
+        if shift + turn + sag <= max(gap, 0.0) + max(gap_after, 0.0) + PASSING:
+            continue
+        if min(gap, apart(p, q, way.normal[0, c], way.placement[1], swept)) - sag > -PASSING:
+            continue
+        # as seen from one of the bodies, the points of the other also turn with the first
+        both = way.angle[a] + way.angle[b]
+        sag = 0.125 * both * both * (way.lever[a] + way.lever[b] + max(gap, 0.0) + shift) + 0.25 * both * shift
+        sag += way.fall
+        until, since = 0.0, 1.0  # shares of the step until which the first direction parts, and since which the last
+        for own in (p, q):
+            until = max(until, _parted(way, swept, c, own, 0, sag))
+            since = min(since, 1.0 - _parted(way, swept, c, own, 1, sag))
+        if until < since:
+            found[c] = True
+            doubts += 1
+    return doubts
+
+
+@compiled(inner=True)
+def _parted(way: Way, swept: SweptPoints, c: int, own: int, end: int, sag: float) -> float:
+    """Share of the step, from its start (end 0) or its end (1), in which the normal there parts a pair.
+
+    The normal turns with the piece `own`.
+    """
+    here, there = way.placement[end, own], way.placement[1 - end, own]
+    turned, size = np.zeros(3), 0.0
+    for i in range(3):
+        along = 0.0
+        for k in range(3):
+            along += here[i, k] * way.normal[end, c, k]
+        size += along * along
+        for k in range(3):
+            turned[k] += along * there[i, k]
+    if size == 0.0:
+        return 0.0
+    start = way.gap[end, c] - sag
+    last = apart(way.pair[c, 0], way.pair[c, 1], turned, way.placement[1 - end], swept) - sag
+    if last >= -PASSING:
+        return 1.0 if start >= -PASSING else 0.0
+    return 0.0 if start <= -PASSING else (start + PASSING) / (start - last)

@@ -44,6 +44,26 @@ class PlacedProximity(Proximity):
         return placement
 
 
+class SweptPoints(NamedTuple):
+    """The points that each piece is swept from, for its heights along directions.
+
+    Attributes:
+        points: (points, 3) of all pieces, in their axes.
+        start: (pieces,) the first of each.
+        number: (pieces,) how many.
+        radius: (pieces,) around the points.
+        axes: (pieces, 3) semi-axes of an ellipsoid; zero for others.
+        plane: (pieces, 4) normal and offset of a half-space; zero for others.
+    """
+
+    points: Array
+    start: Indices
+    number: Indices
+    radius: Array
+    axes: Array
+    plane: Array
+
+
 class Pieces:
     """The bodies of a scene, their pieces, and the pairs of pieces that can meet and of which one moves by itself.
 
@@ -63,7 +83,8 @@ class Pieces:
         restitution: (pairs,).
         friction: (pairs,).
         lever: (n,) greatest distance of a body's swept points from its centre of mass, metres; 0 for a half-space.
-        heights: the last six arguments of `passing_kernel.highest`.
+        swept: swept points of all pieces.
+        jointed: (n,) bodies that have joints.
         notes: what was assumed about masses.
     """
 
@@ -137,8 +158,10 @@ class Pieces:
         kept = a != b
         if scene.figure.outer:
             kept &= (pairs >= scene.figure.geometry.ngeoms).all(axis=1)  # its own pieces do not meet things
-        for names in held_together(scene):
-            one, other = (self.index[name] for name in names)
+        self.jointed: Mask = np.zeros(len(self.names), dtype=bool)
+        for name, holder in joined(scene):
+            one, other = self.index[name], self.index[name if holder is None else holder]
+            self.jointed[[one, other]] = True
             kept &= ~(((a == one) & (b == other)) | ((a == other) & (b == one)))
         self.table = PairTable(pin.Model(), geometry_model(pieces, pairs[kept]), pairs[kept])
         surfaces = self._surfaces(made_of)
@@ -156,7 +179,7 @@ class Pieces:
         return found
 
     def _add_swept_points(self) -> None:
-        """Arrays for `passing_kernel.highest`, and the distances of points from centres of mass."""
+        """Write the swept points, and their distances from centres of mass."""
         swept = self.table.swept
         points = np.vstack([one.points for one in swept] or [np.zeros((0, 3))])
         count: Indices = np.array([len(one.points) for one in swept], dtype=np.intp)
@@ -174,7 +197,7 @@ class Pieces:
             else:
                 axes[k] = piece.geometry.radii
                 lever[k] += one.reach
-        self.heights = (points, start, count, radius, axes, plane)
+        self.swept = SweptPoints(points, start, count, radius, axes, plane)
         self.lever = np.zeros(len(self.names))
         np.maximum.at(self.lever, self.body, lever)
 
@@ -191,8 +214,8 @@ def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
     }
 
 
-def held_together(scene: Scene) -> tuple[tuple[str, str], ...]:
-    """Names of things that joints hold, each with what holds it.
+def joined(scene: Scene) -> tuple[tuple[str, str | None], ...]:
+    """Names of things that have joints, each with what holds it; None for the world.
 
     Raises:
         UnknownNameError: there is no such thing.
@@ -202,9 +225,8 @@ def held_together(scene: Scene) -> tuple[tuple[str, str], ...]:
     known = [name for name, thing in scene.objects.items() if thing.segment is None]
     for name, thing in scene.objects.items():
         for joint in () if thing.body is None else thing.body.joints:
-            if joint.to is None:
-                continue
-            checks.known(joint.to, known, "thing", f"the joint of {name!r}")
+            if joint.to is not None:
+                checks.known(joint.to, known, "thing", f"the joint of {name!r}")
             if joint.to == name:
                 raise InputError(f"{name!r} has a joint to itself; name another thing, or None for the world")
             found.append((name, joint.to))

@@ -1,11 +1,11 @@
 """Rigid bodies that move by themselves among things and a figure that do not.
 
-A frame is advanced in steps of at most `SUBSTEP`. A step ends early at the next impact; there the impacts are resolved
-one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program (`step_program`)
-that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after which
-pieces are in each other is made again with the points where they are; if that does not help, or pieces may have passed
-through each other on the way, with half the time. After too many stops in a frame the impacts of a step become part of
-its program.
+A frame is advanced in steps of at most `STEP.longest`. A step ends early at the next impact; there the impacts are
+resolved one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program
+(`step_program`) that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after
+which pieces are in each other is made again with the points where they are; if that does not help, or pieces may have
+passed through each other on the way, with half the time. After too many stops in a frame the impacts of a step become
+part of its program.
 """
 
 from __future__ import annotations
@@ -17,42 +17,29 @@ import pinocchio as pin
 from numpy.typing import ArrayLike
 
 from wholebody.base import checks
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
-from wholebody.dynamics.joints import CLOSED, Joints
+from wholebody.dynamics.joints import Joints
 from wholebody.dynamics.loops import compiled_kernel
 from wholebody.dynamics.passing import StepStart, check_passing
 from wholebody.dynamics.pieces import Pieces
+from wholebody.dynamics.settings import SKIN, STEP
 from wholebody.dynamics.sleeping import Sleepers
-from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram
+from wholebody.dynamics.step_program import Impulses, StepProgram
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
-SUBSTEP = 1.0 / 240.0  # s: longest step; smaller is more accurate and slower
 LONGEST = 10.0  # s: of a frame, which is 2,400 steps
-SHORTEST = 1e-6  # s: of a step that ends with an impact
-INSIDE = 1e-4  # m: a step that leaves pieces deeper in each other is made again
-SHALLOW = 2e-5  # m: the same for the first try of a step; smaller = more steps made again, fewer pieces to part
-LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
-HALVINGS = 6  # of a step, at most
-GIVEN_UP = 3  # steps of a frame that are too deep even so; then nothing helps, as where bodies are pushed together
-FORESEEN = 2  # times that a step is made again with the points where it led too deep, before it is halved
-MARGIN = 2e-3  # m: pairs are looked at from this much farther than bodies come in a step
-STOPS = 8  # early ends of steps in a frame, at most ...
-FEW = 12  # ... while so many bodies move; fewer with more of them: each stop costs a step of all bodies
 DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
 STRONGEST_GRAVITY = 1e3  # m/s2
 STRONGEST_PUSH = 1e6  # N s
-SEPARATIONS = 4  # rounds of parting pieces after a step
-CLOSINGS = 6  # programs of a step with joints, at most: each closes what the one before left by bodies' turning
-FINE = 1e-5  # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity
 
 
 class RigidBodies:
@@ -93,10 +80,10 @@ class RigidBodies:
         self._sleepers = Sleepers(self.state, self._joints.together())
         self._falling = pieces.dynamic.copy()
         self._near: Contacts
-        self._find_near(SUBSTEP)
+        self._find_near(STEP.longest)
         self._check_start()
         # given velocities may part joints
-        self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
+        self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
 
     def _check_start(self) -> None:
         if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:
@@ -121,7 +108,7 @@ class RigidBodies:
         Raises:
             UnknownNameError: there is none of that name.
         """
-        return np.array(self.state.twist[self._number(name)])
+        return np.array(self.state.bodies.twist[self._number(name)])
 
     def velocity_at(self, name: str, point: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) in the world, m/s.
@@ -131,7 +118,7 @@ class RigidBodies:
             InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        return self._velocity(number, point - self.state.position[number])
+        return self._velocity(number, point - self.state.bodies.position[number])
 
     def _velocity(self, number: int, lever: Array) -> Array:
         """Velocity (3,) of a body's point at a place (3,) seen from its centre of mass, m/s."""
@@ -145,13 +132,13 @@ class RigidBodies:
             InputError: the place is not three numbers within 1e6 m.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        lever = pin.skew(point - self.state.position[number])
+        lever = pin.skew(point - self.state.bodies.position[number])
         inverse = self._inverse_inertia(number)
-        if not self._joints.jointed[number]:
+        if not self.state.bodies.jointed[number]:
             return np.asarray(np.eye(3) / self._pieces.mass[number] - lever @ inverse @ lever)
-        found, movable = np.empty((3, 3)), self.state.moving | self._joints.linked(number)
+        found, movable = np.empty((3, 3)), self.state.bodies.moving | self._joints.linked(number)
         for axis in range(3):
-            twist = np.zeros_like(self.state.twist)
+            twist = np.zeros_like(self.state.bodies.twist)
             twist[number, axis] = 1.0 / self._pieces.mass[number]
             twist[number, 3:] = inverse @ lever[:, axis]
             self._joints.project_velocities(self.state, twist, movable)
@@ -170,20 +157,20 @@ class RigidBodies:
         impulse = _bounded(impulse, STRONGEST_PUSH, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
-        lever, jointed = point - self.state.position[number], self._joints.jointed[number]
+        lever, jointed = point - self.state.bodies.position[number], self.state.bodies.jointed[number]
         before = self.energy() if jointed else 0.5 * float(impulse @ self._velocity(number, lever))
         self.state.velocity[number] += impulse / self._pieces.mass[number]
         self.state.spin[number] += self._inverse_inertia(number) @ (pin.skew(lever) @ impulse)
-        self.state.moving |= self._joints.linked(number)
+        self.state.bodies.moving[self._joints.linked(number)] = True
         if jointed:
-            self._joints.project_velocities(self.state, self.state.twist, self.state.moving)
+            self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
             self._pushed += self.energy() - before
         else:  # along the mean of the velocities before and after
             self._pushed += before + 0.5 * float(impulse @ self._velocity(number, lever))
 
     def _inverse_inertia(self, number: int) -> Array:
-        rotation = self.state.rotation[number]
-        return np.asarray(rotation @ self.state.inverse[number] @ rotation.T)
+        rotation = self.state.bodies.rotation[number]
+        return np.asarray(rotation @ self.state.bodies.inverse[number] @ rotation.T)
 
     def energy(self) -> float:
         """Kinetic and potential energy of the bodies that move by themselves, joules."""
@@ -216,7 +203,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
-        count = int(np.ceil(dt / SUBSTEP - 1e-9))
+        count = int(np.ceil(dt / STEP.longest - 1e-9))
         record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
         self._pushed = 0.0
         self._find_near(dt / count)
@@ -226,8 +213,8 @@ class RigidBodies:
                 self._step(end - record.time, record)
         for number, (_, after) in given.items():
             state.put(number, after)
-            state.twist[number] = 0.0
-        state.given[:] = False
+            state.bodies.twist[number] = 0.0
+        state.bodies.given[:] = False
         self._sleepers.update(self._near, dt)
         self.time += dt
         return record.finished(self.names, self.energy(), self._sleepers.count)
@@ -236,13 +223,13 @@ class RigidBodies:
 
     def _stops(self) -> int:
         """Early ends of steps that a frame may have."""
-        return STOPS * FEW // max(FEW, int(self.state.moving.sum()))
+        return STEP.stops * STEP.few // max(STEP.few, int(self.state.bodies.moving.sum()))
 
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
         if self._sleepers.wake(self._near):
-            self._find_near(SUBSTEP)  # what bears the woken ones was not looked at while all of it was still
+            self._find_near(STEP.longest)  # what bears the woken ones was not looked at while all of it was still
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
@@ -257,18 +244,18 @@ class RigidBodies:
             self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
             record.steps += 1
-            least = self._find_near(SUBSTEP)
-            if record.given_up >= GIVEN_UP:
+            least = self._find_near(STEP.longest)
+            if record.given_up >= STEP.given_up:
                 break
-            if halvings == HALVINGS:
+            if halvings == STEP.halvings:
                 record.given_up += 1
                 break
             shares: tuple[float, ...] = (1.0,)
-            if least >= -(INSIDE if foreseen else SHALLOW):
+            if least >= -(STEP.inside if foreseen else STEP.shallow):
                 free, shares = check_passing(state, before, self._near, self._margin, self._travel(time), time, weight)
                 if free:
                     break
-            start, met = program.remembered(time), bool(shares) and foreseen < FORESEEN
+            start, met = program.remembered(time), bool(shares) and foreseen < STEP.foreseen
             if met:
                 self._add_foreseen(program, before, time, shares)
                 foreseen += 1
@@ -284,14 +271,14 @@ class RigidBodies:
         self._old = program.remembered(time)
         work = program.work()
         record.work += float(work.sum())
-        self._joints.project_velocities(state, state.twist, state.moving)
+        self._joints.project_velocities(state, state.bodies.twist, state.bodies.moving)
         program.settle(before.kept, work)
         np.add.at(record.impulse, program.points.bodies[:, 1], impulse)
         np.add.at(record.impulse, program.points.bodies[:, 0], -impulse)
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
-        if least < LEAST_GAP:
+        if least < STEP.least_gap:
             least, lifted = self._separate(least)
             record.work += lifted
         record.deepest = max(record.deepest, -least)
@@ -300,7 +287,7 @@ class RigidBodies:
     def _until_impact(program: StepProgram, time: float, together: bool) -> tuple[float, bool]:
         """The time to the first impact if that comes before a time and is not part of the program, and whether so."""
         first = float(program.hits.min(initial=np.inf))
-        return (time, False) if together or first >= time else (max(first, SHORTEST), True)
+        return (time, False) if together or first >= time else (max(first, STEP.shortest), True)
 
     def _move(
         self, program: StepProgram, time: float, together: bool, start: Impulses, kept: tuple[Array, Array, Array]
@@ -308,15 +295,15 @@ class RigidBodies:
         """Solve the program of a step and move the bodies, again until joints are closed at its end."""
         joints, state = self._joints, self.state
         hold = np.zeros((len(joints), 3))
-        for closing in range(CLOSINGS):
+        for closing in range(STEP.closings):
             program.solve(time, together, start, hold)
             pushed = program.pushed()
-            self._drift(time, pushed)
+            motion_kernel.drift(state.bodies, pushed, self.gravity, time)
             self._falling = ~pushed
-            if not len(joints) or time < FINE or closing == CLOSINGS - 1:
+            if not len(joints) or time < STEP.fine or closing == STEP.closings - 1:
                 return
             off = joints.gaps(state)
-            if np.abs(off).max() <= CLOSED:
+            if np.abs(off).max() <= STEP.closed:
                 return
             hold -= off / time
             start = program.remembered(time)
@@ -328,8 +315,8 @@ class RigidBodies:
         for share in shares:
             if share < 1.0:
                 state.between(before.kept, share)
-                self._find_near(SUBSTEP)
-            program.add_points(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
+                self._find_near(STEP.longest)
+            program.add_points(self._finder.points(self._near.nearer(STEP.least_gap)), time, share)
             state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
@@ -340,8 +327,8 @@ class RigidBodies:
             record.impulse[second] += row[2:]
             record.impulse[first] -= row[2:]
             for body, sign in ((first, 1.0), (second, -1.0)):
-                if self.state.given[body]:
-                    lever = points.point[number] - self.state.position[body]
+                if self.state.bodies.given[body]:
+                    lever = points.point[number] - self.state.bodies.position[body]
                     record.work += sign * float(
                         row[2:] @ (self.state.velocity[body] + np.cross(self.state.spin[body], lever))
                     )
@@ -349,44 +336,36 @@ class RigidBodies:
             names = self.names[first], self.names[second]
             record.events.append(Event(record.time, *names, *place, float(row[1]), row[2:]))
 
-    def _drift(self, time: float, pushed: Mask) -> None:
-        state = self.state
-        motion_kernel.drift(
-            state.position, state.rotation, state.twist, self._pieces.inertia, state.inverse,
-            state.moving, state.given, pushed, self.gravity, time,
-        )  # fmt: skip
-
     def _find_near(self, time: float) -> float:
         """Find the pairs that can meet within a time; the least distance of any."""
         state = self.state
-        active = state.moving | state.given
         way = self._travel(time)
-        self._margin = 1.5 * way + MARGIN
-        self._near = self._finder.near(state.position, state.rotation, self._margin, active)
+        self._margin = 1.5 * way + STEP.margin
+        self._near = self._finder.near(state.bodies.position, state.bodies.rotation, self._margin, state.active)
         return float(self._near.distance.min(initial=np.inf))
 
     def _travel(self, time: float) -> Array:
         """Most that a point of each body (n,) moves in a time, metres."""
         state = self.state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * self._pieces.lever
-        return np.asarray((speed + np.where(state.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
+        return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> tuple[float, float]:
-        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
+        """Part pieces that are nearer than `STEP.least_gap`, by the least displacements; the least distance then.
 
         Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
         """
         state = self.state
-        before, position = self.energy(), state.position.copy()
-        for _ in range(SEPARATIONS):
+        before, position = self.energy(), state.bodies.position.copy()
+        for _ in range(STEP.separations):
             program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
-            motion_kernel.displace(state.position, state.rotation, program.separation(0.5 * SKIN), state.moving)
-            least = self._find_near(SUBSTEP)
-            if least >= LEAST_GAP:
+            motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
+            least = self._find_near(STEP.longest)
+            if least >= STEP.least_gap:
                 break
         gain = self.energy() - before
         if gain > 0.0:
-            state.slow(state.moving & (state.position != position).any(axis=1), gain)
+            state.slow(state.bodies.moving & (state.bodies.position != position).any(axis=1), gain)
         return least, max(0.0, self.energy() - before)
 
 

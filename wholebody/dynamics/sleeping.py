@@ -5,29 +5,25 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.dynamics import contact_kernel
+from wholebody.dynamics import solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactFinder
+from wholebody.dynamics.settings import SLEEP
 from wholebody.geometry.proximity import Contacts
-
-STILL = 5e-3  # m/s of every point of a body: slower bodies may sleep
-SLEEP_AFTER = 0.5  # s that all bodies of an island are so slow before they sleep
-TOUCHING = 1e-3  # m: nearer bodies wake each other
-MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap at which bodies rest, so none gets inside
 
 
 class Sleepers:
     """Which bodies sleep. A body sleeps and wakes together with all that touch each other.
 
-    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `MOVED`, however slowly
-    or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it too.
+    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `SLEEP.moved`, however
+    slowly or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it.
     """
 
     def __init__(self, state: BodiesState, together: Indices) -> None:
         """Let all be awake; `together` (k, 2) are bodies that joints hold together."""
         self._state, self._together = state, together
-        self._slow_for = np.zeros(len(state.position))
-        self._island = np.arange(len(state.position))
+        self._slow_for = np.zeros(len(state.bodies.position))
+        self._island = np.arange(len(state.bodies.position))
         self._touched: Indices = np.zeros((0, 2), dtype=np.intp)  # a sleeper, and what touches it
         self._position, self._rotation = np.zeros((0, 3)), np.zeros((0, 3, 3))  # of the latter, when the former slept
 
@@ -37,29 +33,29 @@ class Sleepers:
         return int(self._asleep().sum())
 
     def _asleep(self) -> Mask:
-        return self._state.pieces.dynamic & ~self._state.moving
+        return self._state.pieces.dynamic & ~self._state.bodies.moving
 
     def _touching(self, near: Contacts) -> Indices:
         """Bodies (k, 2) that touch, or that a joint holds together."""
-        touching: Indices = self._state.pieces.body[near.pair[near.distance < TOUCHING]]
+        touching: Indices = self._state.pieces.body[near.pair[near.distance < SLEEP.touching]]
         return np.concatenate([touching, self._together])
 
     def update(self, near: Contacts, dt: float) -> None:
         """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
         state = self._state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.lever
-        slow = speed < STILL
+        slow = speed < SLEEP.still
         self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
-        if not (self._slow_for[state.moving] >= SLEEP_AFTER).any():
+        if not (self._slow_for[state.bodies.moving] >= SLEEP.after).any():
             return
         body = self._touching(near)
-        island = np.empty(len(state.position), dtype=np.intp)
-        contact_kernel.join(np.arange(len(body)), body, state.pieces.dynamic, island)
+        island = np.empty(len(state.bodies.position), dtype=np.intp)
+        solve_kernel.join(np.arange(len(body)), body, state.pieces.dynamic, island)
         least = np.full(len(island), np.inf)
-        waiting = np.where(state.pieces.dynamic, np.where(state.moving, self._slow_for, np.inf), np.inf)
+        waiting = np.where(state.pieces.dynamic, np.where(state.bodies.moving, self._slow_for, np.inf), np.inf)
         np.minimum.at(least, island, waiting)
-        falling_asleep = state.moving & (least[island] >= SLEEP_AFTER)
-        state.moving &= ~falling_asleep
+        falling_asleep = state.bodies.moving & (least[island] >= SLEEP.after)
+        state.bodies.moving[falling_asleep] = False
         state.velocity[falling_asleep] = state.spin[falling_asleep] = 0.0
         self._island[falling_asleep] = island[falling_asleep]
         self._remember(body, falling_asleep)
@@ -70,8 +66,8 @@ class Sleepers:
         both = np.concatenate([body, body[:, ::-1]])
         both = np.unique(both[falling_asleep[both[:, 0]] & ~self._asleep()[both[:, 1]]], axis=0)
         self._touched = np.concatenate([self._touched, both])
-        self._position = np.concatenate([self._position, state.position[both[:, 1]]])
-        self._rotation = np.concatenate([self._rotation, state.rotation[both[:, 1]]])
+        self._position = np.concatenate([self._position, state.bodies.position[both[:, 1]]])
+        self._rotation = np.concatenate([self._rotation, state.bodies.rotation[both[:, 1]]])
 
     def wake(self, near: Contacts, came: Mask | None = None) -> bool:
         """Wake what is touched by a body that moves; whether anything woke.
@@ -81,19 +77,19 @@ class Sleepers:
             came: (n,) bodies that were put where they are; none by default.
         """
         state, asleep = self._state, self._asleep()
-        active = state.moving | state.given if came is None else state.moving | state.given | came
+        active = state.active if came is None else state.active | came
         if not (asleep.any() and active.any()):
             return False
         both = self._touching(near)
         both = np.concatenate([both, both[:, ::-1]])
         both = both[asleep[both[:, 0]] & active[both[:, 1]]]
         known = np.isin(self._keys(both), self._keys(self._touched))
-        woken = [both[~known | (self._speeds(both) > STILL), 0], self._touched[self._moved() > MOVED, 0]]
+        woken = [both[~known | (self._speeds(both) > SLEEP.still), 0], self._touched[self._moved() > SLEEP.moved, 0]]
         touched = np.concatenate(woken)
         if not len(touched):
             return False
         waking = asleep & np.isin(self._island, self._island[touched])
-        state.moving |= waking
+        state.bodies.moving[waking] = True
         self._slow_for[waking] = 0.0
         self._forget()
         return True
@@ -101,10 +97,10 @@ class Sleepers:
     def wake_where_put(self, finder: ContactFinder, before: tuple[Array, Array, Array]) -> None:
         """Wake what is touched or was left by bodies that were put elsewhere than in `before`, of `state.copies`."""
         state = self._state
-        put = (state.position != before[0]).any(axis=1) | (state.rotation != before[1]).any(axis=(1, 2))
+        put = (state.bodies.position != before[0]).any(axis=1) | (state.bodies.rotation != before[1]).any(axis=(1, 2))
         if put.any() and self.count:
-            margin = np.full(len(put), 0.5 * TOUCHING)
-            self.wake(finder.near(state.position, state.rotation, margin, put), put)
+            margin = np.full(len(put), 0.5 * SLEEP.touching)
+            self.wake(finder.near(state.bodies.position, state.bodies.rotation, margin, put), put)
 
     def _forget(self) -> None:
         """Forget what touched bodies that are awake."""
@@ -120,7 +116,7 @@ class Sleepers:
     def _speeds(self, both: Indices) -> Array:
         """Greatest speed (k,), within the first body of each pair, that the second one has as a rigid body, m/s."""
         state, own, other = self._state, both[:, 0], both[:, 1]
-        arm = state.position[own] - state.position[other]
+        arm = state.bodies.position[own] - state.bodies.position[other]
         at_centre = state.velocity[other] + np.cross(state.spin[other], arm)
         spin = np.linalg.norm(state.spin[other], axis=1)
         return np.asarray(np.linalg.norm(at_centre, axis=1) + spin * state.pieces.lever[own])
@@ -128,9 +124,9 @@ class Sleepers:
     def _moved(self) -> Array:
         """Most by which what touches each sleeper (k,) is elsewhere, within the sleeper, than when that fell asleep."""
         state, own, other = self._state, self._touched[:, 0], self._touched[:, 1]
-        turn = state.rotation[other] @ self._rotation.transpose(0, 2, 1)
-        arm = state.position[own] - self._position
-        at_centre = state.position[other] + np.einsum("kij,kj->ki", turn, arm) - state.position[own]
+        turn = state.bodies.rotation[other] @ self._rotation.transpose(0, 2, 1)
+        arm = state.bodies.position[own] - self._position
+        at_centre = state.bodies.position[other] + np.einsum("kij,kj->ki", turn, arm) - state.bodies.position[own]
         # the chord of a turn over a lever is the spectral norm of what it changes, Frobenius's over the root of two
         turned = np.linalg.norm(turn - np.eye(3), axis=(1, 2)) / np.sqrt(2.0)
         return np.asarray(np.linalg.norm(at_centre, axis=1) + turned * state.pieces.lever[own])

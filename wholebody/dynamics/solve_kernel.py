@@ -1,370 +1,376 @@
-"""The joint program of all contacts and joints, as compiled loops.
+"""The program of contacts and joints, as compiled loops.
 
-At every contact point, with u = J v (see `contact_kernel`), it finds
+At every contact point, with u = J v (see `rows_kernel`), it finds
 
     0 <= p_n  complementary to  u_n - target >= 0                                                    (Signorini)
     p_t = -min(mu p_n, sticking) u_t / |u_t|                                                         (Coulomb)
 
-and at every joint point u = hold, by Gauss and Seidel's method with projection, one point after the other, forwards and
-backwards in turn, with the conjugate directions of Silcowitz, Niebe and Erleben (2010) between sweeps. Most points bear
-nothing: sweeps over those that do follow a sweep over all.
+and at every joint point u = hold, by Gauss and Seidel's method with projection: one point after the other, forwards and
+backwards in turn, with the conjugate directions of Silcowitz, Niebe and Erleben (2010) between sweeps. Sweeps over all
+points say which of them bear something, so which bodies bear each other; these islands are solved by themselves.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices
+from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.dynamics.contact_kernel import join
+from wholebody.dynamics.rows_kernel import Rows, push
 
 JOINT_PRECISION = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
-NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their target than this are visited in every sweep
-FULL_SWEEP_PERIOD = 8  # sweeps over the points that bear something between sweeps over all
-UNCONVERGED = 30.0  # tolerances: while a sweep changes more, visits are not counted as used up ...
-EXTRA_VISITS = 6  # ... until they are so many times as many
+NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their target than this belong to their island
 ISLAND_SWEEPS = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
+ROUGH = 30.0  # tolerances: an island whose last sweep changes more has EXTRA_SWEEPS times as many sweeps
+EXTRA_SWEEPS = 6
+SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
+class Laws(NamedTuple):
+    """What a program asks of its points.
+
+    Attributes:
+        friction: (m - j,) coefficients of the contact points.
+        target: (m - j,) least u_n after it, m/s.
+        hold: (j, 3) u of the joint points after it, m/s.
+    """
+
+    friction: Array
+    target: Array
+    hold: Array
+
+
+class Limits(NamedTuple):
+    """Where a program ends.
+
+    Attributes:
+        tolerance: of u, m/s: two sweeps, one each way, that change none by more end it.
+        sweeps: most of them.
+    """
+
+    tolerance: float
+    sweeps: int
+
+
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
-def _rates(c: int, bodies: Indices, rows: Array, twist: Array) -> tuple[float, float, float]:
+def _rates(c: int, rows: Rows, twist: Array) -> tuple[float, float, float]:
     """Velocities of B's point relative to A's along the three axes of a point."""
     one, two, three = 0.0, 0.0, 0.0
-    a, b = bodies[c, 0], bodies[c, 1]
+    a, b = rows.bodies[c, 0], rows.bodies[c, 1]
     for k in range(6):
         first, second = twist[a, k], twist[b, k]
-        one += rows[c, 0, k] * first + rows[c, 0, 6 + k] * second
-        two += rows[c, 1, k] * first + rows[c, 1, 6 + k] * second
-        three += rows[c, 2, k] * first + rows[c, 2, 6 + k] * second
+        one += rows.jacobian[c, 0, k] * first + rows.jacobian[c, 0, 6 + k] * second
+        two += rows.jacobian[c, 1, k] * first + rows.jacobian[c, 1, 6 + k] * second
+        three += rows.jacobian[c, 2, k] * first + rows.jacobian[c, 2, 6 + k] * second
     return one, two, three
 
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
-def _push(
-    c: int, bodies: Indices, responses: Array, one: float, two: float, three: float, twist: Array, impulse: Array
-) -> None:
-    """Add to the impulse of a point, and change the velocities of A and B by that."""
-    a, b = bodies[c, 0], bodies[c, 1]
+def _push(c: int, one: float, two: float, three: float, rows: Rows, twist: Array) -> None:
+    """Change the velocities of A and B by an impulse along the three axes of a point."""
+    a, b = rows.bodies[c, 0], rows.bodies[c, 1]
     for k in range(6):
-        twist[a, k] += one * responses[c, 0, k] + two * responses[c, 1, k] + three * responses[c, 2, k]
+        own = rows.response[c, 0, k] * one + rows.response[c, 1, k] * two
+        twist[a, k] += own + rows.response[c, 2, k] * three
     for k in range(6, 12):
-        twist[b, k - 6] += one * responses[c, 0, k] + two * responses[c, 1, k] + three * responses[c, 2, k]
-    impulse[c, 0] += one
-    impulse[c, 1] += two
-    impulse[c, 2] += three
+        own = rows.response[c, 0, k] * one + rows.response[c, 1, k] * two
+        twist[b, k - 6] += own + rows.response[c, 2, k] * three
 
 
 @compiled(error_model="numpy", fastmath=FAST, inline="always")
-def _visit(
-    c: int,
-    bodies: Indices,
-    rows: Array,
-    responses: Array,
-    mobility: Array,
-    across: Array,
-    friction: Array,
-    target: Array,
-    twist: Array,
-    impulse: Array,
-) -> tuple[float, float, bool]:
-    """Solve the program for one contact point alone; `across` (m, 2) are the rates along t1 and t2 by a normal impulse.
+def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tuple[float, float, bool]:
+    """Solve the program for one point alone.
 
     Returns:
-        The change of u, the square of that of the impulse, and whether the point bears or nearly bears something.
+        The change of u, that of a joint times `JOINT_PRECISION`; the square of that of the impulse; and whether the
+        point bears or nearly bears something.
     """
-    normal, one, two = _rates(c, bodies, rows, twist)
-    each, open_by = mobility[c, 0], normal - target[c]
-    before, first, second = impulse[c, 0], impulse[c, 1], impulse[c, 2]
+    if rows.mobility[c, 0] <= 0.0:
+        return 0.0, 0.0, False
+    normal, one, two = _rates(c, rows, twist)
+    joint = c - len(laws.target)
+    if joint >= 0:
+        own = rows.effective_mass[joint]
+        x, y, z = laws.hold[joint, 0] - normal, laws.hold[joint, 1] - one, laws.hold[joint, 2] - two
+        p = own[0, 0] * x + own[0, 1] * y + own[0, 2] * z
+        q = own[1, 0] * x + own[1, 1] * y + own[1, 2] * z
+        r = own[2, 0] * x + own[2, 1] * y + own[2, 2] * z
+        _push(c, p, q, r, rows, twist)
+        impulse[c, 0] += p
+        impulse[c, 1] += q
+        impulse[c, 2] += r
+        return JOINT_PRECISION * max(abs(x), abs(y), abs(z)), p * x + q * y + r * z, True
+    each, side = rows.mobility[c, 0], rows.mobility[c, 1]
+    open_by, before, first, second = normal - laws.target[c], impulse[c, 0], impulse[c, 1], impulse[c, 2]
     now = max(0.0, before - open_by / each)
     if now == 0.0 and before == 0.0 and first == 0.0 and second == 0.0:
         return 0.0, 0.0, open_by < NEAR_TARGET
-    step, side = now - before, mobility[c, 1]
-    one = first - (one + across[c, 0] * step) / side
-    two = second - (two + across[c, 1] * step) / side
-    most, size = friction[c] * now, np.sqrt(one * one + two * two)
+    step = now - before
+    one = first - (one + rows.mobility[c, 2] * step) / side
+    two = second - (two + rows.mobility[c, 3] * step) / side
+    most, size = laws.friction[c] * now, np.sqrt(one * one + two * two)
     if size > most:
         one, two = one * (most / size), two * (most / size)
+    impulse[c, 0], impulse[c, 1], impulse[c, 2] = now, one, two
     one, two = one - first, two - second
-    _push(c, bodies, responses, step, one, two, twist, impulse)
-    impulse[c, 0] = now  # without rounding: none is less than zero
+    _push(c, step, one, two, rows, twist)
     change = max(abs(step) * each, max(abs(one), abs(two)) * side)
     return change, step * step * each + (one * one + two * two) * side, True
 
 
-@compiled(inner=True, error_model="numpy", fastmath=FAST)
-def _hold(
-    first: int,
-    chosen: Indices,
-    bodies: Indices,
-    rows: Array,
-    responses: Array,
-    mobility: Array,
-    effective_mass: Array,
-    hold: Array,
-    twist: Array,
-    impulse: Array,
-    before: Array,
-) -> tuple[float, float]:
-    """Solve the three equations of each joint point alone, from the `first` of the chosen ones on; as `_visit`."""
-    change, square = 0.0, 0.0
-    for place in range(first, len(chosen)):
-        c = chosen[place]
-        if mobility[c, 0] <= 0.0:
-            continue
-        number = c - len(bodies) + len(effective_mass)
-        one, two, three = _rates(c, bodies, rows, twist)
-        one, two, three = hold[number, 0] - one, hold[number, 1] - two, hold[number, 2] - three
-        own = effective_mass[number]
-        p = own[0, 0] * one + own[0, 1] * two + own[0, 2] * three
-        q = own[1, 0] * one + own[1, 1] * two + own[1, 2] * three
-        r = own[2, 0] * one + own[2, 1] * two + own[2, 2] * three
-        for row in range(3):
-            before[place, row] = impulse[c, row]
-        _push(c, bodies, responses, p, q, r, twist, impulse)
-        change = max(change, abs(one), abs(two), abs(three))
-        square += p * one + q * two + r * three
-    return change, square
-
-
 @compiled(error_model="numpy", fastmath=FAST)
-def solve(
-    chosen: Indices,
-    bodies: Indices,
-    jacobian: Array,
-    response: Array,
-    mobility: Array,
-    friction: Array,
-    target: Array,
-    effective_mass: Array,
-    hold: Array,
-    twist: Array,
-    impulse: Array,
-    tolerance: float,
-    visits: int,
-    most: int,
-) -> int:
+def solve(chosen: Indices, rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
     """Solve the program of the points `chosen`; how many sweeps it took.
 
     Args:
-        chosen: (k,) points of the program, in order; the last j of all m are those of joints.
-        bodies: (m, 2).
-        jacobian: (m, 3, 2, 6).
-        response: (m, 3, 2, 6).
-        mobility: (m, 2).
-        friction: (m - j,) coefficients.
-        target: (m - j,) least u_n after it, m/s.
-        effective_mass: (j, 3, 3) impulses of a joint point by a unit velocity: inverses of its J M^-1 J^T.
-        hold: (j, 3) u of the joint points after it, m/s.
+        chosen: (k,) points of the program; those of joints come last, and are visited in this order in every sweep,
+            which needs fewer of them.
+        rows: of all points.
+        laws: of all points.
         twist: (n, 6) velocities with the impulses at the start; changed in place.
         impulse: (m, 3) along n, t1, t2, N s; a start, changed in place.
-        tolerance: a sweep over all that changes no u by more ends it, m/s.
-        visits: of points, after which the next sweep over all ends it; `EXTRA_VISITS` times as many where impulses
-            change much.
-        most: sweeps, the last of which is always one of projection over all.
+        limits: where it ends.
     """
-    count, joints = len(chosen), len(bodies) - len(effective_mass)
-    rows, responses = jacobian.reshape(len(bodies), 3, 12), response.reshape(len(bodies), 3, 12)
-    before, way, across = np.zeros((count, 3)), np.zeros((count, 3)), np.zeros((joints, 2))
-    contacts = 0
+    count = len(chosen)
+    before, way = np.zeros((count, 3)), np.zeros((count, 3))
+    last, contacts = np.inf, 0
     for c in chosen:
-        if c < joints:
-            contacts += 1
-            for k in range(12):
-                across[c, 0] += rows[c, 1, k] * responses[c, 0, k]
-                across[c, 1] += rows[c, 2, k] * responses[c, 0, k]
-    listed = np.arange(count)
-    bearing, last, full, left = 0, np.inf, True, visits
-    for sweep in range(most):
+        contacts += c < len(laws.target)
+    calm = 0  # sweeps that changed less than the tolerance; one is not enough: islands would be taken up again
+    for sweep in range(limits.sweeps):
         change, square = 0.0, 0.0
-        size = contacts if full else bearing
-        kept = 0
-        for number in range(size):
-            index = number if sweep % 2 == 0 else size - 1 - number
-            place = index if full else listed[index]
+        for number in range(count):
+            place = number if sweep % 2 == 0 or number >= contacts else contacts - 1 - number
             c = chosen[place]
-            if mobility[c, 0] <= 0.0:
-                continue
             for row in range(3):
                 before[place, row] = impulse[c, row]
-            largest, moved, bears = _visit(
-                c, bodies, rows, responses, mobility, across, friction, target, twist, impulse
-            )  # fmt: skip
+            largest, moved, _ = _visit(c, rows, laws, twist, impulse)
             change, square = max(change, largest), square + moved
-            if full and bears:
-                listed[kept] = place
-                kept += 1
-            elif full:
-                for row in range(3):
-                    way[place, row] = 0.0
-        if contacts < count:
-            largest, moved = _hold(
-                contacts, chosen, bodies, rows, responses, mobility, effective_mass, hold, twist, impulse, before
-            )  # fmt: skip
-            change, square = max(change, JOINT_PRECISION * largest), square + moved
-        left -= size + count - contacts
-        spent = left <= 0 and (change < UNCONVERGED * tolerance or left <= (1 - EXTRA_VISITS) * visits)
-        if full:
-            bearing = kept
-            if sweep % 2 == 1:  # in the order of the points again
-                for index in range(kept // 2):
-                    other = kept - 1 - index
-                    listed[index], listed[other] = listed[other], listed[index]
-            if change < tolerance or sweep >= most - 1 or spent:
-                return sweep + 1
-        full = change < tolerance or spent or sweep >= most - 2 or sweep % FULL_SWEEP_PERIOD == FULL_SWEEP_PERIOD - 1
+        calm = calm + 1 if change < limits.tolerance else 0
+        if calm == 2 or sweep == limits.sweeps - 1:
+            return sweep + 1
         share, last = square / last, square
-        for index in range(bearing + count - contacts):
-            place = listed[index] if index < bearing else contacts + index - bearing
+        for place in range(count):
             c = chosen[place]
-            if share < 1.0:  # farther along the last way
-                one, two, three = share * way[place, 0], share * way[place, 1], share * way[place, 2]
-                way[place, 0] = one + impulse[c, 0] - before[place, 0]
-                way[place, 1] = two + impulse[c, 1] - before[place, 1]
-                way[place, 2] = three + impulse[c, 2] - before[place, 2]
-                if one != 0.0 or two != 0.0 or three != 0.0:
-                    _push(c, bodies, responses, one, two, three, twist, impulse)
-            else:
-                for row in range(3):
-                    way[place, row] = 0.0
-    return most
+            if share >= 1.0:
+                way[place, 0], way[place, 1], way[place, 2] = 0.0, 0.0, 0.0
+                continue
+            one, two, three = share * way[place, 0], share * way[place, 1], share * way[place, 2]
+            for row in range(3):
+                way[place, row] = share * way[place, row] + impulse[c, row] - before[place, row]
+            if one != 0.0 or two != 0.0 or three != 0.0:
+                _push(c, one, two, three, rows, twist)
+                impulse[c, 0] += one
+                impulse[c, 1] += two
+                impulse[c, 2] += three
+    return limits.sweeps
 
 
 @compiled(error_model="numpy", fastmath=FAST)
-def solve_islands(
-    bodies: Indices,
-    jacobian: Array,
-    response: Array,
-    mobility: Array,
-    friction: Array,
-    target: Array,
-    effective_mass: Array,
-    hold: Array,
-    twist: Array,
-    impulse: Array,
-    tolerance: float,
-    visits: int,
-    most: int,
-) -> int:
+def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: Limits) -> int:
     """Solve the program of all points, each island of bodies that bear each other apart; how many sweeps were over all.
 
-    A sweep over all points says which of them bear something, so which bodies are islands, and which islands are not
-    solved yet. Those are solved by themselves, until a sweep over all changes none by more than the tolerance.
-
     Args:
-        bodies: (m, 2); all arrays and the tolerance are as in `solve`.
-        jacobian: (m, 3, 2, 6).
-        response: (m, 3, 2, 6).
-        mobility: (m, 2).
-        friction: (m - j,).
-        target: (m - j,).
-        effective_mass: (j, 3, 3).
-        hold: (j, 3).
-        twist: (n, 6).
+        rows: of all points.
+        laws: of all points.
+        twist: (n, 6) as in `solve`, and so `impulse`.
         impulse: (m, 3).
-        tolerance: m/s.
-        visits: of all points; an island has as many sweeps as that allows them all, and `EXTRA_VISITS` times as many
-            where impulses change much.
-        most: sweeps over an island.
+        limits: of each island, see `ROUGH`.
     """
-    count, joints = len(bodies), len(bodies) - len(effective_mass)
-    rows, responses = jacobian.reshape(count, 3, 12), response.reshape(count, 3, 12)
-    across, before, everything = np.zeros((joints, 2)), np.zeros((count, 3)), np.arange(count)
-    movable = np.zeros(len(twist), dtype=np.bool_)
-    for c in range(count):
-        for side in range(2):
-            movable[bodies[c, side]] |= responses[c, 0, 6 * side] != 0.0 or responses[c, 1, 6 * side] != 0.0
-            movable[bodies[c, side]] |= responses[c, 2, 6 * side] != 0.0
-        if c < joints:
-            for k in range(12):
-                across[c, 0] += rows[c, 1, k] * responses[c, 0, k]
-                across[c, 1] += rows[c, 2, k] * responses[c, 0, k]
-    usual = min(most, visits // max(count, 1) + 1)
-    listed, points = np.empty(count, dtype=np.intp), np.empty(count, dtype=np.intp)
-    changes, worst = np.zeros(count), np.zeros(len(twist))
-    root, first = np.empty(len(twist), dtype=np.intp), np.empty(len(twist) + 1, dtype=np.intp)
-    swept, sweeps = np.zeros(len(twist), dtype=np.intp), 0
+    count, bodies = len(rows.bodies), len(twist)
+    listed, changes = np.empty(count, dtype=np.intp), np.zeros(count)
+    root, swept, sweeps = np.empty(bodies, dtype=np.intp), np.zeros(bodies, dtype=np.intp), 0
+    part = Limits(0.5 * limits.tolerance, ISLAND_SWEEPS)
     while True:
         change, bearing = 0.0, 0
-        for c in range(joints):
-            if mobility[c, 0] <= 0.0:
-                continue
-            changes[c], _, bears = _visit(
-                c, bodies, rows, responses, mobility, across, friction, target, twist, impulse
-            )  # fmt: skip
+        for c in range(count):
+            changes[c], _, bears = _visit(c, rows, laws, twist, impulse)
             change = max(change, changes[c])
             if bears:
                 listed[bearing] = c
                 bearing += 1
-        for c in range(joints, count):
-            if mobility[c, 0] <= 0.0:
-                continue
-            largest, _ = _hold(
-                c, everything[: c + 1], bodies, rows, responses, mobility, effective_mass, hold, twist, impulse, before
-            )  # fmt: skip
-            changes[c] = JOINT_PRECISION * largest
-            change = max(change, changes[c])
-            listed[bearing] = c
-            bearing += 1
         sweeps += 1
-        if change < tolerance:
+        if change < limits.tolerance:
             return sweeps
-        join(listed[:bearing], bodies, movable, root)
-        first[:] = 0
-        worst[:] = 0.0
-        for c in listed[:bearing]:
-            island = root[bodies[c, 0] if movable[bodies[c, 0]] else bodies[c, 1]]
-            first[island + 1] += 1
-            worst[island] = max(worst[island], changes[c])
-        for island in range(len(twist)):
-            first[island + 1] += first[island]
-        for c in listed[:bearing]:  # in their order within each island; `first` becomes the end of each
-            island = root[bodies[c, 0] if movable[bodies[c, 0]] else bodies[c, 1]]
-            points[first[island]] = c
-            first[island] += 1
+        join(listed[:bearing], rows.bodies, rows.movable, root)
+        points, first, worst = _by_island(listed[:bearing], rows, root, changes)
         solved = True
-        for island in range(len(twist)):
-            start = first[island - 1] if island > 0 else 0
-            if worst[island] < tolerance or swept[island] >= min(most, EXTRA_VISITS * usual):
-                continue
-            if swept[island] >= usual and worst[island] < UNCONVERGED * tolerance:
-                continue
-            solved = False
-            swept[island] += solve(
-                points[start : first[island]], bodies, jacobian, response, mobility, friction, target, effective_mass,
-                hold, twist, impulse, 0.5 * tolerance, ISLAND_SWEEPS * count, ISLAND_SWEEPS,
-            )  # fmt: skip
+        for island in range(bodies):
+            rough = worst[island] >= ROUGH * limits.tolerance
+            most = EXTRA_SWEEPS * limits.sweeps if rough else limits.sweeps
+            if worst[island] >= limits.tolerance and swept[island] < most:
+                solved = False
+                chosen = points[first[island] : first[island + 1]]
+                swept[island] += solve(chosen, rows, laws, twist, impulse, part)
         if solved:
             return sweeps
 
 
+@compiled(inner=True)
+def _by_island(listed: Indices, rows: Rows, root: Indices, changes: Array) -> tuple[Indices, Indices, Array]:
+    """The listed points, sorted by island; where each island (n,) begins among them; and its greatest change."""
+    count = len(root)
+    island = np.empty(len(listed), dtype=np.intp)
+    first, worst = np.zeros(count + 1, dtype=np.intp), np.zeros(count)
+    for number in range(len(listed)):
+        c = listed[number]
+        a, b = rows.bodies[c, 0], rows.bodies[c, 1]
+        island[number] = root[a if rows.movable[a] else b]
+        first[island[number] + 1] += 1
+        worst[island[number]] = max(worst[island[number]], changes[c])
+    for number in range(count):
+        first[number + 1] += first[number]
+    points, following = np.empty(len(listed), dtype=np.intp), first.copy()
+    for number in range(len(listed)):
+        points[following[island[number]]] = listed[number]
+        following[island[number]] += 1
+    return points, first, worst
+
+
+@compiled()
+def join(points: Indices, bodies: Indices, movable: Mask, root: Indices) -> None:
+    """Write the least body of the island of each: bodies that points join, which do not reach through fixed bodies.
+
+    Args:
+        points: (k,) those that join, such as the points that bear something.
+        bodies: (m, 2) of all points.
+        movable: (n,) bodies that islands may reach through.
+        root: (n,) room.
+    """
+    for body in range(len(root)):
+        root[body] = body
+    for c in points:
+        a, b = bodies[c, 0], bodies[c, 1]
+        if not movable[a] or not movable[b]:
+            continue
+        while root[a] != a:
+            a = root[a]
+        while root[b] != b:
+            b = root[b]
+        root[max(a, b)] = min(a, b)
+    for body in range(len(root)):  # lesser bodies know theirs already
+        root[body] = root[root[body]]
+
+
 @compiled(error_model="numpy")
-def residuals(
-    bodies: Indices,
-    jacobian: Array,
-    mobility: Array,
-    friction: Array,
-    target: Array,
-    hold: Array,
-    twist: Array,
-    impulse: Array,
-) -> tuple[float, float]:
+def residuals(rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tuple[float, float]:
     """Largest violation of Signorini's law and of joints, and of Coulomb's law, both m/s: see `solve`."""
     signorini, coulomb = 0.0, 0.0
-    joints = len(bodies) - len(hold)
-    rows = jacobian.reshape(len(bodies), 3, 12)
-    for c in range(len(bodies)):
-        if mobility[c, 0] <= 0.0:
+    for c in range(len(rows.bodies)):
+        if rows.mobility[c, 0] <= 0.0:
             continue
-        normal, one, two = _rates(c, bodies, rows, twist)
-        if c >= joints:
-            number = c - joints
-            off = max(abs(normal - hold[number, 0]), abs(one - hold[number, 1]), abs(two - hold[number, 2]))
-            signorini = max(signorini, off)
+        normal, one, two = _rates(c, rows, twist)
+        joint = c - len(laws.target)
+        if joint >= 0:
+            hold = laws.hold[joint]
+            signorini = max(signorini, abs(normal - hold[0]), abs(one - hold[1]), abs(two - hold[2]))
             continue
-        signorini = max(signorini, abs(min(impulse[c, 0] * mobility[c, 0], normal - target[c])))
-        one, two = impulse[c, 1] - one / mobility[c, 1], impulse[c, 2] - two / mobility[c, 1]
-        share = min(1.0, friction[c] * impulse[c, 0] / max(np.sqrt(one * one + two * two), 1e-300))
+        each, side = rows.mobility[c, 0], rows.mobility[c, 1]
+        signorini = max(signorini, abs(min(impulse[c, 0] * each, normal - laws.target[c])))
+        one, two = impulse[c, 1] - one / side, impulse[c, 2] - two / side
+        share = min(1.0, laws.friction[c] * impulse[c, 0] / max(np.sqrt(one * one + two * two), 1e-300))
         off = np.sqrt((share * one - impulse[c, 1]) ** 2 + (share * two - impulse[c, 2]) ** 2)
-        coulomb = max(coulomb, off * mobility[c, 1])
+        coulomb = max(coulomb, off * side)
     return signorini, coulomb
+
+
+@compiled()
+def solve_from(
+    old: tuple[Indices, Array, Array],
+    new: tuple[Indices, Array],
+    rows: Rows,
+    laws: Laws,
+    twist: Array,
+    impulse: Array,
+    limits: Limits,
+) -> tuple[float, float]:
+    """Solve the program of all points from the impulses of the step before.
+
+    Args:
+        old: as in `_warm_start`, and so `new`.
+        new: of the contact points.
+        rows: of all points.
+        laws: of all points.
+        twist: (n, 6) velocities without impulses; changed in place.
+        impulse: (m, 3) room; a start for those of joints.
+        limits: of each island.
+
+    Returns:
+        The residuals.
+    """
+    impulse[: len(laws.target)] = 0.0
+    _warm_start(old, new, rows.axes, impulse)
+    for c in range(len(impulse)):
+        for row in range(3):
+            if impulse[c, row] != 0.0:
+                push(c, row, impulse[c, row], rows, twist)
+    solve_islands(rows, laws, twist, impulse, limits)
+    return residuals(rows, laws, twist, impulse)
+
+
+@compiled(inner=True)
+def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
+    """Write the impulses of the nearest old points of the same pair.
+
+    An old point that is not the nearest of any new one within `SAME_POINT` gives its impulse to the nearest new one, as
+    witness points jump from corner to corner.
+
+    Args:
+        old: pair (k,) of each, the point (k, 3) in the first body's axes, and its impulse (k, 3) in the world.
+        new: pair (m,) of each, and the point (m, 3).
+        axes: (m, 3, 3) of the new points.
+        impulse: (m, 3) changed in place, along the axes of each point.
+    """
+    pair, local, world = old
+    new_pair, new_local = new
+    most = -1
+    for number in range(len(pair)):
+        most = max(most, pair[number])
+    for c in range(len(new_pair)):
+        most = max(most, new_pair[c])
+    head, following = np.full(most + 1, -1, dtype=np.intp), np.full(len(pair), -1, dtype=np.intp)
+    new_head, new_following = np.full(most + 1, -1, dtype=np.intp), np.full(len(new_pair), -1, dtype=np.intp)
+    for number in range(len(pair)):  # the points of each pair, as lists
+        following[number] = head[pair[number]]
+        head[pair[number]] = number
+    for c in range(len(new_pair)):
+        new_following[c] = new_head[new_pair[c]]
+        new_head[new_pair[c]] = c
+    used, none = np.zeros(len(pair), dtype=np.bool_), np.zeros(len(new_pair), dtype=np.bool_)
+    for c in range(len(new_pair)):
+        number = _nearest(head[new_pair[c]], following, local, new_local[c], used, SAME_POINT)
+        if number >= 0:
+            used[number] = True
+            _add(world[number], axes[c], impulse[c])
+    for number in range(len(pair)):
+        if not used[number]:
+            c = _nearest(new_head[pair[number]], new_following, new_local, local[number], none, np.inf)
+            if c >= 0:
+                _add(world[number], axes[c], impulse[c])
+
+
+@compiled(inner=True)
+def _nearest(first: int, following: Indices, points: Array, at: Array, left_out: Mask, within: float) -> int:
+    """The point of a list that is nearest to a place (3,), within a distance; -1 if there is none."""
+    best, least, number = -1, within * within, first
+    while number >= 0:
+        if not left_out[number]:
+            square = 0.0
+            for k in range(3):
+                square += (points[number, k] - at[k]) ** 2
+            if square < least:
+                best, least = number, square
+        number = following[number]
+    return best
+
+
+@compiled(inner=True)
+def _add(world: Array, axes: Array, impulse: Array) -> None:
+    """Add an impulse (3,) in the world to one (3,) along axes; its normal part is not negative."""
+    for row in range(3):
+        for k in range(3):
+            impulse[row] += axes[row, k] * world[k]
+    impulse[0] = max(impulse[0], 0.0)

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
-from wholebody.dynamics import contact_kernel, energy_kernel, impact_kernel, solve_kernel
+from wholebody.dynamics import energy_kernel, impact_kernel, rows_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.contact_points import ContactPoints
-from wholebody.dynamics.joints import JointRows, Joints
-
-SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
-TOUCH = 1e-5  # m: a gap larger than SKIN by this still touches
-SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
-TOLERANCE = 1e-4  # m/s: of the program of a step; 0.4 um of its way
-UNSOLVED = 1.2e-4  # m/s: of points that push against what is moved; their impulses are not started from again
-MOST, VISITS = 1000, 20_000  # sweeps of it, and points times sweeps: more is exacter and slower
-SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
-MOST_EVENTS = 1000  # at one stop
-RELAXED = 1e-9  # m/s: by which a step that ends with an impact may overshoot
+from wholebody.dynamics.impact_kernel import SLOW
+from wholebody.dynamics.joints import Joints
+from wholebody.dynamics.rows_kernel import Rows
+from wholebody.dynamics.settings import PROGRAM, SKIN
+from wholebody.dynamics.solve_kernel import Laws, Limits
 
 
 class Impulses(NamedTuple):
@@ -52,17 +46,6 @@ class Impulses(NamedTuple):
         return with_values(self, impulse=share * self.impulse, joint=share * self.joint, time=time)
 
 
-class _PointRows(NamedTuple):
-    """What the loops need of all points, those of joints at the end; see `contact_kernel` and `solve_kernel`."""
-
-    bodies: Indices
-    axes: Array
-    jacobian: Array
-    response: Array
-    mobility: Array
-    effective_mass: Array
-
-
 class StepProgram:
     """The contact points of a step and their program.
 
@@ -79,20 +62,20 @@ class StepProgram:
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
-        self._touching = points.gap <= SKIN + TOUCH
+        self._touching = points.gap <= SKIN + PROGRAM.touch
         self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
-        self._rows = self._point_rows(state.moving)
+        self._rows = self._point_rows(state.bodies.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
         self.residuals = (0.0, 0.0)
         self._jammed = np.zeros(len(points.gap), dtype=bool)
         self._local = state.local(points.bodies[:, 0], points.point)
-        self.read_velocities(state.moving)
+        self.read_velocities(state.bodies.moving)
 
     def read_velocities(self, falling: Mask) -> None:
         """Read the present velocities: approaches and times of impact; `falling` (n,) are bodies that nothing bears."""
         bodies, normal = self.points.bodies, self.points.normal
-        self.speed = self._rates(self.state.twist)[: len(normal), 0]
-        fall = (self.state.moving & falling).astype(float)
+        self.speed = self._rates(self.state.bodies.twist)[: len(normal), 0]
+        fall = (self.state.bodies.moving & falling).astype(float)
         self._pull = (fall[bodies[:, 1]] - fall[bodies[:, 0]]) * (normal @ self.gravity)
         self.hits = impact_times(self.points.gap - SKIN, self.speed, self._pull)
         self.hits[(self.speed > -SLOW) | self._touching] = np.inf
@@ -100,25 +83,20 @@ class StepProgram:
     def _rates(self, twist: Array) -> Array:
         """Relative velocities (m + j, 3) along the axes of the points."""
         found = np.empty((len(self._rows.bodies), 3))
-        contact_kernel.rates(self._rows.bodies, self._rows.jacobian, twist, found)
+        rows_kernel.rates(self._rows.bodies, self._rows.jacobian, twist, found)
         return found
 
-    def _point_rows(self, movable: Mask) -> _PointRows:
+    def _point_rows(self, movable: Mask) -> Rows:
+        """The rows of all points; `movable` (n,) are the bodies that they move."""
         state, points, joints = self.state, self.points, self.joints
-        count, whole = len(points.gap), len(points.gap) + len(joints)
-        bodies = np.concatenate([points.bodies, joints.bodies]) if len(joints) else points.bodies
-        rows = _PointRows(
-            bodies, np.empty((count, 3, 3)), np.empty((whole, 3, 2, 6)), np.empty((whole, 3, 2, 6)),
-            np.empty((whole, 2)), np.empty((len(joints), 3, 3)),
-        )  # fmt: skip
-        contact_kernel.write_rows(
-            points.bodies, points.normal, points.point, state.position, np.where(movable, 1.0 / state.pieces.mass, 0.0),
-            state.inverse_inertia(movable), rows.axes, rows.jacobian, rows.response, rows.mobility,
-        )  # fmt: skip
+        rows = Rows.room(np.concatenate([points.bodies, joints.points.bodies]), len(joints), movable)
+        rows_kernel.contact_rows(points, state.bodies, rows)
         if len(joints):
-            own = (rows.jacobian[count:], rows.response[count:], rows.mobility[count:], rows.effective_mass)
-            joints.write_rows(state, movable, JointRows(*own))
+            rows_kernel.joint_rows(joints.points, state.bodies, rows)
         return rows
+
+    def _limits(self, tolerance: float) -> Limits:
+        return Limits(tolerance, min(PROGRAM.sweeps, PROGRAM.visits // max(len(self._rows.bodies), 1) + 1))
 
     def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
         """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
@@ -135,21 +113,21 @@ class StepProgram:
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
         self._jammed = np.zeros(count + len(gap), dtype=bool)
-        self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
+        self._touching = np.concatenate([self._touching, gap <= SKIN + PROGRAM.touch])
         self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
-        bodies, jacobian, response, mobility = (
-            np.concatenate([one[:count], other[: len(gap)], one[count:]])
-            for one, other in (
-                (rows.bodies, own.bodies), (rows.jacobian, own.jacobian), (rows.response, own.response),
-                (rows.mobility, own.mobility),
-            )
+
+        def inserted(before: Any, new: Any) -> Any:
+            return np.concatenate([before[:count], new[: len(gap)], before[count:]])
+
+        self._rows = Rows(
+            inserted(rows.bodies, own.bodies), inserted(rows.axes, own.axes),
+            inserted(rows.jacobian, own.jacobian), inserted(rows.response, own.response),
+            inserted(rows.mobility, own.mobility), rows.effective_mass, rows.movable,
         )  # fmt: skip
-        axes = np.concatenate([rows.axes, own.axes])
-        self._rows = _PointRows(bodies.astype(np.intp), axes, jacobian, response, mobility, rows.effective_mass)
         # what bears a body is known to the next points that join the step
-        self.impulse = np.concatenate([self.impulse[:count], np.zeros((len(gap), 3)), self.impulse[count:]])
+        self.impulse = inserted(self.impulse, np.zeros((len(gap), 3)))
 
     def resolve_impacts(self) -> tuple[Array, bool]:
         """Resolve the impacts of points that touch: events as in `impact_kernel.resolve`, and whether none is left.
@@ -159,15 +137,15 @@ class StepProgram:
         if not (self._touching & (self.speed < -SLOW)).any():
             return np.zeros((0, 5)), True
         state, points = self.state, self.points
-        weighed = state.given & np.isfinite(state.pieces.mass)
-        rows = self._point_rows(state.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.twist.copy(), np.zeros((MOST_EVENTS, 5))
+        weighed = state.bodies.given & np.isfinite(state.pieces.mass)
+        rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
+        twist, events = state.bodies.twist.copy(), np.zeros((PROGRAM.events, 5))
+        laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
-            np.flatnonzero(self._touching), points.pair, rows.bodies, rows.axes, rows.jacobian, rows.response,
-            rows.mobility, self._restitution, self._friction, rows.effective_mass, self.joints.jointed, twist, SLOW,
-            MOST_EVENTS, np.zeros_like(self.impulse), events,
+            np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
+            events,
         )  # fmt: skip
-        state.twist[state.moving] = twist[state.moving]
+        state.bodies.twist[state.bodies.moving] = twist[state.bodies.moving]
         return events[:count], ended
 
     def solve(self, time: float, together: bool, old: Impulses, hold: Array) -> None:
@@ -180,43 +158,41 @@ class StepProgram:
             hold: (j, 3) velocity of the joint points of B seen from those of A, m/s.
         """
         state, points = self.state, self.points
-        began = state.twist.copy()
-        state.velocity[state.moving] += time * self.gravity
+        twist, moving = state.bodies.twist, state.bodies.moving
+        began = twist.copy()
+        state.velocity[moving] += time * self.gravity
         target = np.where(points.gap > SKIN, (SKIN - points.gap) / np.minimum(time, self._until), 0.0)
         ends = self.hits <= time * (1.0 + 1e-9)
         start = old.over(time)
         if together:
             bouncing = ends | (self._touching & (self.speed < -SLOW))
             if bouncing.any():
-                before = state.twist.copy()
+                before = twist.copy()
                 self._solve(np.where(bouncing, -self._restitution * self.speed, target), start, hold)
                 # the work of the impulses is that along the mean of the velocities before and after
-                rates = self._rates(0.5 * (before + state.twist))
+                rates = self._rates(0.5 * (before + twist))
                 rates[len(target) :] -= 0.5 * hold  # what closes joints is no work
                 if float((rates * self.impulse).sum()) <= 0.0:
                     self._restrain(began, time, target)
                     return
-                state.twist[:] = before
-        else:  # bodies that nothing bears move with the mean of both velocities
-            target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - RELAXED, target)
+                twist[:] = before
+        else:  # bodies that nothing bears move with the mean of both velocities, and rounding is to bear none
+            target = np.where(ends, target + 0.5 * np.minimum(self._pull, 0.0) * time - 1e-9, target)
         self._solve(target, start, hold)
         self._restrain(began, time, target)
 
     def _restrain(self, began: Array, time: float, target: Array) -> None:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
-        state = self.state
-        energy_kernel.restrain(
-            self._rows.bodies, self.impulse, self._rates(state.twist), target, UNSOLVED, state.moving, state.given,
-            self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation, began,
-            state.twist, time * self.gravity, self._jammed,
-        )  # fmt: skip
+        bodies, points = self.state.bodies, self._rows.bodies
+        off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > PROGRAM.unsolved
+        energy_kernel.restrain(points, self.impulse, off, bodies, began, time * self.gravity, self._jammed)
 
     def work(self) -> Array:
         """Work that bodies whose motion is given did at each point (m + j,) by the impulses of the program, joules."""
-        given = self.state.given
-        if not given.any():
+        bodies = self.state.bodies
+        if not bodies.given.any():
             return np.zeros(len(self.impulse))
-        moved = np.where(given[:, None], self.state.twist, 0.0)
+        moved = np.where(bodies.given[:, None], bodies.twist, 0.0)
         return -np.asarray((self._rates(moved) * self.impulse).sum(axis=1))
 
     def settle(self, before: tuple[Array, Array, Array], work: Array) -> None:
@@ -226,32 +202,19 @@ class StepProgram:
             before: positions, rotations and velocities at its start.
             work: (m + j,) as from `work`, before joints changed the velocities.
         """
-        state, given = self.state, self.state.given
-        if len(self.joints) or given[self.points.bodies[self._bearing()]].any():
+        bodies, points = self.state.bodies, self.points
+        if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
             energy_kernel.settle(
-                self._rows.bodies, self.impulse, work, len(self.points.gap), state.moving, given,
-                self.joints.jointed, state.pieces.mass, state.pieces.inertia, state.position, state.rotation,
-                state.twist, *before, np.array(self.gravity),
-            )  # fmt: skip
+                self._rows.bodies, self.impulse, work, len(points.gap), bodies, before, np.array(self.gravity)
+            )
 
     def _solve(self, target: Array, start: Impulses, hold: Array) -> None:
-        state, points, rows, count = self.state, self.points, self._rows, len(self.points.gap)
-        self.impulse[:] = 0.0
-        if len(start.pair):
-            head = np.full(len(state.pieces.table.pairs), -1, dtype=np.intp)
-            contact_kernel.start_from(
-                start.pair, start.local, start.impulse, head, points.pair, self._local, rows.axes, SAME_POINT,
-                self.impulse,
-            )  # fmt: skip
-        self.impulse[count:] = start.joint
-        contact_kernel.apply(rows.bodies, rows.response, state.twist, self.impulse)
-        solve_kernel.solve_islands(
-            rows.bodies, rows.jacobian, rows.response, rows.mobility, self._friction, target, rows.effective_mass, hold,
-            state.twist, self.impulse, TOLERANCE, VISITS, MOST,
+        old, new = (start.pair, start.local, start.impulse), (self.points.pair, self._local)
+        self.impulse[len(target) :] = start.joint
+        self.residuals = solve_kernel.solve_from(
+            old, new, self._rows, Laws(self._friction, target, hold), self.state.bodies.twist, self.impulse,
+            self._limits(PROGRAM.tolerance),
         )  # fmt: skip
-        self.residuals = solve_kernel.residuals(
-            rows.bodies, rows.jacobian, rows.mobility, self._friction, target, hold, state.twist, self.impulse
-        )
 
     def world_impulse(self) -> Array:
         """Impulses (m, 3) of the contacts on the second bodies, along the world's axes, N s."""
@@ -259,7 +222,7 @@ class StepProgram:
 
     def pushed(self) -> Mask:
         """Bodies (n,) on which a contact acts."""
-        found: Mask = np.zeros(len(self.state.moving), dtype=bool)
+        found: Mask = np.zeros(len(self.state.bodies.moving), dtype=bool)
         found[self.points.bodies[self._bearing()]] = True
         return found
 
@@ -280,13 +243,10 @@ class StepProgram:
 
     def separation(self, gap: float) -> Array:
         """Least displacements (n, 6) of all bodies, metres and radians, that part every point by a gap."""
-        points, rows = self.points, self._rows
-        way = np.zeros_like(self.state.twist)
-        solve_kernel.solve_islands(
-            rows.bodies, rows.jacobian, rows.response, rows.mobility, np.zeros(len(points.gap)), gap - points.gap,
-            rows.effective_mass, -self.joints.gaps(self.state), way, np.zeros_like(self.impulse), 0.01 * gap,
-            VISITS, MOST,
-        )  # fmt: skip
+        points = self.points
+        way, impulse = np.zeros_like(self.state.bodies.twist), np.zeros_like(self.impulse)
+        laws = Laws(np.zeros(len(points.gap)), gap - points.gap, -self.joints.gaps(self.state))
+        solve_kernel.solve_islands(self._rows, laws, way, impulse, self._limits(0.01 * gap))
         return way
 
 

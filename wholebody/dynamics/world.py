@@ -18,12 +18,12 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array
 from wholebody.base.checks import array, instance, time_step
 from wholebody.base.errors import InputError
-from wholebody.dynamics.coupling import Coupling, Spring
-from wholebody.dynamics.driven_impulses import TOUCH, PushedContacts
+from wholebody.dynamics.coupling import Coupling, PushedContacts, Spring
 from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.dynamics.settings import PUSH
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
@@ -190,7 +190,7 @@ class World(NotCopyable):
         """Give things the impulses of the figure that was stopped at the posture q (nq,)."""
         assert self.engine is not None
         self._workspace.refresh()
-        near = self._workspace.near(q, TOUCH)
+        near = self._workspace.near(q, PUSH.touch)
         contacts = PushedContacts(self.engine, self._workspace.state, self._workspace.table, near, self._owner_of)
         return contacts.push(self._coupling.velocity, self._surfaces)
 

@@ -191,24 +191,27 @@ class _Search:
         start = self._problem.scene.figure.clamp(self._problem.start)
         self._resolver.query(start)
         free = start if self._resolver.deepest <= self._tolerance else None
-        best: _Trial | None = None
-        for attempt in range(1 + self._method.restarts):
+        best = self._attempt(start, free, "")
+        if not self._ends(best):
+            self.contradictions = contradictions(self._problem, self._workspace)
+        for attempt in range(1, 1 + self._method.restarts):
+            if self._ends(best) or self._cannot_gain(best):
+                break
             size = DISTURBANCES[attempt] if attempt < len(DISTURBANCES) else inf
-            q = start if attempt == 0 else self._reach.disturbed(start, size, self._rng)
-            trial = self._attempt(q, free, "" if attempt == 0 else "restart")
-            if best is None or trial.better(best, self._tolerance):
+            trial = self._attempt(self._reach.disturbed(start, size, self._rng), free, "restart")
+            if trial.better(best, self._tolerance):
                 best = trial
-            if self._solves(best):
-                self.contradictions = ()
-            if self._solves(best) or self._control.over:
-                break
-            if attempt == 0:
-                self.contradictions = contradictions(self._problem, self._workspace)
-            least = least_left(self.contradictions)
-            if least is None or (least and best.error <= NEAREST * least):
-                break
-        assert best is not None
+        if self._solves(best):
+            self.contradictions = ()
         return best if not self._control.over else replace(best, converged=False)
+
+    def _ends(self, best: _Trial) -> bool:
+        return self._solves(best) or self._control.over
+
+    def _cannot_gain(self, best: _Trial) -> bool:
+        """Whether the problem has no solution, or none nearer than the best result."""
+        least = least_left(self.contradictions)
+        return least is None or bool(least and best.error <= NEAREST * least)
 
     def pushed_out(self, q: Array) -> Array:
         """The result of overlap resolution at a posture q (nq,), or at one beside it, if that is better."""

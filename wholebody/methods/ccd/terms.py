@@ -68,55 +68,88 @@ def read(problem: Problem, state: State | None = None) -> Request:
     Raises:
         UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
     """
-    figure = problem.scene.figure
-    refused: list[str] = []
-    fixed = {joint for bound in problem.bounds if isinstance(bound, Freeze) for joint in _frozen(figure, bound)}
-    goals, joints = [], set[int]()
-    for number, goal in enumerate(problem.goals):
-        where = f"goals[{number}], {type(goal).__name__}"
-        if not isinstance(goal, (Point, Frame, Orientation)):
-            refused.append(where)
-            continue
-        path = [joint for joint in reaching(figure, goal.frame) if joint not in fixed]
-        if not path:
-            refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
-        goals.append(_goal_place(figure, goal))
-        joints.update(path)
-    cones: dict[str, None] = {}
-    ranges: dict[str, None] = {}
-    moving = _dofs(figure, joints)
-    state = (State(problem.scene.model) if state is None else state).update(problem.start)
-    support = joint_support(problem.scene.model)
-    left_out = {id(term) for term in problem.defaults if not isinstance(term, (ReachCones, RangeOfMotion))}
-    for number, term in enumerate(problem.constraints):
-        if id(term) in left_out:
-            continue
-        where = f"constraints[{number}], {type(term).__name__}"
-        if isinstance(term, ReachCones):
-            cones.update(dict.fromkeys(figure.cones if term.names is None else term.names))
-        elif isinstance(term, RangeOfMotion):
-            ranges.update(dict.fromkeys(term.row_names))
-        elif isinstance(term, Hold):
-            carried = support[_joint(figure, term.frame)]
-            if term.relative_to is not None:
-                carried = carried - support[_joint(figure, term.relative_to)]
-            if carried[moving].any():
-                refused.append(f"{where}({term.frame!r}), which the joints that reach move too")
-            elif np.abs(term.value(state)).max() > HELD:
-                refused.append(f"{where}({term.frame!r}), which is elsewhere at the start")
-            held = {int(joint) for joint in range(1, problem.scene.model.njoints) if _moves(figure, joint, carried)}
-            fixed |= held
-        else:
-            refused.append(where)
-    for number, bound in enumerate(problem.bounds):
-        if not isinstance(bound, (Freeze, StepLimit)):
-            refused.append(f"bounds[{number}], {type(bound).__name__}")
-    if problem.measures_given:
-        refused += [f"measures[{number}], {type(term).__name__}" for number, term in enumerate(problem.measures)]
-    refused += [f"joint {name!r}, which follows another one (mimic)" for name in list(followers_of(figure.model))[:1]]
-    if refused:
-        raise UnsupportedTermError("ccd", refused)
-    return Request(tuple(goals), tuple(sorted(joints)), frozenset(fixed), tuple(cones), tuple(ranges))
+    reader = _Reader(problem, State(problem.scene.model) if state is None else state)
+    goals = reader.goals()
+    cones, ranges = reader.constraints()
+    reader.others()
+    if reader.refused:
+        raise UnsupportedTermError("ccd", reader.refused)
+    return Request(goals, tuple(sorted(reader.joints)), frozenset(reader.fixed), cones, ranges)
+
+
+class _Reader:
+    """Reads the terms of one problem.
+
+    Attributes:
+        refused: what cannot be taken, in words.
+        joints: that move for the goals.
+        fixed: that must not move.
+    """
+
+    def __init__(self, problem: Problem, state: State) -> None:
+        self._problem, self._figure, self._state = problem, problem.scene.figure, state
+        self.refused: list[str] = []
+        self.joints: set[int] = set()
+        self.fixed = {
+            joint for bound in problem.bounds if isinstance(bound, Freeze) for joint in _frozen(self._figure, bound)
+        }
+
+    def goals(self) -> tuple[GoalPlace, ...]:
+        """The goals; their joints are among `joints` then."""
+        found = []
+        for number, goal in enumerate(self._problem.goals):
+            where = f"goals[{number}], {type(goal).__name__}"
+            if not isinstance(goal, (Point, Frame, Orientation)):
+                self.refused.append(where)
+                continue
+            path = [joint for joint in reaching(self._figure, goal.frame) if joint not in self.fixed]
+            if not path:
+                self.refused.append(f"{where}({goal.frame!r}), which no joint moves that may turn (the root stays)")
+            found.append(_goal_place(self._figure, goal))
+            self.joints.update(path)
+        return tuple(found)
+
+    def constraints(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        """Names of the reach cones and of the ranges of motion; call `goals` first."""
+        problem, cones, ranges = self._problem, dict[str, None](), dict[str, None]()
+        left_out = {id(term) for term in problem.defaults if not isinstance(term, (ReachCones, RangeOfMotion))}
+        for number, term in enumerate(problem.constraints):
+            where = f"constraints[{number}], {type(term).__name__}"
+            if id(term) in left_out:
+                continue
+            if isinstance(term, ReachCones):
+                cones.update(dict.fromkeys(self._figure.cones if term.names is None else term.names))
+            elif isinstance(term, RangeOfMotion):
+                ranges.update(dict.fromkeys(term.row_names))
+            elif isinstance(term, Hold):
+                self._hold(term, f"{where}({term.frame!r})")
+            else:
+                self.refused.append(where)
+        return tuple(cones), tuple(ranges)
+
+    def _hold(self, term: Hold, where: str) -> None:
+        """Keep the joints that would move a frame, if it is where it is held and no goal needs them."""
+        model = self._problem.scene.model
+        support = joint_support(model)
+        carried = support[_joint(self._figure, term.frame)]
+        if term.relative_to is not None:
+            carried = carried - support[_joint(self._figure, term.relative_to)]
+        if carried[_dofs(self._figure, self.joints)].any():
+            self.refused.append(f"{where}, which the joints that reach move too")
+        elif np.abs(term.value(self._state.update(self._problem.start))).max() > HELD:
+            self.refused.append(f"{where}, which is elsewhere at the start")
+        self.fixed |= {int(joint) for joint in range(1, model.njoints) if _moves(self._figure, joint, carried)}
+
+    def others(self) -> None:
+        """Refuse bounds, measures and joints without a counterpart in cyclic coordinate descent."""
+        for number, bound in enumerate(self._problem.bounds):
+            if not isinstance(bound, (Freeze, StepLimit)):
+                self.refused.append(f"bounds[{number}], {type(bound).__name__}")
+        if self._problem.measures_given:
+            for number, term in enumerate(self._problem.measures):
+                self.refused.append(f"measures[{number}], {type(term).__name__}")
+        for name in list(followers_of(self._figure.model))[:1]:
+            self.refused.append(f"joint {name!r}, which follows another one (mimic)")
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:

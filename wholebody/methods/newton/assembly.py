@@ -22,13 +22,13 @@ from wholebody.methods.newton.assembly_joints import AssemblyJoints
 from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
 from wholebody.methods.newton.assembly_system import AssemblySystem
 from wholebody.methods.newton.batches import Batch, Key
-from wholebody.methods.newton.contacts import LEAVE
 from wholebody.methods.newton.equations import EquationSet, unit_lengths
-from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
+from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.kkt import kkt_algebra
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.settings import CONTACTS, FRAMES
 from wholebody.methods.newton.system import Patterns, System
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.tasks.inputs import point
@@ -37,8 +37,6 @@ if TYPE_CHECKING:
     from typing_extensions import Self
 
 FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
-FRAME_TOLERANCE = 1e-4  # m, rad: of the goals in the frames of a drag
-HARD_TOLERANCE = 1e-6  # m, rad: of joints and contacts there
 
 
 @dataclass
@@ -277,7 +275,7 @@ class Assembly(AssemblyJoints):
             self._ready(None)
         return self
 
-    def step(self, tolerance: float = FRAME_TOLERANCE) -> AssemblyStep:
+    def step(self, tolerance: float = FRAMES.tolerance) -> AssemblyStep:
         """One frame of a drag: the least motion towards the present goals, in a few iterations.
 
         The bodies keep their new placements. A frame whose iterations were not enough for joints and contacts, or whose
@@ -302,10 +300,10 @@ class Assembly(AssemblyJoints):
         """A few Newton steps from the variables `start` (7 n,) of a system that begun there."""
         before, _ = active.system.largest_errors(active.system.residual(start))
         found = satisfy(
-            active, start, tolerance=HARD_TOLERANCE, goal_tolerance=tolerance, iterations=FRAME_ITERATIONS,
+            active, start, tolerance=FRAMES.hard_tolerance, goal_tolerance=tolerance, iterations=FRAMES.iterations,
             early_exit=True, leave_saddles=True,
         )  # fmt: skip
-        holds = found.hard <= max(10.0 * HARD_TOLERANCE, before)
+        holds = found.hard <= max(10.0 * FRAMES.hard_tolerance, before)
         taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
         if taken:
             self._places = list(found.x.reshape(-1, 7))
@@ -320,7 +318,7 @@ class Assembly(AssemblyJoints):
         while path[-1][0] < 1.0:
             share, q = path[-1]
             workspace.place(motion.placements(share))
-            share = motion.next_share(share, workspace.near(q, LEAVE), LEAVE)
+            share = motion.next_share(share, workspace.near(q, CONTACTS.leave), CONTACTS.leave)
             workspace.place(motion.placements(share))
             x = active.begin(self.variables(), self._goal_batches())
             steps.append(self._newton_frame(active, x, tolerance))

@@ -9,13 +9,11 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
-from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.batches import ONE_SIDED, Batch, Key
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.tangent_rows import TangentRows
 from wholebody.methods.newton.terms import bound_equations, constraint_equations
 from wholebody.problem import Problem
-
-ONE_SIDED = Key("", False, True, 1.0)
 
 
 class AssemblyFigure:

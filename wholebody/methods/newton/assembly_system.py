@@ -12,12 +12,10 @@ from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.batches import Batch, Key
-from wholebody.methods.newton.contacts import LONGEST, ContactSet
-from wholebody.methods.newton.system import WORLD, ActiveSystem, Patterns, unit
+from wholebody.methods.newton.system import ActiveSystem, Patterns, unit
 from wholebody.scene.scene import Scene
 
 Batches = Sequence[tuple[Batch, Key]]
-ONE_SIDED = Key("", False, True, 1.0)
 
 
 class AssemblySystem(ActiveSystem):
@@ -28,7 +26,6 @@ class AssemblySystem(ActiveSystem):
 
     Attributes:
         patterns: what was laid out and analysed.
-        q: (nq,) posture of the scene at the last `retract`, if pairs can touch.
     """
 
     def __init__(
@@ -48,16 +45,13 @@ class AssemblySystem(ActiveSystem):
         self._held, self._figures = list(held), list(figures)
         self._goals: list[tuple[Batch, Key]] = []
         self.patterns, self._to_scene = patterns, to_scene
-        self.contacts: ContactSet | None = None
         if scene is not None and len(scene.pair_table.pairs):
             self.workspace = scene.workspace()
             self._data = pin.Data()  # without the tensors of a model's data, which grow with the cube of its freedoms
             self._data.oMi.extend([pin.SE3.Identity()] * self.workspace.model.njoints)
-            self.contacts = ContactSet(np.full(len(scene.pair_table.pairs), clearance), self.workspace)
-            self.longest = LONGEST
-        self._laid: Hashable = None
+            self._find_contacts(np.full(len(scene.pair_table.pairs), clearance), self.workspace)
         self._goals_laid: Hashable = None
-        self._here = self._left = self.q = np.zeros(0)
+        self._here = np.zeros(0)
         self._fresh = True
 
     def begin(self, x: Array, goals: Batches) -> Array:
@@ -96,14 +90,6 @@ class AssemblySystem(ActiveSystem):
         for axis, unit_vector in enumerate(np.eye(3)):
             joints[1:, axis] = quat.rotate(bodies[:, 3:], np.broadcast_to(unit_vector, (len(bodies), 3)))
 
-    def runs_into(self) -> bool:
-        """Whether a pair that is no inequality overlaps at the result of the last `retract`."""
-        return self.contacts is not None and self.contacts.runs_into()
-
-    def passes(self) -> bool:
-        """Whether the motion to the result of the last `retract` neither jumps over something nor ends deep in it."""
-        return self.contacts is None or self.contacts.passes(self._left, self.q)
-
     def arrive(self, x: Array) -> bool:
         """Renew limits and contacts at x; returns whether the pattern changed."""
         x = self.retract(x)
@@ -115,17 +101,5 @@ class AssemblySystem(ActiveSystem):
         self._fresh = False
         for figure in self._figures:
             figure.choose_limits()
-        batches = [*self._held, *self._goals]
-        laid: Hashable = self._goals_laid
-        if self.contacts is not None:
-            everything = np.concatenate([x, WORLD]).reshape(-1, 7)
-            rows = self.contacts.renew(self._data, everything, len(everything) - 1)
-            laid = (laid, self.contacts.pairs.tobytes())
-            if len(rows):
-                batches.append((rows, ONE_SIDED))
-        changed = laid != self._laid
-        if changed:
-            self._laid = laid
-            self.system, self.algebra = self.patterns.system(laid, batches)
-        self.system.renew(batches)
-        return changed
+        data = None if self.contacts is None else self._data
+        return self._lay([*self._held, *self._goals], self._goals_laid, x, data)

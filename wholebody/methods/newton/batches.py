@@ -33,6 +33,9 @@ class Key(NamedTuple):
     weight: float
 
 
+HARD, ONE_SIDED = Key("", False, False, 1.0), Key("", False, True, 1.0)
+
+
 class Batch(ABC):
     """Equations of one type.
 

@@ -12,17 +12,10 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.geometry.proximity import Joints
 from wholebody.methods.newton import quaternions as quat
 from wholebody.methods.newton.batches import Coincide
+from wholebody.methods.newton.settings import CONTACTS
 from wholebody.scene.workspace import Workspace
 
-ENTER = 0.03  # m beyond the clearance: nearer pairs become inequalities; larger = more rows, fewer repeated steps
-LEAVE = 0.06  # m beyond the clearance: farther pairs cease to be; the difference avoids changes of the structure
-SLOTS = 4  # rows a pair: its witness points and the ends of its contact patch
 FAR = 1.0  # m: gap of an unused slot
-OVERLAP = 1e-3  # m: a step is undone if a pair that was no inequality gets deeper than this
-DEEPEST = 0.01  # m: largest overlap of linearised contacts after a step; a deeper one shortens the step
-SHALLOW = 0.25  # largest such overlap as a share of the thinner piece's width
-LONGEST = 0.08  # m: largest motion of a body in a step if pairs can touch; larger = faster, fewer contacts seen
-MORE = 1e-4  # m: growth of an existing overlap that a step is allowed
 
 
 class ContactSet:
@@ -38,13 +31,13 @@ class ContactSet:
         self.pairs: Indices = np.zeros(0, dtype=np.intp)
         self._forced: Indices = np.zeros(0, dtype=np.intp)
         self._largest = float(clearances.max(initial=0.0))
-        self._within = LEAVE + self._largest
+        self._within = CONTACTS.leave + self._largest
         table = workspace.table
         self._names = tuple(piece.name for piece in workspace.geometry.geometryObjects)
         self._labels: list[str] = []
         self._joint = table.joint[table.pairs].reshape(-1, 2)
         thin = np.array([swept.width for swept in table.swept])[table.pairs].reshape(-1, 2).min(axis=1)
-        self._bearable = np.minimum(DEEPEST, SHALLOW * thin)
+        self._bearable = np.minimum(CONTACTS.deepest, CONTACTS.shallow * thin)
         self._here: QueryResult | None = None
         self._there: QueryResult | None = None
 
@@ -57,7 +50,7 @@ class ContactSet:
         assert self._there is not None
         contacts = self._there.contacts
         violation = self.clearances[contacts.number] - contacts.distance
-        new = contacts.number[violation > OVERLAP]
+        new = contacts.number[violation > CONTACTS.overlap]
         if len(new):
             new = np.setdiff1d(new, self.pairs)
         if not len(new):
@@ -72,7 +65,7 @@ class ContactSet:
         here, there = self._here.contacts, self._there.contacts
         depth = np.zeros(len(self.clearances))
         depth[here.number] = np.maximum(-here.distance, 0.0)
-        allowed = np.maximum(depth + MORE, self._bearable)
+        allowed = np.maximum(depth + CONTACTS.more, self._bearable)
         if (-there.distance > allowed[there.number]).any():
             return False
         return not passes_through(self.workspace, self._here, self._there, before, after)
@@ -93,7 +86,7 @@ class ContactSet:
         spare = contacts.distance - self.clearances[contacts.number]
         member = np.zeros(len(self.clearances), dtype=bool)
         member[self.pairs] = True
-        keep = (spare < ENTER) | (member[contacts.number] & (spare < LEAVE))
+        keep = (spare < CONTACTS.enter) | (member[contacts.number] & (spare < CONTACTS.leave))
         if len(self._forced):
             keep |= np.isin(contacts.number, self._forced)
         wanted = contacts.number[keep]
@@ -102,7 +95,7 @@ class ContactSet:
             self.pairs, self._labels = wanted, []
             names = self._names
             for a, b in self.workspace.table.pairs[wanted]:
-                self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * SLOTS
+                self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * CONTACTS.slots
         return self._rows(contacts, bodies, world)
 
     def _rows(self, contacts: Any, bodies: Array, world: int) -> Coincide:
@@ -114,10 +107,10 @@ class ContactSet:
         order = np.lexsort((rows.gap, slot))
         order = order[slot[order] >= 0]
         rank = np.arange(len(order)) - np.searchsorted(slot[order], slot[order])
-        order, rank = order[rank < SLOTS], rank[rank < SLOTS]
-        at = slot[order] * SLOTS + rank
-        count = len(self.pairs) * SLOTS
-        joints = np.repeat(self._joint[self.pairs], SLOTS, axis=0)
+        order, rank = order[rank < CONTACTS.slots], rank[rank < CONTACTS.slots]
+        at = slot[order] * CONTACTS.slots + rank
+        count = len(self.pairs) * CONTACTS.slots
+        joints = np.repeat(self._joint[self.pairs], CONTACTS.slots, axis=0)
         pair = np.where(joints == 0, world, joints - 1)[:, ::-1]
         normal = np.zeros((count, 3))
         normal[:, 2] = 1.0

@@ -8,15 +8,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.iteration import LEAST_PROGRESS, Iteration
+from wholebody.methods.newton.iteration import Iteration
+from wholebody.methods.newton.settings import ENDINGS, FRAMES
 from wholebody.methods.newton.system import ActiveSystem
-
-FRAME_ITERATIONS = 12  # most iterations of one frame; a farther goal is followed over several frames
-RESTORATIONS = 30  # most steps that only restore the constraints, after the goals were not met
-NUDGE = 0.05  # parts of a quaternion, and of a body's size: random motion that leaves a saddle
-NUDGES = 3  # random motions tried; joint limits send some of them back. More = more time where a goal is out of reach
-GAIN = 1e-2  # least share of the error by which the end of another iteration is lower
-GOAL_DAMPING = 1e-2  # of goals out of reach, so that they give way to constraints by 1e8, not 1e3; larger = slower
 
 
 class FeasibilityResult(NamedTuple):
@@ -78,9 +72,9 @@ def satisfy(
     if not early_exit and run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, measures="ignore")
     _restore(run, iterations, improve_goals)
-    stuck = run.goal > (1.0 - LEAST_PROGRESS) * far if early_exit else run.stationary
+    stuck = run.goal > (1.0 - FRAMES.least_progress) * far if early_exit else run.stationary
     if leave_saddles and stuck and not run.met:
-        _leave_saddle(run, 1 if early_exit else NUDGES, iterations, improve_goals)
+        _leave_saddle(run, 1 if early_exit else ENDINGS.nudges, iterations, improve_goals)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
 
 
@@ -89,7 +83,7 @@ def _restore(run: Iteration, iterations: int, improve_goals: bool) -> None:
     if run.hard <= run.tolerance or not len(run.goal_rows):
         return
     stationary = run.stationary
-    run.iterate(RESTORATIONS, goals=False, measures="ignore")
+    run.iterate(ENDINGS.restorations, goals=False, measures="ignore")
     run.stationary = stationary if run.hard <= run.tolerance else run.stationary
     if improve_goals and run.hard <= run.tolerance and not run.met:
         _improve_goals(run, iterations, run.tolerance)
@@ -110,12 +104,12 @@ def _leave_saddle(run: Iteration, nudges: int, iterations: int, improve_goals: b
         if run.met:
             return
         run.go_back(saddle)
-        if not _moved(run, (NUDGE * size * rng.normal(size=size.shape)).ravel()):
+        if not _moved(run, (ENDINGS.nudge * size * rng.normal(size=size.shape)).ravel()):
             continue
         run.iterate(iterations, goals=True, measures="ignore")
         _restore(run, iterations, improve_goals)
         missed = _missed(run)
-        if missed < tuple((1.0 - GAIN) * value for value in least):
+        if missed < tuple((1.0 - ENDINGS.gain) * value for value in least):
             best, least = run.mark(), missed
     if not run.met:
         run.go_back(best)
@@ -142,10 +136,10 @@ def _missed(run: Iteration) -> tuple[float, float]:
 def _improve_goals(run: Iteration, iterations: int, tolerance: float) -> None:
     """Lower the error of goals out of reach, from a state that meets the constraints; it stays if that fails."""
     best, goal, stationary = run.mark(), run.goal, run.stationary
-    run.least_damping = GOAL_DAMPING
+    run.least_damping = ENDINGS.goal_damping
     run.iterate(iterations, goals=True, measures="ignore")
     if run.hard > tolerance:
-        run.iterate(RESTORATIONS, goals=False, measures="ignore")
+        run.iterate(ENDINGS.restorations, goals=False, measures="ignore")
     if run.hard > tolerance or run.goal > goal:
         run.go_back(best)
     run.stationary = stationary

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key, Unit
-from wholebody.methods.newton.contacts import LONGEST, ContactSet
+from wholebody.methods.newton.batches import HARD, OBJECTIVE, ONE_SIDED, Batch, Key, Unit
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.objective import Objective
 from wholebody.methods.newton.system import ActiveSystem, Patterns
@@ -15,9 +14,6 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.answers import is_own
 from wholebody.tasks.checks import undefined
-
-HARD = Key("", False, False, 1.0)
-ONE_SIDED = Key("", False, True, 1.0)
 
 
 class FigureSystem(ActiveSystem):
@@ -45,8 +41,7 @@ class FigureSystem(ActiveSystem):
         """
         self.problem, self.workspace, self.algebra_name = problem, workspace, algebra
         self.bodies = FigureBodies(problem.scene.figure, problem.start)
-        self.contacts = ContactSet(problem.clearances, workspace) if len(workspace.table.pairs) else None
-        self.longest = LONGEST if self.contacts else np.inf
+        self._find_contacts(problem.clearances, workspace)
         count = self.bodies.count
         unit = Unit(np.arange(count)[:, None], [f"the Euler parameters of {name!r}" for name in self.bodies.names])
         self._limits = self.bodies.limits()
@@ -63,7 +58,6 @@ class FigureSystem(ActiveSystem):
         self.q = self._left = problem.start
         self.patterns = Patterns(count, self.bodies.weight, algebra)
         self._ordered = np.zeros(0)
-        self._laid: tuple[object, ...] = ()
         self._own = tuple(filter(is_own, problem.measures))
         self.arrive(self.variables(problem.start))
 
@@ -99,14 +93,6 @@ class FigureSystem(ActiveSystem):
         """The variables of the nearest posture."""
         return x if x is self._ordered else self.variables(self.bodies.posture(x))
 
-    def runs_into(self) -> bool:
-        """Whether a pair that is no inequality overlaps at the result of the last `retract`."""
-        return self.contacts is not None and self.contacts.runs_into()
-
-    def passes(self) -> bool:
-        """Whether the motion to the result of the last `retract` neither jumps over something nor ends deep in it."""
-        return self.contacts is None or self.contacts.passes(self._left, self.q)
-
     def arrive(self, x: Array) -> bool:
         """Renew limits and contacts at x; returns whether the pattern changed."""
         if x is not self._ordered:
@@ -116,20 +102,7 @@ class FigureSystem(ActiveSystem):
         self._left = self.q
         self.bodies.choose_limits(self._limits, self.q)
         self.objective.renew(self.q)
-        batches = [*self._fixed, *self._goals]
-        pairs: bytes = b""
-        if self.contacts is not None:
-            world = self.bodies.count
-            everything = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
-            rows = self.contacts.renew(self.bodies.data, everything, world)
-            pairs = self.contacts.pairs.tobytes()
-            if len(rows):
-                batches.append((rows, ONE_SIDED))
-        laid = (pairs, *((type(batch), batch.size, batch.bodies.tobytes(), key) for batch, key in self._goals))
-        changed = laid != self._laid
-        if changed:
-            self._laid = laid
-            self.system, self.algebra = self.patterns.system(laid, batches)
-        self.system.renew(batches)
+        goals = tuple((type(batch), batch.size, batch.bodies.tobytes(), key) for batch, key in self._goals)
+        changed = self._lay([*self._fixed, *self._goals], goals, x, self.bodies.data)
         self.objective.enter(self.system)
         return changed

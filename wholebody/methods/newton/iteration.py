@@ -17,38 +17,49 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
 from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
+from wholebody.methods.newton.settings import FRAMES, STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.solution import TraceEntry
 
 Measures = Literal["lower", "keep", "ignore"]
 
-HARD_DAMPING = 1e-10  # of joints and constraints: redundant equations are tolerated at this loss of accuracy
-GOAL_DAMPING = 1e-7  # of goals, far larger, so that they give way first
-FIRST_DAMPING = 1e-5  # first damping after a failed step
-MOST_DAMPING = 1e4
-GOOD, POOR = 0.75, 0.25  # shares of the predicted reduction above and below which the damping falls and rises
-AMPLIFIED = 6.0  # motion per metre of target beyond which a step is damped: the equations are nearly singular there
-FAR = 0.05  # m or rad: goal error from which that is tested; nearer, the measures may move more than the goals
-ENOUGH = 1.0  # largest damping
-DAMPING_UP, DAMPING_DOWN = 8.0, 0.1
-HARD_SHARE = 1e-6  # of the squared damping applies to constraints, for conflicts among them
-ERROR_CLAMP = 0.3  # m or rad: largest reduction of a goal's error in a step; larger = fewer steps, more of them fail
-LARGEST_TURN = 0.35  # change of Euler parameters in a step, half the radians; a linearisation is useless beyond it
-FUNNEL = 0.5  # m or rad of violation allowed for a metre of goal; larger = longer steps, more to restore
-WIDEST = 0.5  # m or rad: largest violation allowed after any step
-RESTORE_ABOVE = 0.7  # share of the funnel from which a step only restores; larger = fewer such steps, more damped ones
-RESTORING_DAMPING = 0.03  # of goals in such a step: they keep their errors, but may give way
-NARROW = 0.7  # factor on the funnel after such a step
-WORTH = 0.05  # least ratio of actual to predicted reduction of a step
-RESTORED = 0.2  # the same for a step that only restores the constraints
-STAGNANT = 1e-6  # relative reduction below which a step counts as no progress
-LEAST_PROGRESS = 0.1  # the same in frames
-STALLED = 1  # number of steps with less reduction than that after which a frame ends
-PATIENCE = 12  # number of steps without progress in a row after which the iteration counts as converged
-REFUSALS = 6  # times in a row that a step is repeated because of a new contact; after that it is shortened
-SHORTENINGS = 8  # halvings of a step whose motion is not free before it counts as failed
-SYSTEMS = 25  # most linear systems a step, while the active set changes
-NEAR = 1e-2  # m or rad: errors below which the last multipliers compensate the damping of equations
+
+class _Trust:
+    """How far the next step is trusted, from what became of the last ones.
+
+    Attributes:
+        damping: of the goals; its square applies to constraints.
+        share: of the constraints' errors that a step corrects.
+        clamp: largest reduction of a goal's error in a step, metres or radians.
+        funnel: violation of constraints up to which a step may reduce the goals' errors, metres or radians.
+    """
+
+    def __init__(self, least_damping: float, funnel: float) -> None:
+        self.damping, self.funnel = least_damping, funnel
+        self.share, self.clamp = 1.0, STEPS.error_clamp
+        self._least = least_damping
+
+    def raise_damping(self) -> None:
+        """After a step that failed, or is too long."""
+        self.damping = max(STEPS.first_damping, self.damping * STEPS.damping_up)
+
+    def fail(self) -> None:
+        """After a step that was not taken."""
+        self.raise_damping()
+        self.share, self.clamp = max(0.5 * self.share, 0.05), max(0.5 * self.clamp, 1e-3)
+
+    def succeed(self, ratio: float) -> None:
+        """After a step with this ratio of the actual to the predicted reduction of the goals' errors."""
+        if ratio >= 0.75:
+            lower = STEPS.damping_down * self.damping if self.damping > STEPS.first_damping else 0.0
+            self.damping = max(lower, self._least)
+        elif ratio < 0.25:
+            self.raise_damping()
+        self.share, self.clamp = min(1.0, 2.0 * self.share), min(STEPS.error_clamp, 2.0 * self.clamp)
+
+    def narrow(self, least: float) -> None:
+        """After a step that only restores and does not reduce the goals' errors."""
+        self.funnel = max(STEPS.narrow * self.funnel, least)
 
 
 class Iteration:
@@ -111,79 +122,84 @@ class Iteration:
             measures: minimised, kept from growing, or ignored.
             early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
         """
-        damping, share, clamp, stagnant = self.least_damping, 1.0, ERROR_CLAMP, 0
-        self.stationary = False
-        least = sum(self._norms(self.residual))
-        refused = 0
-        funnel = max(min(FUNNEL * self._norms(self.residual)[1], WIDEST), self.tolerance)
+        self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
+        trust = _Trust(self.least_damping, max(min(STEPS.funnel * norms[1], STEPS.widest), self.tolerance))
+        least, stagnant = sum(norms), 0
+        enough = FRAMES.least_progress if early_exit else STEPS.least_progress
+        patience = FRAMES.patience if early_exit else STEPS.patience
         for _ in range(iterations):
-            if (self.met if goals else self.hard <= self.tolerance) and self.state.finished():
+            if self._holds(goals) or active.control.over:
                 return
-            if self.active_system.control.over:
-                return
-            self.active_system.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
+            active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
-            try:
-                restore = not goals or (self.goal > self.goal_tolerance and before[0] > RESTORE_ABOVE * funnel)
-                step = self.step(
-                    damping, share, 0.0 if restore else min(1.0, clamp / max(self.goal, 1e-300)), goals, measures
-                )
-                asked = before[0] + min(clamp, self.goal) if self.goal > FAR and not restore else np.inf
-                while self._motion(step) > AMPLIFIED * asked and damping < ENOUGH:
-                    damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-                    step = self.step(damping, share, min(1.0, clamp / max(self.goal, 1e-300)), goals, measures)
-            except SingularSystemError:
-                step = np.zeros_like(self.x)
+            far = self.goal > self.goal_tolerance and before[0] > STEPS.restore_above * trust.funnel
+            restore = not goals or far
+            step = self._trusted_step(trust, before[0], restore, goals, measures)
             length = self.length(step)
-            trial = self.active_system.retract(self.x + length * step)
-            if refused < REFUSALS and self.active_system.runs_into():
-                refused += 1  # the new contact is an inequality now: repeat the step from its start
+            trial = active.retract(self.x + length * step)
+            if active.runs_into():  # the new contact is an inequality now: repeat the step from its start
                 self.residuals.append(self.residuals[-1])
                 self.begin(self.x)
                 continue
-            refused = 0
             trial, length, free = self.shorten(trial, step, length)
             after = self._norms_at(trial)
             promised = self._norms(self.residual + length * self.system.pattern.times(self.values, step))
-            better = self._better(before, after, promised, 0.0 if restore else funnel) or not self.state.finished()
-            if not (free and better and sum(after) < np.inf and self.advance(trial, length)):
+            better = self._better(before, after, promised, 0.0 if restore else trust.funnel)
+            if free and sum(after) < np.inf and (better or not self.state.finished()) and self.advance(trial, length):
+                if restore and after[1] >= before[1]:
+                    trust.narrow(self.tolerance)
+                progress = sum(after) < (1.0 - enough) * least or not self.state.finished()
+                least, stagnant = min(least, sum(after)), 0 if progress else stagnant + 1
+                trust.succeed(self._ratio(before[1], after[1], promised[1], restore))
+            else:
                 self.residuals.append(self.residuals[-1])
-                if damping >= MOST_DAMPING:
+                if trust.damping >= STEPS.most_damping:
                     self.stationary = True
                     return
                 stagnant += early_exit
-                if early_exit and stagnant > STALLED:
-                    return
-                damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-                share, clamp = max(0.5 * share, 0.05), max(0.5 * clamp, 1e-3)
-                continue
-            if restore and after[1] >= before[1]:
-                funnel = max(NARROW * funnel, self.tolerance)
-            nearer = sum(after) < (1.0 - (LEAST_PROGRESS if early_exit else STAGNANT)) * least
-            least = min(least, sum(after))
-            stagnant = 0 if nearer or not self.state.finished() else stagnant + 1
-            gain = before[1] - promised[1]
-            if restore or before[1] - after[1] >= GOOD * gain:
-                damping = max(damping * DAMPING_DOWN if damping > FIRST_DAMPING else 0.0, self.least_damping)
-            elif gain > self.goal_tolerance and before[1] - after[1] < POOR * gain:
-                damping = max(FIRST_DAMPING, damping * DAMPING_UP)
-            share, clamp = min(1.0, 2.0 * share), min(ERROR_CLAMP, 2.0 * clamp)
-            if stagnant >= PATIENCE:
-                self.stationary = True
+                trust.fail()
+            if stagnant >= patience:
+                self.stationary = not early_exit
                 return
-            if early_exit and stagnant > STALLED:
-                return
+
+    def _holds(self, goals: bool) -> bool:
+        """Whether the constraints hold, and the goals where they are pursued."""
+        return (self.met if goals else self.hard <= self.tolerance) and self.state.finished()
+
+    def _trusted_step(
+        self, trust: _Trust, violation: float, restore: bool, goals: bool, measures: Measures
+    ) -> Array:  # fmt: skip
+        """The step (7 n,), damped until it is not far longer than what it corrects; zero where that fails."""
+        share = 0.0 if restore else min(1.0, trust.clamp / max(self.goal, 1e-300))
+        most = np.inf
+        if self.goal > STEPS.far and not restore:
+            most = STEPS.amplified * (violation + min(trust.clamp, self.goal))
+        try:
+            step = self.step(trust.damping, trust.share, share, goals, measures)
+            while self._motion(step) > most and trust.damping < 1.0:
+                trust.raise_damping()
+                step = self.step(trust.damping, trust.share, share, goals, measures)
+        except SingularSystemError:
+            return np.zeros_like(self.x)
+        return step
+
+    def _ratio(self, before: float, after: float, promised: float, restore: bool) -> float:
+        """Actual over predicted reduction of the goals' errors; 1 where that says nothing of the damping."""
+        gain = before - promised
+        if restore or before - after >= 0.75 * gain:
+            return 1.0
+        return (before - after) / gain if gain > self.goal_tolerance else 0.5
 
     def length(self, step: Array) -> float:
         """Share of a step (7 n,) for which the linearisation is valid and which the active system allows."""
-        length = min(1.0, LARGEST_TURN / max(largest_turn(step), 1e-300)) * self.state.share()
+        length = min(1.0, STEPS.largest_turn / max(largest_turn(step), 1e-300)) * self.state.share()
         if np.isfinite(self.active_system.longest):
             length = min(length, self.active_system.longest / max(self._motion(step), 1e-300))
         return length
 
     def shorten(self, trial: Array, step: Array, length: float) -> tuple[Array, float, bool]:
         """The trial and its length, halved until the motion to it is free; and whether it is."""
-        for _ in range(SHORTENINGS):
+        for _ in range(8):
             if self.active_system.passes():
                 return trial, length, True
             length *= 0.5
@@ -224,14 +240,14 @@ class Iteration:
         """
         asked = self.residual * share
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
-        diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
-        softness = (GOAL_DAMPING if goal_share else RESTORING_DAMPING) + damping if goals else FREE
+        diagonal = np.full(len(asked), STEPS.hard_damping + STEPS.hard_share * damping * damping)
+        softness = (STEPS.goal_damping if goal_share else STEPS.restoring_damping) + damping if goals else FREE
         diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":
-            asked[self.objective] = self.residual[self.objective] / (1.0 + damping / FIRST_DAMPING)
-        if damping == 0.0 and goals and max(self.hard, self.goal) < NEAR:
-            base = np.where(self.system.goal, GOAL_DAMPING, HARD_DAMPING)
+            asked[self.objective] = self.residual[self.objective] / (1.0 + damping / STEPS.first_damping)
+        if damping == 0.0 and goals and max(self.hard, self.goal) < STEPS.near:
+            base = np.where(self.system.goal, STEPS.goal_damping, STEPS.hard_damping)
             asked -= np.where(self.system.objective | self.system.inequality, 0.0, base) * self.multiplier
         diagonal[self.objective] = FREE if measures == "ignore" else 1.0 / self.system.stiffness[self.objective]
         gradient = np.zeros_like(self.x)
@@ -239,7 +255,7 @@ class Iteration:
         base = diagonal[rows]
         at = np.zeros_like(self.x)
         self.state.begin(phi)
-        for _ in range(SYSTEMS):
+        for _ in range(STEPS.systems):
             wanted, extra = self.state.rows(phi)
             asked[rows], diagonal[rows] = wanted, base + extra
             system = LinearSystem(self.values, proximity * self.system.weight, diagonal, gradient, asked)
@@ -285,10 +301,11 @@ class Iteration:
         if hard + goal <= 0.1 * self.tolerance:
             return True
         gain = before[1] - promised[1]
-        bend = min(before[1] * before[1], WIDEST)  # violation of curved equations after a full step towards the goals
-        if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= WORTH * gain:
+        # after a full step towards the goals curved equations are violated by its square
+        bend = min(before[1] * before[1], STEPS.widest)
+        if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
             return True
-        restored = before[0] - hard >= RESTORED * max(before[0] - promised[0], 0.0) and hard < before[0]
+        restored = before[0] - hard >= STEPS.restored * max(before[0] - promised[0], 0.0) and hard < before[0]
         return restored and (before[0] > self.tolerance or goal <= before[1])
 
 

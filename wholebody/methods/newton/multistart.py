@@ -19,13 +19,9 @@ from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.refinement import refine
+from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import Solution, TraceEntry
-
-SHARPER = 0.3  # of the tolerance, to which the equations are solved: an assessment uses norms over the rows of a goal
-TRIAL = 30  # iterations in which another start must come nearer than the best so far
-FOR_STARTS = 0.5  # share of the time limit for other starts: the last iteration, towards the nearest, takes time too
-ALIKE = 1e-5  # relative difference of goal errors up to which two results count as equally near
 
 
 class Settings(NamedTuple):
@@ -77,34 +73,33 @@ class Search:
         """The best result of all starts; if it solves the problem, its measures are minimised."""
         self.contradictions = contradictions(self.active_system.problem, self.active_system.workspace)
         hopeless = least_left(self.contradictions) is None
-        best = self._go(q, "", TRIAL) if hopeless else self.from_here(q)
+        best = self._go(q, "", STARTS.trial) if hopeless else self.from_here(q)
         if not self._solves(best) and not hopeless:
-            minima = Minima()
-            for start, how in self._starts(q):
-                if minima.complete:
-                    break
-                found = self._go(start, how, min(TRIAL, self.settings.iterations))
-                if self._better(found, best) and not found.reached.stationary and not self._solves(found):
-                    found = self._go(found.q, how, self.settings.iterations)
-                minima.add(
-                    max(_broken(found), self.settings.assessed_tolerance) + _missed(found), found.reached.stationary
-                )
-                if self._better(found, best):
-                    best = found
-                if self._solves(best):
-                    self.contradictions = ()
-                if (
-                    self._solves(best)
-                    or self.active_system.control.over
-                    or self.active_system.control.spent > FOR_STARTS
-                ):
-                    break
+            best = self._from_other_starts(q, best)
         if self.active_system.control.over:
             return best
         if not best.judgement.holds(self.settings.assessed_tolerance) and not hopeless:
             best = self._least_violation(best, q)
         if self._solves(best) and self.active_system.objective.minimised:
             best = self._refined(best)
+        return best
+
+    def _from_other_starts(self, q: Array, best: SearchResult) -> SearchResult:
+        """The best result of the other starts and the best so far; each start has a trial first."""
+        minima, control = Minima(), self.active_system.control
+        for start, how in self._starts(q):
+            if minima.complete:
+                break
+            found = self._go(start, how, min(STARTS.trial, self.settings.iterations))
+            if self._better(found, best) and not found.reached.stationary and not self._solves(found):
+                found = self._go(found.q, how, self.settings.iterations)
+            least = max(_broken(found), self.settings.assessed_tolerance) + _missed(found)
+            minima.add(least, found.reached.stationary)
+            best = found if self._better(found, best) else best
+            if self._solves(best):
+                self.contradictions = ()
+            if self._solves(best) or control.over or control.spent > STARTS.time_share:
+                break
         return best
 
     def solution(self, found: SearchResult, began: float) -> Solution:
@@ -145,7 +140,7 @@ class Search:
         reached = satisfy(
             active_system,
             active_system.variables(q),
-            tolerance=SHARPER * settings.tolerance,
+            tolerance=STARTS.sharper * settings.tolerance,
             iterations=iterations,
             kind=settings.inequalities,
         )
@@ -183,7 +178,7 @@ class Search:
         enough = self.settings.assessed_tolerance
         for left, right in ((_broken(one), _broken(other)), (_missed(one), _missed(other))):
             left, right = max(left, enough), max(right, enough)
-            if abs(left - right) > max(enough, ALIKE * min(left, right)):
+            if abs(left - right) > max(enough, STARTS.alike * min(left, right)):
                 return left < right
         return one.judgement.measure < other.judgement.measure
 

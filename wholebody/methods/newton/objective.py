@@ -17,6 +17,7 @@ from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.methods.newton.batches import Batch, RootMotion
 from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import System
 from wholebody.methods.newton.tangent_rows import TangentRows, square_rows
 from wholebody.problem import Problem
@@ -26,9 +27,6 @@ from wholebody.tasks.checks import defined
 
 MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
 """Measures that are minimised over the revolute joints, and over a root that they count."""
-SAMPLES = 3  # postures at which the dependence of a measure on joints is tested
-STIFFNESS = 10.0  # m^2 per unit of effort [rad^2]: weight of effort against motion; larger = nearer to least effort
-LEAST_STIFFNESS = 0.03  # rad^-2: half of the least second derivative of a joint
 
 
 class Objective:
@@ -67,7 +65,7 @@ class Objective:
             else:
                 self.reported.append(type(term).__name__)
         self._follows = True
-        self.stiffness = np.full(len(self._tangent), STIFFNESS * LEAST_STIFFNESS)
+        self.stiffness = np.full(len(self._tangent), REFINEMENT.stiffness * REFINEMENT.least_stiffness)
 
     def batches(self) -> list[Batch]:
         """All rows, in the order of their factors."""
@@ -99,7 +97,7 @@ class Objective:
 
     def enter(self, system: System) -> None:
         """Write the present factors into a system."""
-        squares = np.full(sum(rows.size for rows in self.squares), STIFFNESS)
+        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
         system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
 
     def _model_at(self, q: Array) -> None:
@@ -108,9 +106,9 @@ class Objective:
         for term in self._curved:
             gradient += term.weight * term.gradient(state)
             curvature += term.weight * term.curvature(state)
-        half = np.maximum(0.5 * curvature[self._tangent], LEAST_STIFFNESS)
+        half = np.maximum(0.5 * curvature[self._tangent], REFINEMENT.least_stiffness)
         self._aim(q, -0.5 * gradient[self._tangent] / half)
-        self.stiffness = STIFFNESS * half
+        self.stiffness = REFINEMENT.stiffness * half
 
     def _aim(self, q: Array, way: Array) -> None:
         """Count from the posture q (nq,), towards displacements (k,) of the revolute joints and the root."""
@@ -134,6 +132,6 @@ def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) 
     """Whether a measure depends on these degrees of freedom alone, at the start and some other postures."""
     others = np.ones(state.model.nv, dtype=bool)
     others[tangent] = False
-    postures = [start, *random_postures(state.model, SAMPLES, seed=1)] if others.any() else []
+    postures = [start, *random_postures(state.model, 3, seed=1)] if others.any() else []
     states = defined(measure, (state.update(q) for q in postures))
     return not any(np.abs(measure.gradient(at)[others]).max() > 0.0 for at in states)

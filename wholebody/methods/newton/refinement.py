@@ -17,15 +17,8 @@ from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.acceleration import Anderson
 from wholebody.methods.newton.iteration import Iteration
 from wholebody.methods.newton.linear_algebra.base import SingularSystemError
+from wholebody.methods.newton.settings import REFINEMENT
 from wholebody.methods.newton.system import ActiveSystem
-
-ROUNDS = 40  # most rounds
-LONGER, SHORTER = 1.3, 0.5  # factors on the length of a step after a round that was kept, and one that was not
-FINER = 0.1  # of the tolerances, to which a round returns to the equations: larger errors would lower the measures
-MOTION = 1e-2  # weight of the motion; smaller = faster, less stable for degrees of freedom without measures
-SHORTEST = 0.02  # least length of a step; if shorter ones do not lower the measures, the last state is the minimum
-BACK = 6  # most Newton steps back to the equations
-ROUNDING = 1e-13  # relative change of the measures that is rounding
 
 
 def refine(
@@ -42,62 +35,84 @@ def refine(
     Returns:
         The variables, and the number of iterations.
     """
-    run = Iteration(active_system, x, FINER * tolerance, FINER * tolerance, "slack")
-    run.iterate(BACK, goals=True, measures="keep")
+    run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
+    run.iterate(REFINEMENT.back, goals=True, measures="keep")
     if not run.met:
         return x, 0
-    best, least, share, system = run.x, measure(run.x), 1.0, run.system
-    memory = Anderson()
-    step: Array | None = None  # of the model at the best state, once it is known
-    for _ in range(ROUNDS):
-        fast: Array | None = None
-        if step is None:
+    descent = _Descent(run, measure, tolerance)
+    for _ in range(REFINEMENT.rounds):
+        if not descent.lower():
+            break
+    return descent.best, len(run.residuals) - 1
+
+
+class _Descent:
+    """A descent of measures along the equations.
+
+    Attributes:
+        best: (7 n,) the state with the least measures.
+    """
+
+    def __init__(self, run: Iteration, measure: Callable[[Array], float], tolerance: float) -> None:
+        self._run, self._measure, self._tolerance = run, measure, tolerance
+        self.best, self._least = run.x, measure(run.x)
+        self._share, self._memory, self._system = 1.0, Anderson(), run.system
+        self._step: Array | None = None  # of the model at the best state, once it is known
+
+    def lower(self) -> bool:
+        """Make one round; False where no further one would lower the measures."""
+        run, fast = self._run, None
+        if self._step is None:
             try:
-                step = run.step(0.0, 1.0, 1.0, True, "lower", MOTION)
+                self._step = run.step(0.0, 1.0, 1.0, True, "lower", REFINEMENT.motion)
             except SingularSystemError:
-                break
-            fast = memory.propose(step)
-        way = step if fast is None else fast
-        length = (share if fast is None else 1.0) * run.length(way)
-        trial = active_system.retract(run.x + length * way)
-        if active_system.runs_into():
-            run.begin(best)
-            step = None
-            memory.reset()
-            continue
+                return False
+            fast = self._memory.propose(self._step)
+        way, share = (self._step, self._share) if fast is None else (fast, 1.0)
+        length = share * run.length(way)
+        trial = run.active_system.retract(run.x + length * way)
+        if run.active_system.runs_into():
+            run.begin(self.best)
+            self._step = None
+            self._memory.reset()
+            return True
         trial, length, free = run.shorten(trial, way, length)
         free = free and run.advance(trial, length)
         if free:
-            run.iterate(BACK, goals=True, measures="keep")
-        value = _measured(active_system, measure, run.x)
-        change = least - value
-        if free and run.met and change > ROUNDING * abs(least):
-            memory.record(run.x - best)
-            moved = float(np.abs(run.x - best).max())
-            best, least, step = run.x, value, None
-            if run.system is not system:  # other contacts: what was remembered is of other equations
-                system = run.system
-                memory.reset()
-            if fast is None:
-                share = min(1.0, LONGER * share)
-            if moved < tolerance:
-                break
-            continue
-        memory.reset()
-        run.begin(best)
-        if run.system is not system:
-            system, step = run.system, None
-        if fast is None:
-            if share < SHORTEST or (free and run.met and change > -ROUNDING * abs(least)):
-                break
-            share *= SHORTER
-    return best, len(run.residuals) - 1
+            run.iterate(REFINEMENT.back, goals=True, measures="keep")
+        value, rounding = self._measured(), 1e-13 * abs(self._least)
+        change = self._least - value
+        met = free and run.met
+        if met and change > rounding:
+            return self._keep(value, fast is None)
+        self._memory.reset()
+        run.begin(self.best)
+        if run.system is not self._system:
+            self._system, self._step = run.system, None
+        if fast is not None:
+            return True
+        if self._share < REFINEMENT.shortest or (met and change > -rounding):
+            return False
+        self._share *= REFINEMENT.shorter
+        return True
 
+    def _keep(self, value: float, plain: bool) -> bool:
+        """Take the state of the iteration, with the measures `value`; `plain` steps may become longer."""
+        run = self._run
+        self._memory.record(run.x - self.best)
+        moved = float(np.abs(run.x - self.best).max())
+        self.best, self._least, self._step = run.x, value, None
+        if run.system is not self._system:  # other contacts: what was remembered is of other equations
+            self._system = run.system
+            self._memory.reset()
+        if plain:
+            self._share = min(1.0, REFINEMENT.longer * self._share)
+        return moved >= self._tolerance
 
-def _measured(active_system: ActiveSystem, measure: Callable[[Array], float], x: Array) -> float:
-    """The measures at x (7 n,); infinite where one of one's own is not finite there."""
-    try:
-        return measure(x)
-    except UndefinedTermError as error:
-        active_system.control.step_back(error)
-        return np.inf
+    def _measured(self) -> float:
+        """The measures at the iteration's state; infinite where one of one's own is not finite there."""
+        try:
+            return self._measure(self._run.x)
+        except UndefinedTermError as error:
+            self._run.active_system.control.step_back(error)
+            return np.inf

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Hashable, Sequence
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import Control
-from wholebody.methods.newton.batches import OBJECTIVE, Batch, Key
+from wholebody.methods.newton.batches import OBJECTIVE, ONE_SIDED, Batch, Key
+from wholebody.methods.newton.contacts import ContactSet
 from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
 from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.settings import CONTACTS
+from wholebody.scene.workspace import Workspace
 
 WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
 
@@ -153,53 +157,12 @@ def _columns(batch: Batch) -> Indices:
     return (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
 
 
-class ActiveSystem:
-    """A system whose equations do not change; subclasses renew theirs.
-
-    Attributes:
-        system: the equations.
-        algebra: factorisation for the system's pattern.
-        longest: largest motion of any part of a body in a step, metres.
-        control: may end the iteration early.
-        path: the accepted states (7 n,), where a system records them.
-        even: whether goals count alike, whatever their weights.
-    """
-
-    path: tuple[Array, ...] = ()
-    even = False
-    longest = np.inf
-    control = Control(np.inf)
-
-    def __init__(self, system: System, algebra: LinearAlgebra) -> None:
-        """Take equations that do not change."""
-        self.system, self.algebra = system, algebra
-
-    def retract(self, x: Array) -> Array:
-        """The variables (7 n,) after a step, projected to valid states."""
-        return unit(x)
-
-    def runs_into(self) -> bool:
-        """Whether the last retraction has a new contact, which is an inequality now; then the step is repeated."""
-        return False
-
-    def passes(self) -> bool:
-        """Whether the motion to the last retraction is free; if not, the step is shortened."""
-        return True
-
-    def arrive(self, x: Array) -> bool:
-        """Renew the equations at x, the end of a step; returns whether their number or pattern changed."""
-        return False
-
-
 def unit(x: Array) -> Array:
     """Copy of the variables (7 n,) with Euler parameters of unit length."""
     bodies = x.reshape(-1, 7).copy()
     bodies[:, 3:] /= np.sqrt((bodies[:, 3:] ** 2).sum(axis=1, keepdims=True))
     result: Array = bodies.ravel()
     return result
-
-
-REMEMBERED = 32  # cached structures; more = more memory
 
 
 class Patterns:
@@ -219,7 +182,7 @@ class Patterns:
     def system(self, laid: Hashable, batches: Sequence[tuple[Batch, Key]]) -> tuple[System, LinearAlgebra]:
         """The system of these equations and its factorisation; `laid` tells patterns apart."""
         if laid not in self._known:
-            if len(self._known) >= REMEMBERED:
+            if len(self._known) >= 32:  # more would take more memory
                 self._known.clear()
             began = time.process_time()
             system = System(self._count, batches, self._weight)
@@ -227,3 +190,71 @@ class Patterns:
             self.structures += 1
             self.laying += time.process_time() - began
         return self._known[laid]
+
+
+class ActiveSystem:
+    """Equations during an iteration; subclasses renew theirs from state to state.
+
+    Attributes:
+        system: the equations.
+        algebra: factorisation for the system's pattern.
+        contacts: the pairs that can touch; None without any.
+        q: (nq,) posture at the last `retract`, where pairs can touch.
+        longest: largest motion of any part of a body in a step, metres.
+        control: may end the iteration early.
+        path: the accepted states (7 n,), where a system records them.
+        even: whether goals count alike, whatever their weights.
+    """
+
+    path: tuple[Array, ...] = ()
+    even = False
+    longest = np.inf
+    control = Control(np.inf)
+    contacts: ContactSet | None = None
+    q = _left = np.zeros(0)
+    patterns: Patterns
+    _laid: Hashable = None
+
+    def __init__(self, system: System, algebra: LinearAlgebra) -> None:
+        """Take equations that do not change."""
+        self.system, self.algebra = system, algebra
+
+    def retract(self, x: Array) -> Array:
+        """The variables (7 n,) after a step, projected to valid states."""
+        return unit(x)
+
+    def runs_into(self) -> bool:
+        """Whether a pair that is no inequality overlaps at the result of the last `retract`: then it becomes one."""
+        return self.contacts is not None and self.contacts.runs_into()
+
+    def passes(self) -> bool:
+        """Whether the motion to the result of the last `retract` neither jumps over something nor ends deep in it."""
+        return self.contacts is None or self.contacts.passes(self._left, self.q)
+
+    def arrive(self, x: Array) -> bool:
+        """Renew the equations at x, the end of a step; returns whether their number or pattern changed."""
+        return False
+
+    def _find_contacts(self, clearances: Array, workspace: Workspace) -> None:
+        """Let pairs that can touch be inequalities; none where there are no pairs."""
+        if len(clearances):
+            self.contacts, self.longest = ContactSet(clearances, workspace), CONTACTS.longest
+
+    def _lay(self, batches: list[tuple[Batch, Key]], laid: Hashable, x: Array, data: Any) -> bool:
+        """Take these equations, and contacts at x (7 n,), where Pinocchio's `data` have the joints.
+
+        Returns:
+            Whether the pattern changed; `laid` and the pairs tell patterns apart.
+        """
+        if self.contacts is not None:
+            bodies = np.concatenate([x, WORLD]).reshape(-1, 7)
+            rows = self.contacts.renew(data, bodies, len(bodies) - 1)
+            laid = (laid, self.contacts.pairs.tobytes())
+            if len(rows):
+                batches = [*batches, (rows, ONE_SIDED)]
+        changed = laid != self._laid
+        if changed:
+            self._laid = laid
+            self.system, self.algebra = self.patterns.system(laid, batches)
+        self.system.renew(batches)
+        return changed

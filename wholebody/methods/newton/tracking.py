@@ -15,10 +15,11 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, begun, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, FeasibilityResult, satisfy
+from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
-from wholebody.methods.newton.multistart import SHARPER, Search, Settings
+from wholebody.methods.newton.multistart import Search, Settings
+from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import NotCopyable
@@ -26,7 +27,6 @@ from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
 TRADED = 0.5  # greater = weights count in more frames, and light goals wait in more
-FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 
 
 class NewtonStep(NamedTuple):
@@ -84,7 +84,7 @@ class NewtonTracker(NotCopyable):
         self._alone = OneAtATime("tracker")
         self._lay_out()
 
-    def step(self, q: Array, tolerance: float = FRAME_TOLERANCE) -> NewtonStep:
+    def step(self, q: Array, tolerance: float = FRAMES.tolerance) -> NewtonStep:
         """The same as `frame`; what things that moved meanwhile met is named.
 
         Raises:
@@ -105,14 +105,14 @@ class NewtonTracker(NotCopyable):
 
         Args:
             q: posture at the beginning of the frame.
-            tolerance: of the goals, metres and radians; `FRAME_TOLERANCE` where None.
+            tolerance: of the goals, metres and radians; 1e-4 where None.
 
         Raises:
             InputError: objects were added to or removed from the scene, a new term has no equations, or another thread
                 is within a call of this tracker.
         """
         q = posture(q, self.workspace.model.nq)
-        enough = FRAME_TOLERANCE if tolerance is None else TOLERANCE(tolerance, "tolerance")
+        enough = FRAMES.tolerance if tolerance is None else TOLERANCE(tolerance, "tolerance")
         with self._alone:
             active_system = self._renewed()
             active_system.objective.anchor(q)
@@ -136,9 +136,9 @@ class NewtonTracker(NotCopyable):
             return satisfy(
                 active_system,
                 active_system.variables(q),
-                tolerance=SHARPER * self._settings.tolerance,
+                tolerance=STARTS.sharper * self._settings.tolerance,
                 goal_tolerance=enough,
-                iterations=FRAME_ITERATIONS,
+                iterations=FRAMES.iterations,
                 kind=self._settings.inequalities,
                 early_exit=True,
             )

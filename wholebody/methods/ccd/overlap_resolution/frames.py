@@ -108,33 +108,46 @@ class FrameResolver:
         resolver.counts, resolver.margin, resolver.tracked = Counts(), MARGIN, None
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
         self._swept = False
-        q, overlaps = resolver.resolve(q_free, rng, OVERRUN)
-        pushed = resolver.counts.iterations > 0
-        for size in PERTURBATIONS if overlaps else ():
-            perturbed, still = resolver.resolve(self._perturbed(q_free, size, rng), rng, resolver.counts.work + OVERRUN)
-            if not still:
-                q, overlaps = perturbed, still
-                break
-        if overlaps:
+        q, free = self._freed(q_free, rng)
+        if not free:
             return self._result(q if resolver.query(wanted) else wanted)
-        before = self._resolver.placed
+        pushed = resolver.counts.iterations > 0
+        shown = self._followed(q, wanted, rng)
+        self._swept = shown is not None and not pushed
+        return self._result(q if shown is None else shown)
+
+    def _freed(self, q: Array, rng: np.random.Generator) -> tuple[Array, bool]:
+        """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
+        resolver = self._resolver
+        found, overlaps = resolver.resolve(q, rng, OVERRUN)
+        for size in PERTURBATIONS if overlaps else ():
+            perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
+            if not still:
+                return perturbed, True
+        return found, not overlaps
+
+    def _followed(self, q: Array, wanted: Array, rng: np.random.Generator) -> Array | None:
+        """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
+        resolver, attraction = self._resolver, self._attraction
+        before = resolver.placed
         pin.forwardKinematics(self._model, self._tracked, wanted)
-        resolver.tracked, shown = self._tracked, None
-        self._attraction.free = not resolver.query(wanted)
-        resolver.margin = WIDE if self._attraction.free else MARGIN
-        if self._attraction.free and not self._passes_through(before, q, wanted):
+        resolver.tracked = self._tracked
+        attraction.free = not resolver.query(wanted)
+        resolver.margin = WIDE if attraction.free else MARGIN
+        if attraction.free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
-        self._attraction.limit = resolver.counts.work + BUDGET + OVERRUN
-        for self._attraction.step_length in (STEP, SMALL_STEP) if shown is None else ():
-            self._attraction.limit = max(self._attraction.limit, resolver.counts.work + SMALL_STEP_BUDGET + OVERRUN)
+            if shown is not None:
+                return shown
+        attraction.limit = resolver.counts.work + BUDGET + OVERRUN
+        for attraction.step_length in (STEP, SMALL_STEP):
+            attraction.limit = max(attraction.limit, resolver.counts.work + SMALL_STEP_BUDGET + OVERRUN)
             way = self._approach(q, wanted, before, rng)
             chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
             found = (self._toward(q, way[k]) for k in chosen)
             shown = next((made for made in found if made is not None), None)
             if shown is not None:
-                break
-        self._swept = shown is not None and not pushed
-        return self._result(q if shown is None else shown)
+                return shown
+        return None
 
     def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
         """Steps from a free posture towards the wanted one; returns the postures."""
