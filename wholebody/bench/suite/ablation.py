@@ -205,6 +205,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     search, descent = multistart.Search, sqp.SQP
     return {
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
+        "watchdog": (descent, "_promises", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
