@@ -27,6 +27,9 @@ COLORS = {
 other settings are further blues."""
 
 
+GREY = "#666666"
+
+
 class Style(NamedTuple):
     """Colour and marker of a method; the principal ones are drawn wide and with their spread."""
 
@@ -55,7 +58,7 @@ _STYLES = {
 }
 _SOLVERS = ("#35507a", "#5f86b3", "#8aa0c0")
 """Shades for the QP method with further solvers: one family, seen at a glance."""
-_OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
+OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99", "#332288", "#88ccee", "#cc6677", "#ddcc77")
 
 
 def method_style(adapter: str) -> Style:
@@ -65,12 +68,13 @@ def method_style(adapter: str) -> Style:
     number = sha256(adapter.encode()).digest()[0]
     if adapter.startswith("qp/"):
         return Style(_SOLVERS[number % len(_SOLVERS)], ".", False)
-    return Style(_OTHERS[number % len(_OTHERS)], "p", True)
+    return Style(OTHERS[number % len(OTHERS)], "p", True)
 
 
-_SETTINGS = {
+SETTINGS = {
     "svg.hashsalt": "wholebody",  # names inside the file do not depend on chance
     "svg.fonttype": "none",
+    "savefig.dpi": 150,
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
     "axes.spines.top": False,
@@ -81,7 +85,6 @@ _SETTINGS = {
     "grid.linewidth": 0.6,
     "figure.facecolor": "white",
 }
-PNG_DPI = 150
 
 
 def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
@@ -91,7 +94,7 @@ def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any
     matplotlib.use("agg")
     from matplotlib import pyplot
 
-    matplotlib.rcParams.update(_SETTINGS)
+    matplotlib.rcParams.update(SETTINGS)
     chart, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
     return chart, axes
 
@@ -108,7 +111,7 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     svg, png = path.with_suffix(".svg"), path.with_suffix(".png")
     chart.savefig(svg, metadata={"Date": None})
-    chart.savefig(png, dpi=PNG_DPI, metadata={"Software": None})
+    chart.savefig(png, metadata={"Software": None})
     pyplot.close(chart)
     return svg, png
 
@@ -163,16 +166,14 @@ def shares_and_times(
     return save(chart, path)
 
 
-DECADES = 2.6  # beyond which the labels of 2 and 5 would overlap their neighbours
-
-
 def plain_log(axis: Any) -> None:
     """Make the x axis logarithmic, with 1, 2, 5, 10, ... written out; over many decades 1, 10, 100, ... alone."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     class Plain(LogLocator):
         def tick_values(self, vmin: float, vmax: float) -> Any:
-            self.set_params(subs=(1.0,) if vmax > 10.0**DECADES * vmin else (1.0, 2.0, 5.0))
+            wide = vmax > 10.0**2.6 * vmin  # beyond, the labels of 2 and 5 would overlap their neighbours
+            self.set_params(subs=(1.0,) if wide else (1.0, 2.0, 5.0))
             return super().tick_values(vmin, vmax)
 
     axis.set_xscale("log")

@@ -5,7 +5,8 @@ A template has the words and the columns; who calls `render` has the figures.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
 from itertools import groupby
 from math import isfinite
@@ -34,11 +35,28 @@ def render(name: str, templates: Path = TEMPLATES, /, **values: Any) -> str:
     return "\n".join(lines)
 
 
-def html(text: str) -> str:
-    """Markdown with tables as HTML."""
+def page(title: str, text: str, charts: Mapping[str, Path], subtitle: str = "") -> str:
+    """Markdown as one HTML page that needs no network; images of the SVG charts, by their names, are put within."""
     from markdown_it import MarkdownIt
 
-    return str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+    body = str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+    body = re.sub(r"<td[^>]*>([^<]{35,})</td>", r'<td class="text">\1</td>', body)  # texts break into lines
+    picture = r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>'
+    body = re.sub(picture, lambda found: _within(charts[found[1]], found[2]), body)
+    sections = [(_anchor(name), name) for name in re.findall(r"<h2>(.*?)</h2>", body)]
+    body = re.sub(r"<h2>(.*?)</h2>", lambda found: f'<h2 id="{_anchor(found[1])}">{found[1]}</h2>', body)
+    return render("page.html", title=title, subtitle=subtitle, sections=sections, body=body)
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+
+
+def _within(svg: Path, caption: str) -> str:
+    """A chart within a page. Names in it are of one file, and there are many files in the page."""
+    drawn = svg.read_text(encoding="utf-8")
+    drawn = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{svg.stem}-", drawn[drawn.index("<svg") :])
+    return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"
 
 
 @cache

@@ -191,8 +191,8 @@ def _held_out(arguments: argparse.Namespace) -> int:
     from wholebody.bench.suite.adapters.registry import adapters, installed
     from wholebody.bench.suite.compare import held_out
 
-    cases = arguments.cases or (4 if arguments.quick else held_out.CASES)
-    minutes = held_out.MINUTES if arguments.minutes is None else arguments.minutes
+    cases = arguments.cases or (4 if arguments.quick else 40)
+    minutes = 20.0 if arguments.minutes is None else arguments.minutes
     names = arguments.methods or [name for name in held_out.METHODS if installed(name)]
     asked, left_out = held_out.settings(adapters(names), cases, arguments.seed, minutes)
     if left_out:

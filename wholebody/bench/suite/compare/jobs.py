@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from wholebody.base.batches import own_child
 from wholebody.base.runner import Child, EndedError
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
-from wholebody.bench.suite.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
+from wholebody.bench.suite.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Record
 from wholebody.bench.suite.compare.reference_kernel import kernel_seconds
-from wholebody.bench.suite.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
+from wholebody.bench.suite.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.suite.compare.store import Chunk
 from wholebody.bench.suite.problem_sets.case import ProblemSet
 
@@ -50,7 +50,6 @@ def work(task: Task) -> Chunk:
     building = time.perf_counter() - began
     if fault:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
-    hard = _difficulty(child, which)
     records: list[Record] = []
     spent, swept, cold = {}, {}, {}
     kernel = child.call(kernel_seconds, seconds=BUILDING)
@@ -66,16 +65,7 @@ def work(task: Task) -> Chunk:
         if ladder and spent[adapter.name] * len(ladder) <= task.most:
             records += _sweep(child, adapter, ladder, task, first, ended)
             swept[adapter.name] = time.perf_counter() - between
-    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel, hard)
-
-
-def _difficulty(child: Child, which: Which) -> Difficulty | None:
-    """How hard the case is; None where that ended the process, which no method has to answer for."""
-    try:
-        found: Difficulty = child.call(difficulty, which, seconds=BUILDING)
-    except EndedError:
-        return None
-    return found
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel)
 
 
 def _sweep(

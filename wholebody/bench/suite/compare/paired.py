@@ -9,11 +9,11 @@ from collections.abc import Mapping, Sequence
 from math import inf, isfinite
 
 from wholebody.bench.statistics import LEAST, ratio
-from wholebody.bench.suite.compare.front import OUR_VARIANTS, OURS
 from wholebody.bench.suite.compare.record import COARSE, FLOOR
-from wholebody.bench.suite.compare.results import QUANTITIES, Results, effort_excess, middle
+from wholebody.bench.suite.compare.results import WORST, Results, effort_excess, middle
 
-WORST = QUANTITIES[0]
+OURS = "qp"
+"""Our default method; "qp/..." is the same method with other settings for its programs."""
 
 Figures = Mapping[tuple[str, int], float]
 """One positive figure a problem, by the name of its set and its number."""
@@ -38,7 +38,7 @@ def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
 def times(results: Results, families: Sequence[str], adapter: str) -> Figures:
     """Return the seconds of a method for every problem of some sets that it solves at the default budget."""
     return {
-        (family, record.number): max(getattr(record, results.clock), 1e-9)
+        (family, record.number): max(record.seconds, 1e-9)
         for family in families
         for record in results.taken(family, adapter)
         if record.success(COARSE)
@@ -69,17 +69,10 @@ def errors(results: Results, family: str, adapter: str) -> Figures:
 
 
 def named(adapters: Sequence[str]) -> str:
-    """Return methods in words, with the settings of one method that cannot be told apart."""
-    ours = [f"`{name}`" for name in adapters if _is_ours(name)]
-    alike = f" (any of {', '.join(ours)})" if len(ours) > 1 else ""
-    return ", ".join(f"`{name}`{alike if name == OURS else ''}" for name in algorithms(adapters))
-
-
-def algorithms(adapters: Sequence[str]) -> list[str]:
-    """Return the names of methods; several settings of one method have the name of the method."""
-    several = sum(_is_ours(name) for name in adapters) > 1
-    return list(dict.fromkeys(OURS if several and _is_ours(name) else name for name in adapters))
-
-
-def _is_ours(name: str) -> bool:
-    return f"{name}/".startswith(OUR_VARIANTS)
+    """Return methods in words; several settings of our default method are listed behind its name."""
+    ours = [name for name in adapters if f"{name}/".startswith(f"{OURS}/")]
+    if len(ours) < 2:
+        return ", ".join(f"`{name}`" for name in adapters)
+    listed = f"`{OURS}` (any of {', '.join(f'`{name}`' for name in ours)})"
+    names = dict.fromkeys(listed if name in ours else f"`{name}`" for name in adapters)
+    return ", ".join(names)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import inf
-from typing import NamedTuple
 
 from wholebody.bench.suite.adapters.base import Budget
 
@@ -13,8 +12,6 @@ DEFAULT: Budget = (1e-4, None)
 
 COARSE, FINE = 1e-3, 1e-4  # m, rad: to which an answer is called a success
 FLOOR = 1e-9  # m, rad: errors below this are not told apart
-
-FRAME_CAP = 0.1  # s: most for a frame, on the average, where goals move; slower than that nobody drags
 
 ANSWERED, REFUSED, FAILED, OVERTIME = "answered", "refused", "failed", "overtime"
 """Outcomes: a posture; the method said that it cannot take the problem; an exception or a posture that is none; the
@@ -108,18 +105,9 @@ class Record:
         return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
 
 
-class Difficulty(NamedTuple):
-    """How hard a problem is. The greater one is of the harder problem: the descent counts before the distance.
-
-    Attributes:
-        resists: whether a plain Gauss-Newton descent from the start does not solve the problem.
-        distance: from the start to the witness: root of the sum of squares over the joints [rad].
-    """
-
-    resists: bool
-    distance: float
-
-
 def frame_cap(cap: float, frames: float) -> float:
-    """Seconds that a frame may take on the average, where a solve may take `cap` seconds and there are so many."""
-    return max(cap / frames, FRAME_CAP)
+    """Seconds that a frame may take on the average, where a solve may take `cap` seconds and there are so many.
+
+    At least 0.1: nobody drags with slower frames.
+    """
+    return max(cap / frames, 0.1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf
@@ -14,52 +13,34 @@ from wholebody.bench.suite.adapters.base import Budget
 from wholebody.bench.suite.compare.record import COARSE, DEFAULT, FLOOR, REFUSED, Record
 
 EFFORT_FLOOR = 1e-5  # share of the best effort below which efforts are not told apart
-EXACT = 1e-6  # m, rad: answers less exact than this are cheaper by what they lack, and are no measure for others
-LEAST_EFFORT = 1e-9  # efforts below this are none, and nothing is a share of them
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is charted against time. It is infinite for answers that fail in anything else.
+    """What is charted against time.
 
     Attributes:
-        name: for files.
         title: over a chart.
         label: of its axis.
         floor: below which values are not told apart.
-        of: its value from a record and the best known measure of the case.
+        of: its value from a record and the best known measure of the case; infinite for a failure.
     """
 
-    name: str
     title: str
     label: str
     floor: float
     of: Callable[[Record, float], float]
 
 
-def _goal(record: Record, best: float) -> float:
-    return max(record.missed, FLOOR) if record.broken <= COARSE else inf
-
-
-def _penetration(record: Record, best: float) -> float:
-    others = max(record.missed, record.limit_violation, record.constraint_violation)
-    return max(record.penetration, record.clearance_violation, FLOOR) if others <= COARSE else inf
-
-
 def effort_excess(record: Record, best: float) -> float:
-    """Effort above the best known, as a share of it; infinite for an answer that is none."""
-    if not record.success(COARSE) or best < LEAST_EFFORT or best == inf:
+    """Effort above the best known, as a share of it; infinite for an answer that does not solve the problem."""
+    if not record.success(COARSE) or best < 1e-9 or best == inf:  # nothing is a share of no effort
         return inf
     return max(record.measure / best - 1.0, EFFORT_FLOOR)
 
 
-QUANTITIES = (
-    Quantity("worst", "worst of all", "worst error [m, rad]", FLOOR, lambda record, best: record.worst),
-    Quantity("goal", "goals", "goal error [m, rad]", FLOOR, _goal),
-    Quantity("penetration", "penetration", "overlap, or lack of clearance [m]", FLOOR, _penetration),
-    Quantity("effort", "effort", "effort above the best known [share]", EFFORT_FLOOR, effort_excess),
-)
-"""The charts of every set. "worst" is the accuracy of an answer: the worst of goals and of all that must hold."""
+WORST = Quantity("worst of all", "worst error [m, rad]", FLOOR, lambda record, best: record.worst)
+EFFORT = Quantity("effort", "effort above the best known [share]", EFFORT_FLOOR, effort_excess)
 
 
 class Results:
@@ -67,32 +48,21 @@ class Results:
 
     Attributes:
         sets, adapters: names, in the order of reports.
-        clock: "seconds" for wall time, "cpu_seconds" for the processor's.
     """
 
     def __init__(self, records: Iterable[Record], sets: Sequence[str], adapters: Sequence[str]) -> None:
         self.sets, self.adapters = tuple(sets), tuple(adapters)
-        self.clock = "seconds"
         self._cells: dict[tuple[str, str], dict[Budget, dict[int, Record]]] = {}
         self._best: dict[tuple[str, int], float] = {}
         for record in records:
             cell = self._cells.setdefault((record.set, record.method), {})
             cell.setdefault(record.level, {})[record.number] = record
-            self._note(record)
-
-    def by_processor(self) -> Results:
-        """The same, with the processor's time in place of wall time: what other work on a machine disturbs least."""
-        other = copy.copy(self)
-        other.clock = "cpu_seconds"
-        return other
-
-    def _note(self, record: Record) -> None:
-        case = (record.set, record.number)
-        exact = record.measure if record.success(EXACT) else inf
-        self._best[case] = min(self._best.get(case, inf), record.best, exact)
+            case = (record.set, record.number)
+            exact = record.measure if record.success(1e-6) else inf  # a less exact answer is cheaper by what it lacks
+            self._best[case] = min(self._best.get(case, inf), record.best, exact)
 
     def best(self, record: Record) -> float:
-        """Least measure known for the case of a record: of the witness, and of all answers exact to `EXACT`."""
+        """Least measure known for the case of a record: of the witness, and of all answers exact to 1e-6."""
         return self._best[record.set, record.number]
 
     def default(self, family: str, adapter: str) -> list[Record]:
@@ -108,7 +78,7 @@ class Results:
         cell = self._cell(family, adapter)
         cases = self.swept(family, adapter)
         listed = [level for level, row in cell.items() if cases and cases <= row.keys()]
-        return sorted(listed, key=lambda level: middle([getattr(cell[level][number], self.clock) for number in cases]))
+        return sorted(listed, key=lambda level: middle([cell[level][number].seconds for number in cases]))
 
     def swept(self, family: str, adapter: str) -> frozenset[int]:
         """Cases that a method solved at all its budgets; at the default one where it was not swept at all."""
@@ -123,12 +93,12 @@ class Results:
         """Seconds (n,) and values (n,) of some cases at one budget."""
         row = self._cell(family, adapter)[level]
         records = [row[number] for number in sorted(cases)]
-        seconds = np.array([getattr(record, self.clock) for record in records])
+        seconds = np.array([record.seconds for record in records])
         return seconds, np.array([quantity.of(record, self.best(record)) for record in records])
 
     def moving(self, family: str) -> bool:
         """Whether the goals of a set move."""
-        return any(record.frames for adapter in self.adapters for record in self.default(family, adapter))
+        return self.frames(family) > 0.0
 
     def frames(self, family: str) -> float:
         """Median count of the frames of a set's cases, as they were answered; 0 where goals do not move."""
@@ -138,7 +108,7 @@ class Results:
 
     def quantities(self, family: str) -> tuple[Quantity, ...]:
         """What is charted of a set; efforts are not compared while goals move."""
-        return QUANTITIES[:3] if self.moving(family) else QUANTITIES
+        return (WORST,) if self.moving(family) else (WORST, EFFORT)
 
     def _cell(self, family: str, adapter: str) -> Mapping[Budget, Mapping[int, Record]]:
         return self._cells.get((family, adapter), {})

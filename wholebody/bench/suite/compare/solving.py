@@ -23,16 +23,13 @@ from wholebody.base.runner import allow, allow_processor, processor_time
 from wholebody.bench.suite.adapters.base import Adapter, Budget
 from wholebody.bench.suite.compare.record import (
     ANSWERED,
-    COARSE,
     DEFAULT,
     FAILED,
     REFUSED,
-    Difficulty,
     Record,
     frame_cap,
 )
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet
-from wholebody.bench.suite.problem_sets.difficulty import away, descended
 from wholebody.bench.tables import programs_text
 from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.methods.differential import TOOL
@@ -83,21 +80,6 @@ def built(which: Which) -> str | None:
     except Exception as error:
         return f"{type(error).__name__}: {sentence(error)}"
     return None
-
-
-def difficulty(which: Which) -> Difficulty:
-    """How hard a case is; one whose goals move by its first frame, and by how far it goes from there."""
-    case = case_of(which).case
-    problem = copy.copy(case.problem)
-    if case.frames:
-        problem.retarget(case.frames[0])
-    found = descended(case, case.problem.start)
-    solved = found is not None and _worst(assess(problem, found)) <= COARSE
-    return Difficulty(not solved, float(np.linalg.norm(away(case))))
-
-
-def _worst(judgement: Assessment) -> float:
-    return max(float(getattr(judgement, name)) for name in JUDGED[:6])
 
 
 def warmed(which: Which, adapter: Adapter, cap: float) -> float:

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from wholebody.base.errors import FileFormatError, InputError
-from wholebody.bench.suite.compare.record import Difficulty, Record
+from wholebody.bench.suite.compare.record import Record
 
 NAME = "chunks.jsonl"
 
@@ -31,7 +31,6 @@ class Chunk:
         building: seconds to build the case.
         cold: seconds of the first solve of each method in its process, what it imports and compiles included; of the
             methods for which the process was new.
-        difficulty: how hard the case is; None where it was not measured.
         kernel: seconds of the reference kernel in the process, before the case was solved.
         fault: why the case could not be built; empty where it was.
     """
@@ -44,7 +43,6 @@ class Chunk:
     building: float = 0.0
     cold: Mapping[str, float] = field(default_factory=dict)
     kernel: float = 0.0
-    difficulty: Difficulty | None = None
     fault: str = ""
 
 
@@ -109,8 +107,7 @@ class Store:
 
 def _chunk(value: dict[str, Any]) -> Chunk:
     records = tuple(Record(**inner) for inner in value.pop("records"))
-    difficulty = value.pop("difficulty", None)
-    return Chunk(records=records, difficulty=difficulty and Difficulty(*difficulty), **value)
+    return Chunk(records=records, **value)
 
 
 def _short(value: Any) -> str:

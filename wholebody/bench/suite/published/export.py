@@ -19,12 +19,11 @@ from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import wilson
 from wholebody.bench.suite.problem_sets.bodies import human
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet, generator
-from wholebody.bench.suite.problem_sets.difficulty import away, descended
 from wholebody.bench.suite.published.bodies import BodyFiles, body_files
 from wholebody.bench.suite.published.problems import problem_content, problem_name, witness_content
 from wholebody.bench.suite.published.reading import INDEX, VERSION, dumped
 from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
-from wholebody.bench.suite.published.seeds import far_seed
+from wholebody.bench.suite.published.seeds import away, descended, far_seed
 
 STATIC = Path(__file__).parent / "static"
 NAMES = ("problem", "body", "answers", "verdict")

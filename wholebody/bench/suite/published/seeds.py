@@ -1,4 +1,10 @@
-"""Seeds of published problems: the start is near; a random posture is far, one without overlap if it is found."""
+"""Seeds of published problems, and how hard a problem is from them, by what favours no method that is compared.
+
+The start is the near seed; a random posture is the far one, without overlap if it is found. Two things tell how hard a
+problem is: how far the witness is from the start, and whether a plain Gauss-Newton descent solves the problem. The
+descent closes goals and holds within the joint limits with the shortest step in every turn, and knows nothing of
+contacts and balance.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +18,6 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.bench.suite.problem_sets.fitting import Held, fitted, held
 
-DRAWS = 60  # random postures that are tried for one in which nothing overlaps
-
 
 def far_seed(case: Case, rng: np.random.Generator) -> Array:
     """A random posture (nq,) from which solving is hard.
@@ -25,7 +29,7 @@ def far_seed(case: Case, rng: np.random.Generator) -> Array:
     problem = case.problem
     free, closing = _free(problem), [term for term in held(problem) if _is_relative(term)]
     best, least = np.array(problem.start), np.inf
-    for _ in range(DRAWS):
+    for _ in range(60):
         q = _drawn(problem, free, rng)
         if closing:
             closed = fitted(problem.scene.figure, q, closing, free)
@@ -68,3 +72,24 @@ def _drawn(problem: wb.Problem, free: Indices, rng: np.random.Generator) -> Arra
     q = np.array(problem.start)
     q[limits.idx_q[chosen]] = rng.uniform(limits.lower[chosen], limits.upper[chosen])
     return q
+
+
+def away(case: Case) -> Array:
+    """Way (n,) of all joints but a free root from the start to the end of its path [rad, m], or to the witness."""
+    figure = case.problem.scene.figure
+    end = case.path[-1] if len(case.path) else case.witness
+    found = pin.difference(figure.model, case.problem.start, end)
+    return np.asarray(found[6:] if figure.root == "free" else found)
+
+
+def descended(case: Case, seed: Array) -> Array | None:
+    """The posture (nq,) in which the descent from a seed (nq,) ends; None where goals and holds are not closed.
+
+    A case whose goals move is asked for those of its first frame.
+    """
+    problem = case.problem
+    figure = problem.scene.figure
+    goals = problem.goals
+    if case.frames:
+        goals = tuple(goal.resolve(problem.scene, problem.start) for goal in case.frames[0])
+    return fitted(figure, figure.clamp(seed), [*goals, *held(problem)], np.arange(figure.model.nv))
