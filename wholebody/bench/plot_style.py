@@ -65,6 +65,8 @@ def method_style(adapter: str) -> Style:
     """Return the style of a method; one that is not known here has a style of its own, by its name."""
     if adapter in _STYLES:
         return _STYLES[adapter]
+    if adapter in COLORS:
+        return Style(COLORS[adapter], ".", False)
     number = sha256(adapter.encode()).digest()[0]
     if adapter.startswith("qp/"):
         return Style(_SOLVERS[number % len(_SOLVERS)], ".", False)

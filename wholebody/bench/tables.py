@@ -27,24 +27,29 @@ def write_text(path: Path, text: str) -> None:
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
 
-    An interval has three columns, of which the ends are called NAME_low and NAME_high.
+    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
     """
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")
-    text.write(_line(flat(rows[0])))
-    for row in rows:
-        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in flat(row).values()]))
+    cells = [flat(row) for row in rows]
+    names = list(dict.fromkeys(name for each in cells for name in each))
+    text.write(_line(names))
+    for each in cells:
+        values = [each.get(name, "") for name in names]
+        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in values]))
     write_text(path, text.getvalue())
 
 
 def flat(row: Any) -> dict[str, Any]:
-    """The fields of a row by name, and the ends of those that are intervals."""
+    """The fields of a row by name, the ends of those that are intervals, and the entries of those that are mappings."""
+    given = {field.name: getattr(row, field.name) for field in dataclasses.fields(row)}
     cells: dict[str, Any] = {}
-    for field in dataclasses.fields(row):
-        value = cells[field.name] = getattr(row, field.name)
-        if isinstance(value, Interval):
-            cells |= {field.name: value.value, f"{field.name}_low": value.low, f"{field.name}_high": value.high}
+    for field, value in given.items():
+        for name, each in value.items() if isinstance(value, Mapping) else [(field, value)]:
+            cells[name] = each
+            if isinstance(each, Interval):
+                cells |= {name: each.value, f"{name}_low": each.low, f"{name}_high": each.high}
     return cells
 
 

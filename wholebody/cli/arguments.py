@@ -122,17 +122,8 @@ def scene_parser(
     parser.add_argument("--overlap", default="qp", metavar="METHOD", help=overlap)
     parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
     parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
-    add_folders(parser, out)
-    return parser
-
-
-def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add `--out`, with a folder where it is left out, and `--update-docs`."""
     parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})")
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write tables and charts into the documentation too (default folder: docs)",
-    )  # fmt: skip
+    return parser
 
 
 def check_overlaps(chosen: Iterable[str]) -> None:

@@ -16,7 +16,7 @@ from scipy.optimize import minimize
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.motion.cases import synthetic
+from wholebody.bench.measure.clips import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.methods.control import Progress

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import argparse
-import shutil
+from functools import partial
 from itertools import count as numbers
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.machine import machine
-from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
-from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, seed
+from wholebody.bench.tables import read_rows
+from wholebody.cli.bench.command import Chart, command, count, folders, listed, measuring, option, publish, seed
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -21,79 +21,40 @@ if TYPE_CHECKING:
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.case import HardCase
-    from wholebody.bench.suite.stability.pictures import Drawn
     from wholebody.bench.suite.stability.verdict import Result
-
-PAGE = "where-methods-fail.md"
-ASSETS = "assets/stability"
-ATTACKED = "reliability.md"
-INTERRUPTED = 130  # exit code after Ctrl-C
 
 
 @measuring(
     "stability",
     "hard cases by methods: where each fails, and how",
     "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
-    "honest best effort, a clear refusal, or WRONG. With --from an earlier run is told again: its table, its "
-    "chart, and with --update-docs the page, for whose pictures a few answers are asked for anew.",
-    listed(
-        "--methods",
-        "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page; with --from those of "
-        "the file)",
-    ),
-    listed("--cases", "cases (default: all, with --from those of the file; with --quick a few)"),
-    option(
-        "--from", dest="earlier", type=Path, metavar="CSV", help="stability.csv of an earlier run, instead of asking"
-    ),
+    "honest best effort, a clear refusal, or WRONG.",
+    listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: one of each algorithm)"),
+    listed("--cases", "cases (default: all; with --quick a few)"),
     count("--jobs", 1, "processes at a time"),
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
     from wholebody.bench.suite.adapters.registry import adapters, installed
     from wholebody.bench.suite.stability import catalogue, page
-    from wholebody.bench.suite.stability.verdict import read_result, result
+    from wholebody.bench.suite.stability.verdict import result
 
-    _check_page(arguments)
-    whole = arguments.update_docs is not None
-    cases = arguments.cases or (catalogue.QUICK if arguments.quick else None)
-    asked: Sequence[Adapter] = ()
-    if arguments.earlier is not None:
-        every = (catalogue.names(), page.METHODS) if whole else (None, None)
-        found, facts = read_result(arguments.earlier, cases or every[0], arguments.methods or every[1])
-        if whole:
-            asked = adapters(found.methods)
-    else:
-        asked = adapters(arguments.methods or [name for name in page.METHODS if whole or installed(name)])
-        chosen = catalogue.cases(cases)
-        facts = machine()
-        found = result(
-            chosen,
-            [adapter.name for adapter in asked],
-            _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs),
-        )
-        write_rows(arguments.out / "stability.csv", facts, list(found.rows.values()))
-    report = page.report(found, facts)
-    write_text(arguments.out / "stability.md", report + "\n")
-    svg, _ = page.matrix(found, arguments.out / "stability.svg")
+    asked = adapters(arguments.methods or [name for name in page.METHODS if installed(name)])
+    chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
+    facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
+    found = result(chosen, [adapter.name for adapter in asked], cells)
     _print(found)
-    print(f"wrote {arguments.out}")
-    if arguments.update_docs is not None:
-        pictures = _drawn(found, asked, arguments.update_docs, arguments.jobs)
-        shutil.copyfile(svg, arguments.update_docs / ASSETS / page.CHART)
-        text = page.page(found, asked, facts, pictures, ASSETS)
-        replace_section(arguments.update_docs / PAGE, "stability", text)
-        print(f"wrote {arguments.update_docs / PAGE}")
-
-
-def _check_page(arguments: argparse.Namespace) -> None:
-    """Raise InputError, before anything is asked, where the page could not be written or would lose cases."""
-    docs = arguments.update_docs
-    if docs is None:
-        return
-    if arguments.cases or arguments.quick:
-        raise InputError("the page has all cases; leave --cases and --quick out, or leave --update-docs out")
-    if not (docs / PAGE).is_file():
-        raise InputError(f"{docs / PAGE}: there is no such page; give the folder of the documentation")
+    rows, text = list(found.rows.values()), page.report(found, asked, facts)
+    charts = {"stability": Chart(partial(page.matrix, found), "Cases by methods: a colour and a sign a cell")}
+    publish(
+        "stability",
+        text,
+        arguments,
+        facts=facts,
+        tables={"stability": rows},
+        charts=charts,
+        page="where-methods-fail.md",
+    )
 
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
@@ -107,23 +68,6 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
             cells.append(cell)
             bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
     return cells
-
-
-def _drawn(found: Result, asked: Sequence[Adapter], docs: Path, jobs: int) -> Drawn:
-    """Draw answers; those of an earlier run are asked for again, and drawn where the verdict is of the same kind."""
-    from wholebody.bench.suite.stability.pictures import draw, shown
-    from wholebody.bench.suite.stability.verdict import judged_verdict
-    from wholebody.cli.tables import progress_bar
-
-    cells, known = dict(found.cells), {adapter.name: adapter for adapter in asked}
-    if not cells:
-        for cell in _asked([(case, known[method]) for case, method in shown(found)], jobs):
-            key = cell.case.name, cell.method
-            if judged_verdict(cell, None).kind == found.rows[key].verdict:
-                cells[key] = cell
-    with progress_bar(thread=False) as bar:
-        work = bar.add_task("drawing", total=len(found.cases))
-        return draw(found, cells, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
 
 
 def _print(result: Result) -> None:
@@ -189,16 +133,13 @@ def attack(arguments: argparse.Namespace) -> int:
         raise InputError("no case ended; give more --seconds")
     rows.sort(key=lambda one: (one.seed, one.number))
     facts = machine()
-    write_rows(arguments.out / "attack.csv", facts, rows)
     report.index(rows, arguments.out)
-    text = report.report(rows, facts)
-    write_text(arguments.out / "attack.md", text + "\n")
-    print(text)
-    print(f"wrote {arguments.out}")
-    if arguments.update_docs is not None:
-        replace_section(arguments.update_docs / ATTACKED, "attack", text)
-        print(f"wrote {arguments.update_docs / ATTACKED}")
-    return INTERRUPTED if interrupted else int(any(one.outcome == "wrong" for one in rows))
+    publish(
+        "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
+    )
+    if interrupted:
+        return 130  # as shells have it after Ctrl-C
+    return int(any(one.outcome == "wrong" for one in rows))
 
 
 def _check(arguments: argparse.Namespace) -> None:

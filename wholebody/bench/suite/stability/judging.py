@@ -31,7 +31,6 @@ class Judged:
         passed: what it went into between frames, in words; "" for nothing.
         dip: how deep, at the deepest [m].
         misreported: largest difference between what it says is left and what is [m, rad].
-        worst: index of the posture to look at: where it went through something, the deepest, or the last.
     """
 
     finite: bool = True
@@ -44,7 +43,6 @@ class Judged:
     passed: str = ""
     dip: float = 0.0
     misreported: float = 0.0
-    worst: int = 0
 
 
 def judge(case: HardCase, answer: Answer) -> Judged:
@@ -77,32 +75,29 @@ def _stream(question: Stream, answer: Answer) -> Judged:
     first = problem.goals[0]
     assert isinstance(first, Point)
     found: list[Assessment] = []
-    passed, deepest_way, through, excess, misreported = "", 0.0, 0, 0.0, 0.0
+    passed, deepest_way, excess, misreported = "", 0.0, 0.0, 0.0
     before = scene.figure.clamp(problem.start)
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
         for name, place in frame.moved.items():
             scene.move(name, at=place)
         depth, owners = depth_between(scene, before, q, DIP)
         if depth > deepest_way:
-            passed, deepest_way, through = f"{owners}, frame {number}", depth, number
+            passed, deepest_way = f"{owners}, frame {number}", depth
         problem.retarget([Point(first.frame, frame.target)])
         found.append(assess(problem, q))
         misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
         speed = np.abs(velocities(scene.model, np.array([before, q]), question.dt)).max()
         excess = max(excess, float(speed / question.speed - 1.0))
         before = q
-    deepest = int(np.argmax([each.penetration for each in found]))
-    inside = found[deepest].penetration > INSIDE
     return Judged(
         goal_error=_left(found[-1]),
-        penetration=found[deepest].penetration,
+        penetration=max(each.penetration for each in found),
         limit_violation=max(each.limit_violation for each in found),
         constraint_violation=max(each.constraint_violation for each in found),
         speed_excess=excess,
         passed=passed,
         dip=deepest_way,
         misreported=misreported,
-        worst=through if passed else deepest if inside else len(found) - 1,
     )
 
 

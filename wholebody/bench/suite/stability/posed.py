@@ -79,7 +79,6 @@ def on_the_axis() -> Posed:
     expected="honest",
     best=None,
     near=0.01,
-    eye=(1.0, -0.8, 0.35),
 )
 def at_the_shoulder() -> Posed:
     """A person with the arm forward."""
@@ -142,7 +141,6 @@ OUT_OF_REACH.case(
     expected="honest",
     best=None,
     near=0.005,
-    see_through=("box",),
 )
 def inside_an_obstacle() -> Posed:
     """A box of 20 cm before an arm."""
@@ -171,7 +169,6 @@ def conflict() -> Posed:
     why="The hand begins in front and is to go to the small of the back. The straight way leads through the trunk and "
     "ends at limits of the shoulder; the way round leads away from the goal first.",
     acceptable="Solved: the place was taken from a posture without overlap within all limits.",
-    eye=(-1.0, -0.7, 0.35),
 )
 def behind_the_back() -> Posed:
     """A person with the arm forward."""
@@ -229,7 +226,6 @@ STARTS.case(
     why="Most of the last link begins inside a block. Linearised contacts are trusted over a few centimetres, and the "
     "way out is longer.",
     acceptable=ABOVE_BLOCK,
-    see_through=("block",),
 )(partial(_inside, 0.3))
 
 
@@ -243,7 +239,6 @@ STARTS.case(
     expected="honest",
     best=0.12,
     near=0.002,
-    see_through=("plate",),
 )
 def cancelling() -> Posed:
     """The goal keeps the fork where it is, so that nothing but the contact moves it."""
@@ -293,7 +288,6 @@ def out_of_limits() -> Posed:
     why="The goal is in the inner corner of a floor and a wall, 1 mm from touching both. Two contacts hold the tip at "
     "once, their active set changes from step to step, and methods that leave one contact at a time go to and fro.",
     acceptable="Solved: there is 1 mm of room.",
-    eye=(-0.6, -1.0, 0.6),
 )
 def corner() -> Posed:
     """An arm over the corner."""
@@ -310,7 +304,6 @@ def corner() -> Posed:
     why="The goal is 20 cm deep in a slot with 1 mm of room on either side. The last link has to be straight in line "
     "with the slot before it enters; nearly all postures near the goal overlap.",
     acceptable="Solved: the arm fits.",
-    see_through=("upper block", "lower block"),
 )
 def narrow_passage() -> Posed:
     """A slot between two blocks, the arm above its mouth."""

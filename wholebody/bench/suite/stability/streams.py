@@ -28,8 +28,6 @@ RADIUS = 0.03
     expected="honest",
     near=0.01,
     best=0.8 - (0.598 - RADIUS),
-    eye=(-0.5, -1.0, 0.3),
-    see_through=("plate",),
 )
 def thin_plate() -> Stream:
     """Thirty frames at rest before the plate would be too kind: it begins at once."""
@@ -54,7 +52,7 @@ def goal_jumps() -> Stream:
     start = np.array([-0.9, 0.5, 0.3])
     problem = Problem(scene, start, goals=[Point("tip", (0.8, 0.0, 0.5))])
     sides = still((0.8, 0.0, 0.5), 5) + still((0.8, 0.0, -0.5), REST) + still((0.8, 0.0, 0.5), REST)
-    return Stream(problem, sides, shown=5 + REST // 4)
+    return Stream(problem, sides)
 
 
 @STREAMS.case(
@@ -63,7 +61,6 @@ def goal_jumps() -> Stream:
     why="In a channel the goal is behind the floor in one frame and behind the ceiling in the next. The contacts and "
     "limits that held the last step are those that do not hold this one: a warm start is wrong every time.",
     acceptable="An honest answer in the channel, in every frame.",
-    see_through=("ceiling", "floor"),
     expected="honest",
     best=0.5 - (0.15 - RADIUS),
     near=np.inf,
@@ -89,7 +86,7 @@ def _interval(dt: float) -> Stream:
     way = tuple(Frame((0.5, -0.4 + 0.8 * k / count, 0.35)) for k in steps)
     lead = still(way[0].target, REST)
     ends = still((0.5, 0.4, 0.35) if count <= 200 else (0.5, 0.05, 0.45), REST)
-    return Stream(problem, lead + way + ends, dt=dt, shown=REST + len(way) // 2)
+    return Stream(problem, lead + way + ends, dt=dt)
 
 
 for _dt, _name, _title, _why in (
@@ -139,7 +136,7 @@ def _ball(speed: float) -> Stream:
     problem = Problem(scene, start, goals=[Point("tip", target)])
     way = np.arange(-0.6, 0.6, speed * FRAME)
     frames = tuple(Frame(target, {"ball": (0.35, float(y), 0.6)}) for y in way)
-    return Stream(problem, frames + still(target, REST), shown=len(frames) // 2)
+    return Stream(problem, frames + still(target, REST))
 
 
 STREAMS.case(

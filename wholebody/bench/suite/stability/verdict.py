@@ -6,21 +6,15 @@ All verdicts together are a result, of which everything is drawn and written.
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import NamedTuple, cast
 
-from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.base.records import with_values
-from wholebody.bench.suite.adapters import registry
-from wholebody.bench.suite.stability import catalogue
 from wholebody.bench.suite.stability.asking import Cell
 from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
 from wholebody.bench.suite.stability.judging import INSIDE, Judged
-from wholebody.bench.tables import filled, read_rows
+from wholebody.bench.tables import filled
 
 BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
@@ -29,40 +23,20 @@ NOT_HELD = ("infeasible", "stalled")  # statuses that say that something may be 
 SAME = 2e-5  # m: nearer to the best known answer than this is as good
 LEAST_SENTENCE = 15  # letters of a refusal that says anything
 
-SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "adapter": "△", "wrong": "✗"}
+SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "wrong": "✗"}
 WORDS: dict[Kind, str] = {
     "solved": "solved",
     "honest": "honest best effort",
     "refusal": "clear refusal",
-    "adapter": "our adapter",
     "wrong": "WRONG",
 }
-
-
-_NUMBER = r"[\d.]+(?:e[+-]\d+)?"
-_AMOUNT = rf"({_NUMBER} (?:rad|m|mm|µm))"
-BRIEF = {
-    r"(hangs|crashes): .*": r"\1",
-    r"takes .*": "takes it",
-    r"refuses with .* only": "unclear",
-    r"answers|NaN": r"\g<0>",
-    rf"{_AMOUNT} out of limits": r"\1",
-    rf"{_AMOUNT} inside on the way: .*": r"\1 way",
-    rf"{_AMOUNT} inside, not deeper": r"\1 in",
-    rf"{_AMOUNT} inside(, says \w+)?": r"\1",
-    rf"a constraint missed by {_AMOUNT} \(or mrad\)(, says \w+)?": r"\1",
-    rf"({_NUMBER}) times too fast": r"\1 × speed",
-    rf"claims solved, {_AMOUNT} left": r"claims \1",
-    rf"misreports what is left by {_AMOUNT}": "misreports",
-}
-"""How figures are shortened for the cell of a table; any other wrong answer is an error, whatever words it has."""
 
 
 class Verdict(NamedTuple):
     """What one method's answer to one case is worth.
 
     Attributes:
-        kind: of the five; "adapter" is given by the audit alone, to what would be wrong.
+        kind: of the four.
         figure: the worst figure, in a few words; "" where there is nothing to add.
         acceptable: whether the case accepts it.
     """
@@ -75,15 +49,6 @@ class Verdict(NamedTuple):
     def symbol(self) -> str:
         """One sign: an honest answer that is as good as can be is a full circle."""
         return "●" if self.kind == "honest" and self.acceptable else SYMBOLS[self.kind]
-
-    @property
-    def brief(self) -> str:
-        """The figure for the cell of a table."""
-        words = self.figure.partition("; alone")[0]
-        for pattern, short in BRIEF.items():
-            if found := re.fullmatch(pattern, words, re.DOTALL):
-                return found.expand(short)
-        return "error" if self.kind in ("wrong", "adapter") else words
 
 
 def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
@@ -162,36 +127,12 @@ def length(metres: float) -> str:
     return f"{1e3 * metres:.3g} mm" if metres >= 1e-4 else f"{1e6 * metres:.2g} µm"
 
 
-ALONE: dict[tuple[str, str], str] = {
-    ("inside-obstacle", "mink"): "alone, mink stays outside (0 mm inside)",
-    ("edge-on-edge", "mink"): "alone, mink stays outside (0 mm inside)",
-    ("narrow-passage", "mink"): "alone, mink solves it with a minimum distance of 0.3 mm",
-    ("100-m-scale", "mink"): "alone, mink solves it with its distances scaled by 100",
-    ("dt-10-ms", "mink"): "alone, mink solves it",
-    ("dt-1-s", "mink"): "alone, mink solves it",
-    ("100-m-scale", "pink"): "alone, pink solves it",
-    (
-        "narrow-passage",
-        "pink",
-    ): "alone, pink solves it with d_min 0.5 mm; our margin of 1 mm is all the room of the slot",
-    ("moving-obstacle", "pink"): "alone, pink solves it with its default d_min of 2 cm and 10 steps a frame",
-}
-"""What a tool does by itself, by case and method: a wrong answer there is its adapter's fault, were there one again."""
-
-
-def audited(case: str, method: str, verdict: Verdict) -> Verdict:
-    """The verdict, but "adapter" in place of "wrong" where the tool alone does better."""
-    if verdict.kind != "wrong" or (case, method) not in ALONE:
-        return verdict
-    return with_values(verdict, kind="adapter", figure=f"{verdict.figure}; {ALONE[case, method]}")
-
-
 @dataclass(frozen=True)
 class StabilityRow:
     """One method's answer to one case; errors in m and rad.
 
     Attributes:
-        verdict: "solved", "honest", "refusal", "adapter" or "wrong".
+        verdict: "solved", "honest", "refusal" or "wrong".
         acceptable: whether the case accepts it.
         figure: the worst figure, in a few words.
         status: what the method says.
@@ -224,13 +165,11 @@ class Result:
         cases: in the order of reports.
         methods: in the order in which they were asked.
         rows: by case's name and method.
-        cells: the same; none where the rows were read from a file.
     """
 
     cases: tuple[HardCase, ...]
     methods: tuple[str, ...]
     rows: Mapping[tuple[str, str], StabilityRow]
-    cells: Mapping[tuple[str, str], Cell] = field(default_factory=dict)
 
     @cached_property
     def verdicts(self) -> dict[tuple[str, str], Verdict]:
@@ -270,68 +209,17 @@ def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Iterable[Ce
     placed = {(cell.case.name, cell.method): cell for cell in cells}
     best = _known(placed.values()) | {case.name: case.best for case in cases if case.best is not None}
     keys = [(case.name, method) for case in cases for method in methods]
-    return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys}, placed)
-
-
-def read_result(
-    path: Path, cases: Iterable[str] | None = None, methods: Iterable[str] | None = None
-) -> tuple[Result, dict[str, str]]:
-    """Cells of an earlier run, from the file of its rows; and the facts of the machine that it ran on.
-
-    Args:
-        path: the file.
-        cases: names; None for all that the file has.
-        methods: names; None for all that the file has. "all", and the name of a method with several adapters, such as
-            "newton", mean those that the file has. Their packages need not be installed.
-
-    Raises:
-        FileFormatError: the file is none of such rows, or has none.
-        InputError: it lacks a cell.
-        UnknownNameError: there is no such case or method.
-    """
-    facts, read = read_rows(path, StabilityRow)
-    if not read:
-        raise FileFormatError(f"{path}: has no answers; give the stability.csv of a run")
-    rows = {(row.case, row.method): row for row in read}
-    asked = tuple(dict.fromkeys(row.method for row in read))
-    if methods is not None:
-        asked = tuple(dict.fromkeys(each for name in methods for each in _meant(name, asked)))
-    if cases is None:
-        chosen = catalogue.cases(dict.fromkeys(row.case for row in read), str(path))
-    else:
-        chosen = catalogue.cases(cases)
-    keys = [(case.name, method) for case in chosen for method in asked]
-    for case, method in keys:
-        if (case, method) not in rows:
-            raise InputError(f"{path}: has no answer of {method} to {case}; ask for others, or run it")
-    return Result(chosen, asked, {key: rows[key] for key in keys}), facts
-
-
-def _meant(name: str, known: Sequence[str]) -> Sequence[str]:
-    """The methods of a file that a name means; the name itself where the file lacks it."""
-    if name == registry.ALL:
-        return known
-    every = registry.names()
-    if name in known or name in every:
-        return (name,)
-    if name not in {each.partition("/")[0] for each in every}:
-        raise UnknownNameError("method", name, {*known, *every, registry.ALL})
-    return [each for each in known if each.startswith(f"{name}/")] or (name,)
+    return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys})
 
 
 def _row(cell: Cell, best: float | None) -> StabilityRow:
     case, answer = cell.case, cell.answer
-    verdict = judged_verdict(cell, best)
+    verdict = decide(case, answer, cell.judged, best)
     return filled(
         StabilityRow, verdict, answer, cell.judged, case=case.name, method=cell.method, verdict=verdict.kind,
         best=math.nan if best is None else best, frames=len(answer.postures),
         sentence=answer.refusal or answer.message,
     )  # fmt: skip
-
-
-def judged_verdict(cell: Cell, best: float | None) -> Verdict:
-    """The verdict on a cell as the audit leaves it; `best` is as for `decide`."""
-    return audited(cell.case.name, cell.method, decide(cell.case, cell.answer, cell.judged, best))
 
 
 def _known(cells: Iterable[Cell]) -> dict[str, float]:
