@@ -9,8 +9,8 @@ import pytest
 
 from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
-from wholebody.bench.measure.rows import Panel, chart, shares
 from wholebody.bench.measure.track import VARIANTS
+from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import STEPPING
 from wholebody.cli.bench import add_to
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
-    from wholebody.bench.measure.rows import Row
+    from wholebody.bench.rows import Row
     from wholebody.tracking import InteractionScene, Judgement, Recording
 
 HELP = "follow a tracker frame by frame through a gallery without penetration"
@@ -58,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
     check_overlaps(chosen)
     make_folder(arguments.out)
     check_writable(arguments.out / f"{names[0]}.csv")
-    facts, rows = machine(), list[Row]()
+    facts, rows = machine(), []
     for name in names:
         scene = build_scene(name, frames=arguments.frames, seed=arguments.seed)
         rows += [_run_one(scene, overlap, arguments.seed, arguments.out, facts) for overlap in chosen]
@@ -68,13 +68,11 @@ def run(arguments: argparse.Namespace) -> int:
     return 0 if all(map(is_held, rows)) else 1
 
 
-def _run_one(
-    scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]
-) -> Row:  # fmt: skip
+def _run_one(scene: InteractionScene, overlap: str, seed: int, out: Path, facts: dict[str, str]) -> Row:
     import gc
 
     from wholebody.bench.measure.frames import frame_panels, loop_rows
-    from wholebody.bench.measure.rows import chart
+    from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
     from wholebody.cli.tables import progress_bar
     from wholebody.tracking import follow, judge

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from wholebody.assessment.posture import Assessment
-    from wholebody.bench.measure.rows import Row
+    from wholebody.bench.rows import Row
     from wholebody.figures import Figure
     from wholebody.problem import Problem
     from wholebody.solution import Solution
@@ -55,7 +55,7 @@ def table(*columns: str, title: str = "") -> Table:
 
 def print_rows(rows: Sequence[Row]) -> None:
     """Print measurements: a line a figure, a column a row."""
-    from wholebody.bench.measure.rows import shown
+    from wholebody.bench.rows import shown
 
     made = table("", *(f"{row.case}, {row.tool}" for row in rows))
     for name in dict.fromkeys(name for row in rows for name in row.figures):

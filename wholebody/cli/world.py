@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
 
 if TYPE_CHECKING:
-    from wholebody.bench.measure.rows import Row
+    from wholebody.bench.rows import Row
     from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
@@ -85,7 +85,7 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
 
 def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
     from wholebody.bench.measure.frames import frame_panels, world_rows
-    from wholebody.bench.measure.rows import chart
+    from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
     from wholebody.cli.tables import progress_bar
     from wholebody.dynamics.overlaps import overlaps

@@ -12,7 +12,6 @@ import pytest
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
 from wholebody.bench.attack.report import Row
-from wholebody.bench.attack.running import Ended
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import add_to
 
@@ -56,9 +55,9 @@ def test_other_runs_are_counted_too(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def two(cases: Iterator[Case], *_: object) -> Iterator[Ended]:
+    def two(cases: Iterator[Case], *_: object) -> Iterator[tuple[Case, Verdict]]:
         for case in islice(cases, 2):
-            yield Ended(case, None, Verdict("right", "nothing"))
+            yield case, Verdict("right", "nothing")
         raise KeyboardInterrupt
 
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)

@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from wholebody.bench.measure import clips, motion
 from wholebody.bench.measure.motion import CHECKED, MotionRow
-from wholebody.bench.measure.rows import chart
+from wholebody.bench.rows import chart
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
 from wholebody.motion import avoidance

@@ -10,9 +10,9 @@ import pytest
 import wholebody as wb
 from tests.csv_rows import csv_rows
 from wholebody.bench.measure import solve
-from wholebody.bench.measure.rows import Row
 from wholebody.bench.measure.scaling import TIP, chain, task
 from wholebody.bench.measure.solve import LEVELS, detail_summary, levels, of_figure, reach, reach_summary, solve_reach
+from wholebody.bench.rows import Row
 from wholebody.bench.suite.problem_sets.bodies import CLEARANCE
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.problem_sets.things import KINDS

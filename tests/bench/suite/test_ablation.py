@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.measure import motion_ablation as ablated
-from wholebody.bench.measure.rows import Row
+from wholebody.bench.rows import Row
 from wholebody.bench.suite import ablation
 from wholebody.bench.suite.ablation import Constant, report
 from wholebody.bench.suite.ablation import Row as Change

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.suite.problem_sets.robot_arm import SET as ROBOT_ARMS
+from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.stability.posed import cancelling
 
 LENGTHS = (0.5, 0.4)
@@ -320,7 +320,7 @@ def test_a_person_who_stands_in_the_middle_of_a_chair_gets_out_of_it(honest):
 @pytest.mark.parametrize(("number", "seed"), [(40, 1), (17, 12), (28, 11)])
 def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(honest, number, seed):
     """A witness proves that the goal is within reach; those that begin near the start all end blocked."""
-    case = ROBOT_ARMS.make(number, seed)
+    case = SETS["robot_arm"].make(number, seed)
     proof = wb.assess(case.problem, case.witness)
     assert proof.holds(1e-6)
     assert proof.goal_error < 1e-6

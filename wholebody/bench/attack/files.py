@@ -2,114 +2,79 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack.case import CORPUS, Verdict, Written
+from wholebody.bench.attack.case import CORPUS, Verdict
 from wholebody.bench.attack.mutations import mutated
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
+from wholebody.taskfile import read_task
+from wholebody.taskfile.result import read
+from wholebody.tracking.track_files import read_track
 
-LONGEST = 1500  # characters of a refusal: more is no sentence
-HEAVIEST = 1e9  # kg, m, rad/s: numbers of a robot above this are slips
-PACKAGED = 0.15  # share of cases that begin with a file of the package
 NO_FILES = (
-    "/dev/zero",
-    "/dev/null",
-    "/",
-    "no-such-file",
-    "a" * 5000,
-    "a/" * 3000 + "b",
-    "nul\0l",
-    "",
-    ".",
-    "/dev/full",
-)
-ELSEWHERE = 0.01  # share of cases whose path leads to no file
-
+    "/dev/zero", "/dev/null", "/", "no-such-file", "a" * 5000, "a/" * 3000 + "b", "nul\0l", "", ".", "/dev/full",
+)  # fmt: skip
 ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
-TASK = {"task.toml": "everything.toml"} | ROBOT
 """Names of files that belong together, and where they are stored."""
-
-SCRIPT = '''"""{title}"""
-
-from pathlib import Path
-
-import wholebody as wb
-from wholebody.bench.attack import files
-{imports}
-HERE = Path(__file__).parent
-
-try:
-    verdict = files.sane({call})
-except wb.WholebodyError as error:
-    verdict = files.refused(error)
-print(verdict)
-'''
 
 
 class Reader(NamedTuple):
     """A way to read a file.
 
     Attributes:
-        imports: what its call needs.
-        call: Python, with `{path}` for the file's path.
+        read: reads the file at a path, and what lies beside it.
         files: what it reads, by names; the first one is mutated, another one now and then.
     """
 
-    imports: str
-    call: str
+    read: Callable[[Path], Any]
     files: Mapping[str, bytes]
 
 
-def written(rng: np.random.Generator) -> Written:
-    """Write a case."""
+def case(rng: np.random.Generator, folder: Path) -> Verdict:
+    """Read a mutated file, or seldom a path that leads to none."""
     reader = _reader(rng)
     contents = dict(reader.files)
     names = list(contents)
     chosen = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
-    path = f"HERE / {names[0]!r}"
-    if rng.random() < ELSEWHERE:
-        path = f"Path({NO_FILES[int(rng.integers(len(NO_FILES)))]!r})"
+    path = folder / names[0]
+    if rng.random() < 0.01:
+        path = Path(NO_FILES[int(rng.integers(len(NO_FILES)))])
     else:
         contents[chosen] = mutated(contents[chosen], rng)
-    call = reader.call.replace("{path}", path)
-    title = f"a {chosen} that is not what it should be"
-    return Written(SCRIPT.format(title=title, imports=reader.imports, call=call), contents)
+    for name, text in contents.items():
+        (folder / name).write_bytes(text)
+    try:
+        return sane(reader.read(path))
+    except wb.WholebodyError as error:
+        return refused(error)
 
 
 def _reader(rng: np.random.Generator) -> Reader:
     kind = str(rng.choice(["task", "robot", "mesh", "track", "result"], p=[0.3, 0.3, 0.1, 0.15, 0.15]))
+    task = {"task.toml": "everything.toml"} | ROBOT
     if kind == "mesh":
         name, stored = (("part.obj", "box.obj"), ("part.stl", "tetrahedron.stl"))[int(rng.integers(2))]
-        return Reader("", "wb.Mesh({path}).pieces()", _stored({name: stored}))
+        return Reader(lambda path: wb.Mesh(path).pieces(), _stored({name: stored}))
     if kind == "track":
-        call = "read_track({path}, wb.load(HERE / 'robot.urdf'))"
-        return Reader(
-            "from wholebody.tracking.track_files import read_track\n",
-            call,
-            _stored({"track.csv": "track.csv"} | ROBOT),
-        )
+        files = _stored({"track.csv": "track.csv"} | ROBOT)
+        return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
     if kind == "result":
-        return Reader(
-            "from wholebody.taskfile.result import read\n",
-            "read({path})",
-            _stored({"result.json": "result.json"} | TASK),
-        )
+        return Reader(read, _stored({"result.json": "result.json"} | task))
+    packaged = rng.random() < 0.15
     if kind == "robot":
-        if rng.random() < PACKAGED:
-            return Reader("", "wb.load({path})", {"hand.urdf": urdf_path("hand").read_bytes()})
-        return Reader("", "wb.load({path})", _stored(ROBOT))
-    imports = "from wholebody.taskfile import read_task\n"
-    if rng.random() < PACKAGED:
-        tasks = task_paths()
-        name = sorted(tasks)[int(rng.integers(len(tasks)))]
-        beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
-        return Reader(imports, "read_task({path})", {"task.toml": tasks[name].read_bytes(), **beside})
-    return Reader(imports, "read_task({path})", _stored(TASK))
+        return Reader(wb.load, {"hand.urdf": urdf_path("hand").read_bytes()} if packaged else _stored(ROBOT))
+    if not packaged:
+        return Reader(read_task, _stored(task))
+    tasks = task_paths()
+    name = sorted(tasks)[int(rng.integers(len(tasks)))]
+    beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
+    return Reader(read_task, {"task.toml": tasks[name].read_bytes(), **beside})
 
 
 def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
@@ -120,7 +85,7 @@ def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
 def refused(error: Exception) -> Verdict:
     """Judge a refusal: one sentence that a person can read."""
     words = str(error)
-    if len(words) > LONGEST:
+    if len(words) > 1500:
         return Verdict("wrong", f"a refusal of {len(words)} characters: {words[:100]!r}...")
     if not words.strip() or "\n" in words.strip():
         return Verdict("wrong", f"a refusal of other than one line: {words[:100]!r}")
@@ -160,10 +125,10 @@ def _figure(figure: wb.Figure) -> Verdict:
     limits = np.concatenate([model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit])
     if not (np.isfinite(masses).all() and np.isfinite(places).all() and np.isfinite(inner).all()):
         return Verdict("wrong", "a robot was taken whose masses or places are not made of finite numbers")
-    if (masses < 0.0).any() or masses.max() > HEAVIEST or np.abs(places).max() > HEAVIEST:
-        return Verdict(
-            "wrong", f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
-        )
+    most = 1e9  # kg, m: greater numbers of a robot are slips
+    if (masses < 0.0).any() or masses.max() > most or np.abs(places).max() > most:
+        words = f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
+        return Verdict("wrong", words)
     if np.isnan(limits).any() or (model.velocityLimit < 0.0).any():
         return Verdict("wrong", "a robot was taken with limits that are not numbers, or with negative velocities")
     for name in figure.postures:

@@ -2,38 +2,27 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+from time import process_time
+
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.bench.attack.bodies import body
-from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.case import Verdict, chosen
 from wholebody.bench.attack.judging import Pairs
-from wholebody.bench.attack.solves import Terms, script_head
+from wholebody.bench.attack.solves import scene_of
 from wholebody.bench.attack.things import clear, inside
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.scene.scene import Scene
 
-PARTS = 150  # of a way
-FINER = 40  # parts of the part where something is deepest
-ROUNDING = 3e-6  # m, of pieces of up to a metre
 
-TAIL = """
-end = np.array({end!r})
-began = process_time()
-found = scene.sweep(start, end)
-seconds = process_time() - began
-verdict = sweeps.verdict(scene, start, end, found, seconds)
-print(verdict)
-"""
-
-
-def written(rng: np.random.Generator) -> Written:
-    """Write a sweep."""
-    figure = body(rng)
-    names = figure.figure.postures
-    q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
+def case(rng: np.random.Generator, folder: Path) -> Verdict:
+    """Sweep from a posture to another, and judge what was found by a fine subdivision."""
+    figure = body(rng, folder)
+    q = figure.figure.clamp(figure.figure.posture(chosen(rng, figure.figure.postures)))
     share = float(rng.choice([0.01, 0.1, 0.5, 1.0]))
     free = list(range(figure.figure.model.nv)) if rng.random() < 0.3 else None
     end = figure.near(q, share, rng, free)
@@ -49,20 +38,20 @@ def written(rng: np.random.Generator) -> Written:
             thing = clear(rng, placed, figure.size, 0.0, [1])
         if thing is not None and np.abs(thing.at[:3]).max() < 99.0:
             things.append(thing)
-    text = script_head(
-        f"a way of {figure.figure.name} among {len(things)} things", figure, q, things, Terms(), "sweeps"
-    )
-    return Written(text + TAIL.format(end=end.tolist()), figure.files)
+    scene = scene_of(figure, things)
+    began = process_time()
+    found = scene.sweep(q, end)
+    return verdict(scene, q, end, found, process_time() - began)
 
 
 def verdict(scene: Scene, start: Array, end: Array, found: FirstContact | None, seconds: float) -> Verdict:
     """Judge what a sweep found on the way from one posture (nq,) to another, and took in seconds of CPU time."""
-    pairs = Pairs(scene)
-    rounding = ROUNDING * max(1.0, pairs.size)
-    shares = np.linspace(0.0, 1.0, PARTS + 1)
+    pairs, parts = Pairs(scene), 150
+    rounding = 3e-6 * max(1.0, pairs.size)
+    shares = np.linspace(0.0, 1.0, parts + 1)
     deeper = _deeper(pairs, scene, start, end, shares)
     top = int(np.argmax(deeper))
-    near = np.linspace(shares[max(top - 1, 0)], shares[min(top + 1, PARTS)], FINER)
+    near = np.linspace(shares[max(top - 1, 0)], shares[min(top + 1, parts)], 40)
     shares, deeper = np.append(shares, near), np.append(deeper, _deeper(pairs, scene, start, end, near))
     deepest = float(deeper.max(initial=0.0))
     words = f"the deepest on the way is {deepest:.3g} m deeper than at the start"

@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.drops import GRAVITY
-from wholebody.bench.measure.rows import Row
+from wholebody.bench.rows import Row
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.step_program import SKIN
 

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.rows import Row, measured_ms
+from wholebody.bench.rows import Row, measured_ms
 from wholebody.bench.suite.problem_sets.things import coal_distance
 
 DENSITY = 700.0  # kg/m3

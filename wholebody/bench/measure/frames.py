@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.rows import Figure, Panel, Row, report
+from wholebody.bench.rows import Figure, Panel, Row, report
 from wholebody.dynamics.world import WorldFrame
 from wholebody.tracking.dragging import Dragged, DragJudgement
 from wholebody.tracking.judging import Judgement
@@ -31,7 +31,7 @@ PAPER = tuple(
 """Table 2 of Schmidl and Lin, on a processor of 1.7 GHz."""
 
 
-def frame_rows(case: str, tool: str, columns: Mapping[str, Sequence[Any] | Array]) -> list[Row]:
+def frame_rows(case: str, tool: str, columns: Mapping[str, Any]) -> list[Row]:
     """A row for each frame, from columns (frames,) by name."""
     count = len(next(iter(columns.values())))
     lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
@@ -89,7 +89,7 @@ def drag_rows(task: str, drag: Dragged, judged: DragJudgement) -> tuple[Row, lis
 
 def is_clean(drag: Row) -> bool:
     """Whether a drag kept all limits, and nothing was penetrated or passed by more than a millimetre."""
-    return max(drag["deepest mm"], drag["between mm"]) <= 1.0 and drag["beyond limits rad"] <= 1e-6
+    return bool(max(drag["deepest mm"], drag["between mm"]) <= 1.0 and drag["beyond limits rad"] <= 1e-6)
 
 
 def loop_rows(scene: str, run: Recording, judged: Judgement) -> tuple[Row, list[Row]]:
@@ -144,7 +144,7 @@ def loop_rows(scene: str, run: Recording, judged: Judgement) -> tuple[Row, list[
 def is_held(run: Row) -> bool:
     """Whether a run kept limits and cones, passed through nothing, and was never deeper than a millimetre."""
     beyond = max(run["beyond limits rad"], run["beyond cones rad"])
-    return run["deepest mm"] <= 1.0 and not run["frames that pass"] and beyond < 1e-6
+    return bool(run["deepest mm"] <= 1.0 and not run["frames that pass"] and beyond < 1e-6)
 
 
 def loop_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.rows import Figure, Row, measured_ms
+from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.dynamics.rigid_bodies import RigidBodies
 
 DT = 1.0 / 60.0
@@ -25,9 +25,8 @@ def long_run(minutes: float, seed: int = 0) -> Row:
     engine, names, pillar = _engine(seed)
     rng = np.random.default_rng(seed)
     frames, kicks = round(60.0 * minutes / DT), round(10.0 / DT)
-    times, impacts, deepest, grew, energy = [], 0, 0.0, 0.0, engine.energy()
+    times, impacts, asleep, deepest, grew, energy = [], 0, 0, 0.0, 0.0, engine.energy()
     lay: Array | None = None
-    made = None
     for number in range(frames):
         if number % kicks == kicks - 1:
             _kick(engine, f"ball {rng.integers(6)}", rng)
@@ -35,7 +34,7 @@ def long_run(minutes: float, seed: int = 0) -> Row:
         spent, _, made = measured_ms(partial(engine.advance, DT))
         times.append(spent)
         impacts, deepest = impacts + len(made.events), max(deepest, made.deepest)
-        grew, energy = max(grew, made.energy - energy), made.energy
+        grew, energy, asleep = max(grew, made.energy - energy), made.energy, made.sleeping
         if number == kicks:
             lay = _places(engine, pillar)
     end = _places(engine, names) - AWAY
@@ -51,7 +50,7 @@ def long_run(minutes: float, seed: int = 0) -> Row:
         "largest gain of energy J": grew,
         "drift mm": 1e3 * drift,
         "outside": int((~inside).sum()),
-        "asleep at the end": made.sleeping if made else 0,
+        "asleep at the end": asleep,
     }
     return Row("a pen", f"{minutes:g} minutes", figures)
 

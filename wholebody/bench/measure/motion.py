@@ -18,7 +18,7 @@ from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.base.runner import BY_THE_CLOCK, Job, allow_processor
 from wholebody.bench.measure.clips import recorded, synthetic
-from wholebody.bench.measure.rows import Figure, Panel, Row, measured_ms, report, shares
+from wholebody.bench.rows import Figure, Panel, Row, measured_ms, report, shares
 from wholebody.bench.tables import read_rows, write_rows
 
 if TYPE_CHECKING:

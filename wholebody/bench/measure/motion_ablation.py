@@ -14,7 +14,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.clips import synthetic
-from wholebody.bench.measure.rows import Row, measured_ms
+from wholebody.bench.rows import Row, measured_ms
 from wholebody.bench.suite.ablation import FACTORS, changed, constants_in
 
 Case = tuple[str, str, str, int]

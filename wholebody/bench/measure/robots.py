@@ -18,7 +18,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import Child, EndedError
-from wholebody.bench.measure.rows import Figure, Row, measured_ms, report
+from wholebody.bench.rows import Figure, Row, measured_ms, report
 from wholebody.geometry.mesh_cache import VARIABLE
 
 if TYPE_CHECKING:

@@ -17,7 +17,7 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import Scratch
-from wholebody.bench.measure.rows import Figure, Panel, Row, measured_ms
+from wholebody.bench.rows import Figure, Panel, Row, measured_ms
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.simplification.simplify import simplify

@@ -21,8 +21,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.bench import statistics
-from wholebody.bench.measure.rows import Figure, Row, measured_ms, quiet, times
 from wholebody.bench.measure.scaling import TIP, chain, task
+from wholebody.bench.rows import Figure, Row, measured_ms, quiet, times
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.bench.suite.problem_sets.bodies import TIPS

@@ -10,8 +10,8 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.bench.measure import track as setting
-from wholebody.bench.measure.rows import Figure, Panel, Row, quiet, report, shares, times
 from wholebody.bench.measure.track import Track, judge
+from wholebody.bench.rows import Figure, Panel, Row, quiet, report, shares, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.registry import make_tool
@@ -95,13 +95,13 @@ def _beside(track: Track, tools: Sequence[str], shift: int) -> dict[str, Run]:
 
 def time_rows(track: Track, runs: Runs) -> list[Row]:
     """Times of all steps of each tool, and their ratios to the reference's in the same repeat, with intervals."""
-    rows, reference = [], runs.get(REFERENCE)
+    rows, reference = [], runs.get(REFERENCE, [])
     for name, mine in runs.items():
         figures: dict[str, Figure] = {}
         for clock, front in (("wall", ""), ("cpu", "CPU")):
             own = _clock(mine, clock)
             figures |= times(own, "µs", front)
-            for part, quantile in (("median", 0.5), ("p95", 0.95)) if reference is not None else ():
+            for part, quantile in (("median", 0.5), ("p95", 0.95)) if reference else ():
                 ratio = quantile_ratio(own, _clock(reference, clock), quantile)
                 figures[f"{front} {part} × {REFERENCE}".strip()] = ratio
         figures["set-up ms"] = 1e3 * float(np.median([run.setup for run in mine]))

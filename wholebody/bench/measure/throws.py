@@ -18,7 +18,7 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.rows import Figure, Row, measured_ms
+from wholebody.bench.rows import Figure, Row, measured_ms
 from wholebody.tracking.moving_goals import retarget
 
 Path = Sequence[tuple[float, Array]]

@@ -53,7 +53,7 @@ def ablation(arguments: argparse.Namespace) -> None:
 
 def _of_motion(arguments: argparse.Namespace) -> None:
     from wholebody.bench.measure import motion_ablation as ablated
-    from wholebody.bench.measure.rows import report
+    from wholebody.bench.rows import report
     from wholebody.figures import load
 
     only = chosen(arguments.only, ablated.USED, "--only")

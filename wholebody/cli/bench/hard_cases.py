@@ -14,10 +14,9 @@ from wholebody.bench.tables import read_rows
 from wholebody.cli.bench.command import Chart, command, count, folders, listed, measuring, option, publish, seed
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from wholebody.bench.attack.case import Case
-    from wholebody.bench.attack.report import Row
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.case import HardCase
@@ -115,17 +114,21 @@ or no end within a minute. What ended before Ctrl-C is written.""",
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report, running
-    from wholebody.bench.attack.report import Row, is_slow
+    from wholebody.bench.attack.report import Row
 
     _check(arguments)
     earlier = [one for path in arguments.also for one in read_rows(path, Row)[1]]
     rows: list[Row] = []
-    tell, interrupted = _teller(rows), False
+    interrupted = False
     try:
-        for ended in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
-            line = tell(ended)
-            if line.outcome == "wrong" or is_slow(line):
-                report.keep(ended, arguments.out)
+        for case, verdict in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
+            rows.append(report.row(case, verdict))
+            if rows[-1].outcome == "wrong":
+                print(f"WRONG: {case.kind} {case.number}: {rows[-1].words}", flush=True)
+            elif len(rows) % 200 == 0:
+                print(f"{len(rows)} cases, {sum(one.outcome == 'wrong' for one in rows)} wrong", flush=True)
+            if rows[-1].outcome == "wrong" or rows[-1].slow:
+                report.keep(case, verdict, arguments.out)
     except KeyboardInterrupt:
         interrupted = True
     rows += earlier
@@ -162,19 +165,3 @@ def _cases(arguments: argparse.Namespace) -> Iterator[Case]:
         if done == arguments.cases:
             return
         yield Case(arguments.seed, number, kind_of(number))
-
-
-def _teller(rows: list[Row]) -> Callable[..., Row]:
-    """Return what adds a case to the rows, and prints a line where it was wrong, and now and then how far it is."""
-    from wholebody.bench.attack.report import row
-
-    def tell(ended: object) -> Row:
-        line = row(ended)  # type: ignore[arg-type]
-        rows.append(line)
-        if line.outcome == "wrong":
-            print(f"WRONG: {line.kind} {line.number}: {line.words}", flush=True)
-        elif len(rows) % 200 == 0:
-            print(f"{len(rows)} cases, {sum(one.outcome == 'wrong' for one in rows)} wrong", flush=True)
-        return line
-
-    return tell

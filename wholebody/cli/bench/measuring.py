@@ -11,7 +11,7 @@ from pathlib import Path
 from wholebody.base import checks
 from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
-from wholebody.bench.measure.rows import Panel, Row, chart, report
+from wholebody.bench.rows import Panel, Row, chart, report
 from wholebody.bench.tables import write_rows
 from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish, publish_page
 
@@ -118,7 +118,7 @@ def _task(arguments: argparse.Namespace) -> None:
 def _reaches(arguments: argparse.Namespace) -> None:
     """Random reaches whose answer is known to exist."""
     from wholebody.bench.measure import solve
-    from wholebody.bench.measure.rows import shares
+    from wholebody.bench.rows import shares
     from wholebody.bench.suite.adapters.registry import adapters
 
     seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count or 200))

@@ -34,7 +34,7 @@ def settings(adapters: tuple[Adapter, ...], cases: int, seed: int, minutes: floa
         robots.folder()
     except InputError as error:
         left_out = str(error)
-        names.remove(robots.SET.name)
+        names.remove("robots")
     chosen = [*names, *dict.fromkeys(TUNED_ON[name] for name in names)]
     families = tuple(problem_set(name) for name in chosen)
     return Settings(families, adapters, cases, sweep=0, levels=1, seed=seed, cap=20.0, minutes=minutes), left_out

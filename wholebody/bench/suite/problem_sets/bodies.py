@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
@@ -17,9 +17,6 @@ ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at 
 CLEARANCE = 0.002  # m: what is asked of an answer
 TIPS = ("right_index_tip", "left_index_tip")
 FEET = ("left_foot", "right_foot")
-SOLES = ("left_foot", "right_foot", "left_toes", "right_toes")
-ATTEMPTS = 5000
-"""Postures that are tried for one witness; about one in five of a person's upper body is free."""
 
 
 _Found = TypeVar("_Found")
@@ -45,7 +42,7 @@ def floor_scene(figure: wb.Figure) -> wb.Scene:
 def is_free(scene: wb.Scene, q: Array, room: float = ROOM) -> bool:
     """Whether nothing but the soles on the floor is nearer than `room`, metres, in the posture q, shape (nq,)."""
     owners = scene.piece_owner
-    soles = {frozenset(("floor", name)) for name in SOLES}
+    soles = {frozenset(("floor", name)) for name in (*FEET, "left_toes", "right_toes")}
     return all(frozenset((owners[a], owners[b])) in soles for a, b in scene.contacts(q, within=room).pair)
 
 
@@ -73,11 +70,11 @@ def until_found(attempt: Callable[[], _Found | None]) -> _Found:
     Raises:
         InputError: it never did.
     """
-    for _ in range(ATTEMPTS):
+    for _ in range(5000):  # about one in five of the postures of a person's upper body is free
         found = attempt()
         if found is not None:
             return found
-    raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
+    raise InputError("none of 5000 postures is free; give another seed")
 
 
 def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) -> Array:
@@ -90,6 +87,12 @@ def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) 
         reach = share * (high - low)
         values[name] = float(np.clip(q[place] + float(rng.uniform(-reach, reach)), low, high))
     return figure.clamp(figure.with_joints(q, values))
+
+
+def bent(figure: wb.Figure, q: Array, degrees: Mapping[str, float], sides: Sequence[str] = ("left", "right")) -> Array:
+    """The posture q, (nq,), with joints of one side or both at angles by the joints' names without the side."""
+    angles = {f"{side}_{name}": np.radians(angle) for side in sides for name, angle in degrees.items()}
+    return figure.with_joints(q, angles)
 
 
 def movable(figure: wb.Figure) -> NDArray[np.intp]:

@@ -17,11 +17,6 @@ import wholebody as wb
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.state import State, Wrench
 
-EXACT = 1e-10  # m, rad
-TURNS = 25
-LONGEST = 0.5  # rad, m: of an entry of a step, as farther away the rows are no longer true
-SHORT = 1e-9  # keeps the step finite where rows depend on each other
-
 
 class MassAbove(wb.Goal):
     """The centre of mass above a place on the floor."""
@@ -70,14 +65,15 @@ def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices)
         dofs: places in the tangent of what may move.
     """
     model, state = figure.model, _state(figure)
-    for _ in range(TURNS):
+    for _ in range(25):
         state.update(q)
         error = np.concatenate([goal.error(state) for goal in goals])
-        if np.abs(error).max() < EXACT:
+        if np.abs(error).max() < 1e-10:  # m, rad
             return q
         rows = np.vstack([state.dense_jacobian(goal.jacobian(state)) for goal in goals])
         step = _shortest(rows, -error, dofs, *figure.tangent_bounds(q))
-        step *= min(1.0, LONGEST / max(float(np.abs(step).max()), 1e-300))
+        # Farther away than half a radian or metre the rows are no longer true.
+        step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-300))
         q = figure.clamp(pin.integrate(model, q, step))
     return None
 
@@ -89,14 +85,17 @@ def _state(figure: wb.Figure) -> State:
 
 
 def _shortest(rows: Array, wanted: Array, dofs: Indices, lower: Array, upper: Array) -> Array:
-    """Step (nv,) of the given degrees of freedom that does what is wanted; those that would leave their limits stop."""
+    """Step (nv,) of the given degrees of freedom that does what is wanted; those that would leave their limits stop.
+
+    1e-9 keeps the step finite where rows depend on each other.
+    """
     step = np.zeros(rows.shape[1])
     left = dofs
     while len(left):
         part = rows[:, left]
         rest = step.copy()
         rest[left] = 0.0
-        step[left] = part.T @ np.linalg.solve(part @ part.T + SHORT * np.eye(len(rows)), wanted - rows @ rest)
+        step[left] = part.T @ np.linalg.solve(part @ part.T + 1e-9 * np.eye(len(rows)), wanted - rows @ rest)
         beyond = (step[left] < lower[left]) | (step[left] > upper[left])
         if not beyond.any():
             break

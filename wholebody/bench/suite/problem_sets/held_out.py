@@ -26,22 +26,15 @@ from wholebody.bench.suite.problem_sets.bodies import (
     standing_problem,
     until_found,
 )
-from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.fitting import fitted
 from wholebody.bench.suite.problem_sets.reaching import reach_among
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 
-PEOPLE = 12  # that take turns
-STATURES = (1.50, 1.98)  # m: of the shortest and the tallest of them
-THINGS = 35
-LEAN = 0.6  # rad: standard deviation of each turn of the pelvis before the feet are put on their places
-SUNK = (-0.6, 0.05)  # m: how high the pelvis then is above where it stands
-AWAY = 0.15  # m: and how far to a side
 
-
-def _uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """All joints anywhere within their limits, the feet then put on their places; one fingertip, or both."""
-    figure = human()
+    figure, given = human(), numbers("uniform_witnesses")
     start = figure.posture("standing")
     feet = [wb.Frame(foot, figure.placement(start, foot)).resolve(alone(figure), start) for foot in FEET]
     limits, dofs = figure.limits, movable(figure)
@@ -52,8 +45,8 @@ def _uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
         q = np.array(start)
         q[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
         q = figure.with_joints(q, {name: standing[name] for name in toes})
-        q[:3] += rng.uniform((-AWAY, -AWAY, SUNK[0]), (AWAY, AWAY, SUNK[1]))
-        turn = np.append(0.5 * LEAN * rng.normal(size=3), 1.0)
+        q[:3] += rng.uniform(*given.pelvis_m)
+        turn = np.append(0.5 * given.lean_rad * rng.normal(size=3), 1.0)
         q[3:7] = turn / np.linalg.norm(turn)
         found = fitted(figure, figure.clamp(q), feet, dofs)
         return found if found is not None and is_free(alone(figure), found) else None
@@ -65,23 +58,26 @@ def _uniform(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
 @lru_cache(maxsize=2)
 def person(number: int) -> wb.Figure:
-    """One of `PEOPLE` people, women and men in turn, from short to tall."""
-    low, high = STATURES
-    return wb.load("human", sex=("female", "male")[number % 2], stature=low + (high - low) * number / (PEOPLE - 1))
+    """One of the people of the set, women and men in turn, from short to tall."""
+    given = numbers("other_people")
+    low, high = given.statures_m
+    stature = low + (high - low) * number / (given.people - 1)
+    return wb.load("human", sex=("female", "male")[number % 2], stature=stature)
 
 
-def _people(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def people(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """The reach among twenty things, by other people."""
-    return reach_among(person(number % PEOPLE), TIPS[number // PEOPLE % 2], rng)
+    count = numbers("other_people").people
+    return reach_among(person(number % count), TIPS[number // count % 2], rng)
 
 
-def _clutter(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def clutter(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """A reach among more and other things."""
     figure = human()
     start = figure.posture("standing")
     witness = sampled_posture(figure, start, rng)
     scene = floor_scene(figure)
-    add_things(scene, THINGS, Occupied(figure, (start, witness)), ROOM, rng, make=_other_thing)
+    add_things(scene, numbers("other_clutter").things, Occupied(figure, (start, witness)), ROOM, rng, make=_other_thing)
     return standing_problem(scene, start, [point(figure, witness, TIPS[number % 2])]), witness
 
 
@@ -98,24 +94,3 @@ def _other_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
         a, b, c = rng.uniform(0.03, 0.25, 3)
         return kind, wb.Ellipsoid((float(a), float(b), float(c)))
     return kind, wb.Hull(rng.uniform(-1.0, 1.0, (20, 3)) * (*rng.uniform(0.1, 0.3, 2), rng.uniform(0.01, 0.03)))
-
-
-UNIFORM = ProblemSet(
-    "uniform_witnesses",
-    "uniform witnesses",
-    "A standing person brings one fingertip or both to where a posture has them whose joints, legs and trunk too, are "
-    "anywhere within their limits.",
-    _uniform,
-)
-PEOPLE_SET = ProblemSet(
-    "other_people",
-    "other people",
-    f"Reaches among twenty things by {PEOPLE} women and men of {STATURES[0]:.2f} to {STATURES[1]:.2f} m.",
-    _people,
-)
-CLUTTER = ProblemSet(
-    "other_clutter",
-    "other clutter",
-    f"A standing person brings one fingertip to a place among {THINGS} planks, rods, ellipsoids and slabs.",
-    _clutter,
-)

@@ -7,7 +7,7 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from wholebody.bench.measure.rows import Row, report, shares, shown, table
+from wholebody.bench.rows import Row, report, shares, shown, table
 from wholebody.bench.statistics import NOTHING, Interval
 
 ROWS = [Row("a", "qp", {"ms": 1.25, "status": "solved"}), Row("b", "ccd", {"ms": Interval(2.0, 1.0, inf), "count": 3})]
