@@ -6,11 +6,10 @@ from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.starts import Minima, named_postures, restarts, throughout
+from wholebody.methods.starts import Minima, restarts, throughout
 
 
 def descents_needed(values, fewest: int = 0) -> int:
@@ -89,30 +88,3 @@ def test_a_joint_without_limits_starts_anywhere(problem: wb.Problem) -> None:
         found = angles(problem, restarts(problem, workspace.state, problem.start, np.random.default_rng(0), 40, [1.0]))
     assert found[:, 1].min() < -2.5
     assert found[:, 1].max() > 2.5
-
-
-def test_named_postures_are_where_the_start_is_and_look_where_it_looks() -> None:
-    human = wb.load("human")
-    turn = pin.SE3(pin.utils.rotate("z", 2.0), np.array((3.0, -1.0, 0.0)))
-    start = human.posture("standing")
-    start[:7] = pin.SE3ToXYZQUAT(turn * pin.XYZQUATToSE3(start[:7]))
-    problem = wb.Problem(wb.Scene(human), start=start, constraints=[wb.Hold("pelvis")])
-    with problem.borrow() as workspace:
-        found = list(named_postures(problem, workspace.state, start))
-    sitting = human.postures.index("sitting") - 1
-    expected = human.posture("sitting")
-    np.testing.assert_allclose(found[sitting][7:], expected[7:], atol=1e-9)
-    placed = turn * pin.XYZQUATToSE3(expected[:7])
-    assert pin.XYZQUATToSE3(found[sitting][:7]).isApprox(placed, 1e-9)
-    assert len(found) == len(human.postures) - 1
-
-
-def test_named_postures_leave_frozen_joints_alone() -> None:
-    human = wb.load("human")
-    problem = wb.Problem(wb.Scene(human), constraints=[wb.Freeze("root", "left_leg")])
-    still = [human.model.joints[human.joint_id(name)].idx_q for name in human.joint_names("left_leg")]
-    with problem.borrow() as workspace:
-        found = np.array(list(named_postures(problem, workspace.state, problem.start)))
-    assert np.ptp(found, axis=0).max() > 1.0
-    np.testing.assert_array_equal(found[:, :7], np.tile(problem.start[:7], (len(found), 1)))
-    np.testing.assert_array_equal(found[:, still], np.tile(problem.start[still], (len(found), 1)))

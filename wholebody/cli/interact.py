@@ -6,41 +6,30 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
+from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
+from wholebody.cli.command import command
 
 if TYPE_CHECKING:
     from wholebody.bench.rows import Row
     from wholebody.tracking import InteractionScene, Judgement, Recording
 
-HELP = "follow a tracker frame by frame through a gallery without penetration"
-DESCRIPTION = """\
+
+@command(
+    "interact",
+    "follow a tracker frame by frame through a gallery without penetration",
+    """\
 Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the shown figure follows as
 far as contact allows. Print a table of times and remaining overlap, assessed independently. Write the numbers of every
 frame (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a ghost (HTML, opens
-without a network)."""
-EPILOG = """\
+without a network).""",
+    *scene_options("name of the scene, or all", "qp, ccd or all (default: qp)", "out/interact"),
+    epilog="""\
 examples:
   wholebody interact --list
   wholebody interact two_arms
   wholebody interact all --out out/interact
-exit code: 1 if a frame overlaps by more than the tolerance, passes through something or leaves a joint limit or cone"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    scene_parser(
-        commands,
-        run,
-        "interact",
-        scene="name of the scene, or all",
-        overlap="qp, ccd or all (default: qp)",
-        out="out/interact",
-        help=HELP,
-        description=DESCRIPTION,
-        epilog=EPILOG,
-    )
-
-
+exit code: 1 if a frame overlaps by more than the tolerance, passes through something, or leaves a joint limit""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder

@@ -64,22 +64,6 @@ def restarts(
         yield _moved(problem, state, start, rng.uniform(-0.5, 0.5, len(span)) * spread * span)
 
 
-def named_postures(problem: Problem, state: State, start: Array) -> Iterator[Array]:
-    """The figure's named postures but the first, shape (nq,), where the start is and looking where it looks.
-
-    Args:
-        problem: its bounds are kept.
-        state: of the run; it is moved.
-        start: (nq,).
-    """
-    figure = problem.scene.figure
-    for name in figure.postures[1:]:
-        q = figure.posture(name)
-        if figure.root == "free":
-            q[:7] = pin.SE3ToXYZQUAT(_upright(start[:7]) * pin.XYZQUATToSE3(q[:7]))
-        yield _moved(problem, state, start, pin.difference(figure.model, start, q))
-
-
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
 
@@ -162,14 +146,6 @@ def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
             spread[joint.idx_v] = TURN
     limited = np.isfinite(upper - lower)
     return np.where(limited, lower, -0.5 * spread), np.where(limited, upper, 0.5 * spread)
-
-
-def _upright(root: Array) -> pin.SE3:
-    """Where a free root (7,) stands on the ground, turned about the vertical only."""
-    placed = pin.XYZQUATToSE3(root)
-    forward = placed.rotation[:, 0]
-    turn = np.arctan2(forward[1], forward[0])
-    return pin.SE3(pin.utils.rotate("z", turn), np.array((placed.translation[0], placed.translation[1], 0.0)))
 
 
 def _moved(problem: Problem, state: State, start: Array, move: Array) -> Array:

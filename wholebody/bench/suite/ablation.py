@@ -204,7 +204,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     search, descent = multistart.Search, sqp.SQP
     return {
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
-        "watchdog": (descent, "_promises", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
@@ -218,7 +217,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
-        "named postures": (multistart, "named_postures", lambda problem, state, start: iter(())),
         "leaving contacts that cancel": (search, "_leave_cancelling", lambda self: None),
         "relaxed probes": (search, "_relaxed_probes", lambda self, starts: iter(())),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import read_rows
-from wholebody.cli.bench.command import Chart, command, count, folders, listed, measuring, option, publish, seed
+from wholebody.cli.bench.command import Chart, folders, listed, measuring, publish, seed
+from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
@@ -109,7 +110,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
     listed("--kinds", "of cases: solve, stream, sweep, contact, file, argument", "KIND"),
     count("--jobs", 1, "processes at a time"),
     listed("--also", "attack.csv of other runs, counted too", "CSV", type=Path, default=[]),
-    folders("out/attack"),
+    *folders("out/attack"),
 )
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
@@ -140,9 +141,7 @@ def attack(arguments: argparse.Namespace) -> int:
     publish(
         "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
     )
-    if interrupted:
-        return 130  # as shells have it after Ctrl-C
-    return int(any(one.outcome == "wrong" for one in rows))
+    return 130 if interrupted else int(any(one.outcome == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
 def _check(arguments: argparse.Namespace) -> None:

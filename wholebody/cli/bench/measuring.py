@@ -13,7 +13,8 @@ from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
 from wholebody.bench.rows import Panel, Row, chart, report
 from wholebody.bench.tables import write_rows
-from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish, publish_page
+from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
+from wholebody.cli.command import count, option
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:

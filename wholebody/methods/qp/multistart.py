@@ -21,7 +21,7 @@ from wholebody.methods.qp.screening import SCREENED, Settings, least_measures
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
-from wholebody.methods.starts import Minima, hooked_hands, named_postures, restarts, throughout
+from wholebody.methods.starts import Minima, hooked_hands, restarts, throughout
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
@@ -223,7 +223,6 @@ class Search:
             self._come_near()
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
-            self._leave_from_named_postures()
         if not self._out_of_reach and self.best.violation.worst > tolerance:
             self._near_best()
         if self.best.violation.left <= tolerance:
@@ -233,16 +232,6 @@ class Search:
             local = self._stay(best)
             if held(local, tolerance) and local.violation.left <= best.violation.left + tolerance:
                 self._best = local
-
-    def _leave_from_named_postures(self) -> None:
-        """Where nothing leads out of what the best posture is inside of, begin at the figure's other postures."""
-        if held(self.best, self.settings.tolerance) or self.contradictions:
-            return
-        for q in self.lineariser.defined(named_postures(self.problem, self.lineariser.state, self.problem.start)):
-            if not self.control.over:
-                local = self._feasibility(self.lineariser, self._at_most(PROBE_PROGRAMS), "probe").once(q)
-                self.spent += local.iterations
-                self._accept(local, "from another posture")
 
     def _proven(self) -> bool:
         """Whether the best posture is known to be as near to the goals as any."""

@@ -44,7 +44,6 @@ PATIENCE = 6
 PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
 UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the measure: then it ends
 RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
-RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
@@ -89,7 +88,6 @@ class SQP:
         self._radius, self._measures, self._full_step = FIRST_RADIUS, self.measures, self.full_step
         self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
-        self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
         self._unimproved = 0
@@ -143,13 +141,9 @@ class SQP:
                         self._ahead.reset()
                 elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
                     self._measures = True
-            elif self._anchor is not None:
-                here, self._anchor = self._anchor, None
             elif self._radius < LEAST_RADIUS:
                 converged = True
                 break
-        if self._anchor is not None:
-            here = self._anchor
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
@@ -240,15 +234,9 @@ class SQP:
             self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        promising = not acceptance.accepted and self._promises(here, there)
-        if (acceptance.accepted or promising) and self._jumps(here, there):
-            acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
-        self._record(there, "tentative" if promising else acceptance.by)
-        if promising:
-            self._anchor = here
-            self._ahead.reset()
-            self._shift = np.zeros_like(self._shift)
-            return there
+        if acceptance.accepted and self._jumps(here, there):
+            acceptance = StepAcceptance(False, False, False, "blocked")
+        self._record(there, acceptance.by)
         if not acceptance.accepted:
             self._reject(there.longest, acceptance.by)
             return None
@@ -290,18 +278,10 @@ class SQP:
             self._radius = 0.5 * self._radius
         if step.parts is not None and not step.flat:
             self._ahead.record(step.parts, way, way is not step.dq)
-        self._anchor = None
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
         self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
         return there
-
-    def _promises(self, here: Iterate, there: Iterate) -> bool:
-        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
-        if self._anchor is not None or not self._measures:
-            return False
-        broken = max(there.violation.elastic, there.violation.hold)
-        return there.violation.goal < here.violation.goal and broken < RESTORABLE
 
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
@@ -324,22 +304,13 @@ class SQP:
         return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
-        """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
-        predicted = step.predicted
-        if self._anchor is not None:
-            predicted = with_values(
-                predicted, violation=max(0.1 * predicted.violation, 1e-3 * self._anchor.violation.total)
-            )
-        before = here if self._anchor is None else self._anchor
+        """Judge a step from here to there; near the goals the Lagrangian stands for the measures."""
         measures = [
             one.at.measure if step.multipliers is None else step.multipliers.lagrangian(one.at.measure, one.rows)
-            for one in (before, there)
+            for one in (here, there)
         ]
         return self._funnel.judge(
-            (before.violation.total, measures[0]),
-            (there.violation.total, measures[1]),
-            predicted,
-            self._measures,
+            (here.violation.total, measures[0]), (there.violation.total, measures[1]), step.predicted, self._measures
         )
 
     def _record(self, there: Iterate, what: str) -> None:

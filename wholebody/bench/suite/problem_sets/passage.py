@@ -66,7 +66,8 @@ def _wrist(side: str, rng: np.random.Generator) -> pin.SE3:
 
 def _boards(kind: int, wrist: pin.SE3, rng: np.random.Generator) -> list[tuple[wb.Box, pin.SE3]]:
     """Four boards around a window, or two on both sides of a slot, where the hand and the forearm go through."""
-    half = np.array(given.half_m) + rng.uniform(*given.gap_m, 2)
+    narrow, broad = given.gap_m
+    half = np.array(given.half_m) + rng.uniform(narrow, broad, 2)
     past, wide, thick = float(rng.uniform(*given.past_wrist_m)), given.wide_m, given.thick_m
     if kind == 1:
         deep = float(rng.uniform(*given.deep_m))

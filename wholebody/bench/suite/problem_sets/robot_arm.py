@@ -83,7 +83,8 @@ def _length(word: str | float, known: dict[str, float]) -> float:
 def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
     """The file: every link is a cylinder from its joint to the next one."""
     ends = [axis.at for axis in axes] + [tool]
-    radii = np.linspace(*given.radii_m, len(ends))
+    thick, thin = given.radii_m
+    radii = np.linspace(thick, thin, len(ends))
     lines = [f'<robot name="{name}">']
     lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
     lines.append('<link name="tool"/>')
