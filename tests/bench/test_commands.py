@@ -12,14 +12,14 @@ from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import STEPPING
-from wholebody.cli.bench import add_to
+from wholebody.cli.bench import run as group
 
 MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
+    group.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["bench", *words])
     return int(arguments.run(arguments))
 

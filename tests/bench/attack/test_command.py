@@ -13,12 +13,12 @@ from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
 from wholebody.bench.attack.report import Row
 from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.cli.bench import run as group
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
+    group.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["bench", "attack", *words])
     return int(arguments.run(arguments))
 
