@@ -112,9 +112,9 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert set(STEPPING) <= set(plot_style.COLORS)
-    assert plot_style.method_style("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart
-    assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
+    assert {name.replace("wholebody", "qp") for name in STEPPING} <= set(plot_style.STYLES)
+    assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
+    assert len({style.color for style in plot_style.STYLES.values()}) == len(plot_style.STYLES)
 
 
 @pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--jobs", "0"), ("solve", "--count", "-1")])

@@ -138,11 +138,11 @@ OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs"
 def _compare_on_task(arguments: argparse.Namespace) -> int:
     """Compare methods on one's own task."""
     from rich.console import Console
-    from rich.markup import escape
 
+    from wholebody.bench.rows import chart
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.bench.suite.compare import own_task
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import print_rows
     from wholebody.taskfile import read_task
 
     _alone(arguments, "task", OF_SETS)
@@ -153,15 +153,8 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     facts, out = machine(), arguments.out
     write_rows(out / "task.csv", facts, rows)
     write_text(out / "task.md", own_task.report(rows, title, facts) + "\n")
-    _, png = own_task.chart(rows, title, out / "task")
-    made = table("method", "outcome", "warm ms", "cold ms", "goals mm", "overlap mm", "effort", title=title)
-    for row in rows:
-        figures = (row.warm_ms, row.cold_ms, row.goal_mm, row.overlap_mm, row.effort)
-        made.add_row(row.method, row.outcome, *("" if value != value else f"{value:.3g}" for value in figures))
-    console.print(made)
-    for row in rows:
-        if row.outcome in ("refused", "failed", "overtime"):
-            console.print(f"{row.method}: {escape(row.said)}", highlight=False)
+    _, png = chart(own_task.panels(rows, title), out / "task")
+    print_rows(rows)
     for path in (out / "task.md", out / "task.csv", png):
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
     return 0

@@ -46,7 +46,7 @@ def step(arguments: argparse.Namespace) -> None:
     from wholebody.bench.measure import step
     from wholebody.bench.measure.figure_track import figure_tracks
     from wholebody.bench.measure.track import VARIANTS, track
-    from wholebody.bench.suite.adapters.registry import chosen_tools, tool_class
+    from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
 
     tools = chosen_tools(arguments.tools)
     repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
@@ -55,7 +55,7 @@ def step(arguments: argparse.Namespace) -> None:
     courses = [course for spec in figures or () for course in figure_tracks(spec, steps)]
     tracks = {course.name: course for course in courses or (track(name, steps) for name in VARIANTS)}
     runs: dict[str, step.Runs] = {}
-    notes = [line for name in tools for line in tool_class(name).differences]
+    notes = [line for name in tools for line in tool_differences(name)]
     tables: dict[str, list[Row]] = {}
     for name, course in tracks.items():
         taken, refused = step.taking(course, tools) if figures else (list(tools), {})

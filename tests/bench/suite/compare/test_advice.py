@@ -45,12 +45,12 @@ def results(*records: list[Record]) -> Results:
 OURS_CURVE = curve_of(OURS, (1e-2, 0.010, 1e-2), (1e-4, 0.020, 2e-4), (1e-6, 0.030, 2e-6))
 
 
-def test_points_are_medians_with_their_spread() -> None:
-    points = curve(results(OURS_CURVE), "s", OURS, WORST)
-    assert [point.seconds for point in points] == pytest.approx([0.010, 0.020, 0.030])
-    assert [point.value for point in points] == pytest.approx([1e-2, 2e-4, 2e-6])
-    assert (points[0].low, points[0].high) == (pytest.approx(0.5e-2), pytest.approx(2e-2))
-    assert points[0].seconds_p95 == pytest.approx(0.040)
+def test_the_line_of_a_chart_joins_the_medians_of_the_best_budgets() -> None:
+    milliseconds, values = curve(results(OURS_CURVE), "s", OURS, WORST)
+    assert milliseconds == pytest.approx([10.0, 20.0, 30.0])
+    assert values == pytest.approx([1e-2, 2e-4, 2e-6])
+    worse = curve_of(OURS, (1e-1, 0.010, 1e-1), (1e-4, 0.020, 1e-3), (1e-2, 0.030, 1e-2), (1e-6, 0.040, 1e-6))
+    assert curve(results(worse), "s", OURS, WORST)[0] == pytest.approx([10.0, 20.0, 40.0])
 
 
 def test_effort_is_measured_against_the_best_exact_answer() -> None:

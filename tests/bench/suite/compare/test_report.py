@@ -14,7 +14,6 @@ from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.suite.compare import report as publishing
-from wholebody.bench.suite.compare.charts import BAND, Point, lowest
 from wholebody.bench.suite.compare.record import ANSWERED, OVERTIME, REFUSED, Record
 from wholebody.bench.suite.compare.settings import Settings
 from wholebody.bench.suite.compare.store import Chunk, Store
@@ -114,29 +113,7 @@ def test_the_page_of_results_gets_its_part(folder: Path) -> None:
         assert (folder / "docs" / name).is_file()
 
 
-def test_the_line_of_a_chart_joins_the_best_budgets() -> None:
-    def point(seconds: float, value: float) -> Point:
-        return Point((1e-3, None), 1, seconds, seconds, value, value, value)
-
-    points = [point(1.0, 1e-1), point(2.0, 1e-3), point(3.0, 1e-2), point(4.0, 1e-6)]
-    assert [made.seconds for made in lowest(points)] == [1.0, 2.0, 4.0]
-    assert max(made.value for made in points) < BAND
-
-
-def test_principal_methods_have_colours_of_their_own() -> None:
-    names = (
-        "qp/osqp",
-        "qp/daqp",
-        "newton/slack",
-        "newton/barrier",
-        "newton/kkt",
-        "ccd",
-        "dls",
-        "placo",
-        "mink",
-        "pink",
-    )
-    assert len({method_style(name).color for name in names}) == len(names)
+def test_settings_of_one_solver_have_one_colour() -> None:
     assert method_style("qp/some_solver") == method_style("qp/some_solver")
 
 

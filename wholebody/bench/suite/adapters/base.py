@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 from wholebody.base.arrays import Array
 from wholebody.methods.base import Method
@@ -38,21 +38,21 @@ class Adapter:
         make: a fresh method from a tolerance and the most iterations, as in a `Budget`.
         loose: budgets from cheap to exact, that draw its curve of speed against accuracy; those of feasibility only
             go before.
-        setup: how it was set up, for reports.
-        differences: what it cannot express, or does otherwise; one sentence each.
         prepare: builds what a solve of a problem needs, so that it is not timed with it; raises InputError where the
             method cannot express the problem.
         hindered: a method, from a tolerance, whose quadratic programs are never finished, or that has one iteration;
             None where `make` does the latter.
+        setup: how it was set up, for reports.
+        differences: what it cannot express, or does otherwise; one sentence each.
     """
 
     name: str
     make: Callable[[float, int | None], Method]
     loose: tuple[Budget, ...]
-    setup: str
-    differences: tuple[str, ...] = ()
     prepare: Callable[[Any, Problem], None] = _nothing
     hindered: Callable[..., Method] | None = None
+    setup: str = ""
+    differences: tuple[str, ...] = ()
 
 
 def made(kind: Callable[..., Method], fewer: Mapping[str, Any], tolerance: float, iterations: int | None) -> Method:
@@ -72,12 +72,10 @@ class Tool(ABC):
 
     Attributes:
         name: for tables.
-        differences: what it cannot express of the task, or does otherwise; one sentence each.
         failures: steps for which it found no answer; it then stays where it is.
     """
 
     name: str
-    differences: ClassVar[tuple[str, ...]] = ()
     failures: int = 0
 
     @abstractmethod

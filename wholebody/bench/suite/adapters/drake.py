@@ -39,20 +39,6 @@ def drake_adapter() -> Adapter:
         make=Drake,
         prepare=Drake.prepare,
         loose=(*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5))),
-        setup="pydrake's InverseKinematics on a MultibodyPlant made from ours, by SNOPT, at most "
-        f"{ITERATIONS} major iterations: goals and holds are AddPositionConstraint and "
-        "AddAngleBetweenVectorsConstraint of a "
-        f"{SHARE:g} of the tolerance, pairs AddMinimumDistanceLowerBoundConstraint with an influence of "
-        f"{100 * INFLUENCE:g} cm, measures a quadratic cost; one start, the problem's own. Building its plant is "
-        "set-up.",
-        differences=(
-            "drake's constraint has one least distance for all pairs: those that begin nearer are left out, but for "
-            "those with a half-space, which is lowered",
-            "a half-space is a box of 50 m, since drake has no distance of a half-space from a hull",
-            "InverseKinematics has no Balance, Plane, ReachCones, CenterOfMass or Axis here, and takes goals as hard",
-            "drake minimises Effort and Displacement only",
-            "its plant is made for free roots, turning and sliding joints",
-        ),
     )
 
 

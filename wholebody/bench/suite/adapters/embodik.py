@@ -35,24 +35,6 @@ def embodik_adapter() -> Adapter:
         make=EmbodikLoop,
         prepare=EmbodikLoop.prepare,
         loose=(*few(10, 20, 50), *LADDER),
-        setup="embodik's KinematicsSolver.solve_position_step on a URDF made from our model, set up as in its "
-        f"examples: steps of {STEP:g} s, which grow up to {LARGER:g} times from {100 * AT:g} cm of error on, damping "
-        f"and tolerance {DAMPING:g}, gains of {GAIN:g} / s, goals of priority 0 and mode SCALE_ELASTIC with the "
-        "fallback to MIN_ERROR that its collision guide advises, the measure as a PostureTask of priority 1, weight "
-        f"{POSTURE:g} and mode MIN_ERROR, every step as a new command, the model's own limits of speed, {ROWS} "
-        "collision rows, its collision preset BALANCED and its recovery as they come; pairs keep "
-        f"{1e3 * EmbodikLoop.margin:g} mm for each metre of the figure more than the clearance, less where the start "
-        f"has less room; one start, at most {ITERATIONS} steps, the loop of our adapter to placo. Building its model "
-        "is set-up.",
-        differences=(
-            "its collision rows are those of the nearest pairs, and of what is inside",
-            "goals have one weight, and its posture task takes the last measure alone",
-            "a half-space is the top of a box, eight times as wide as the figure is long",
-            "its model is written for fixed roots, turning and sliding joints, and for all shapes but ellipsoids and "
-            "cones: its URDF reader hangs things on the root, which is right only where the root stands still",
-            "it takes Point, Frame and Orientation, Freeze, Effort and Displacement, and refuses every other term by "
-            "name",
-        ),
     )
 
 

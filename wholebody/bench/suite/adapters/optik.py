@@ -28,14 +28,6 @@ def optik_adapter() -> Adapter:
         make=Optik,
         prepare=Optik.prepare,
         loose=tuple((tolerance, None) for tolerance in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
-        setup="optik's Robot.ik in the mode 'speed', on one thread, with its own random restarts for at most "
-        f"{LONGEST:g} s, and a squared error of the square of {SHARE:g} of the tolerance. Writing and reading its "
-        "chain is set-up.",
-        differences=(
-            "optik knows no contacts and no measures: it takes the first posture that it finds",
-            "optik places one frame, in position and orientation, by the chain that carries it: fixed roots, turning "
-            "and sliding joints",
-        ),
     )
 
 

@@ -32,22 +32,6 @@ def pink_adapter() -> Adapter:
         make=_pink,
         prepare=PinkLoop.prepare,
         loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
-        setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
-        "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
-        f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
-        f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
-        f"{GAIN} a step ({OUT} beside things that move), safe_displacement_gain 0 (1, its default, in budgets of "
-        f"feasibility only), d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
-        "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
-        differences=(
-            f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
-            "pink's barrier has one least distance for all pairs: those that begin nearer are left out, but for those "
-            "with a half-space, which is lowered",
-            "pairs that hard tasks keep in place are left out, since their rows leave pink no solution",
-            "inside of something pink's barrier pulls deeper, so a margin is kept",
-            "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
-            "pink minimises Effort and Displacement only",
-        ),
     )
 
 
@@ -224,9 +208,6 @@ class PinkTool(Tool):
     """One `solve_ik` and `integrate_inplace` a step."""
 
     name = "pink"
-    differences: ClassVar[tuple[str, ...]] = (
-        f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance, not all within a distance",
-    )
 
     def __init__(self, track: Track) -> None:
         """Set the tasks up."""

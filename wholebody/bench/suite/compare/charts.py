@@ -7,122 +7,47 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from math import inf
 from pathlib import Path
-from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import method_style
-from wholebody.bench.suite.adapters.base import Budget
+from wholebody.bench.rows import Panel, chart
 from wholebody.bench.suite.compare.paired import OURS
 from wholebody.bench.suite.compare.record import COARSE
 from wholebody.bench.suite.compare.results import Quantity, Results, middle
 from wholebody.bench.suite.compare.summary import Summary
 
-BAND = 30.0  # where points are drawn whose median is no answer: above all values, which are metres, radians, shares
 MOST = 6  # methods in a chart
 
 
-class Point(NamedTuple):
-    """One method at one budget.
+def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:
+    """Median milliseconds and values of a method in a set at its budgets, from the fastest on.
 
-    Attributes:
-        level: the budget.
-        cases: how many it stands for.
-        seconds, seconds_p95: median, and 95 %, of the call [s].
-        value: median; infinite where more than half of the answers are none.
-        low, high: quartiles.
+    Without the budgets than which another is both faster and more accurate, and those of which more than half of the
+    answers are none.
     """
-
-    level: Budget
-    cases: int
-    seconds: float
-    seconds_p95: float
-    value: float
-    low: float
-    high: float
-
-
-def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> list[Point]:
-    """Points of a method in a set, from the fastest budget to the slowest."""
     cases = results.swept(family, adapter)
-    points = []
+    found: tuple[list[float], list[float]] = [], []
     for level in results.levels(family, adapter):
         seconds, values = results.values(family, adapter, level, quantity, cases)
-        spent = seconds[np.isfinite(seconds)]
-        if len(spent):
-            quartiles = [middle(values, share) for share in (0.5, 0.25, 0.75)]
-            points.append(Point(level, len(cases), middle(spent), middle(spent, 0.95), *quartiles))
-    return points
-
-
-def lowest(points: list[Point]) -> list[Point]:
-    """Points than which no other of the same method is both faster and more accurate, from the fastest on."""
-    kept: list[Point] = []
-    for point in points:
-        if not kept or point.value < kept[-1].value:
-            kept.append(point)
-    return kept
+        value, spent = middle(values), seconds[np.isfinite(seconds)]
+        if np.isfinite(value) and len(spent) and value < min(found[1], default=np.inf):
+            found[0].append(1e3 * middle(spent))
+            found[1].append(value)
+    return found
 
 
 def speed_accuracy(results: Results, family: str, title: str, adapters: Sequence[str], path: Path) -> tuple[Path, Path]:
-    """One panel a quantity: median error over median time at every budget, quartiles and 95 % of the time as bars.
-
-    The line of a method joins its best budgets; those that are slower and no more accurate stand beside it, small.
-    """
-    quantities = results.quantities(family)
-    chart, axes = plot_style.figure(1, 2, (11.0, 4.6))
-    drawn: dict[str, Any] = {}
-    for panel in axes[0][len(quantities) :]:
-        panel.set_visible(False)
-    for panel, quantity in zip(axes[0], quantities, strict=False):
-        for adapter in reversed(adapters):
-            points = curve(results, family, adapter, quantity)
-            if points:
-                drawn[adapter] = _draw(panel, points, adapter)
-        _dress(panel, quantity, "a frame" if results.moving(family) else "a solve")
-    chart.suptitle(title, x=0.01, ha="left", fontsize=13)
-    plot_style.legend_below(chart, {name: drawn[name] for name in adapters if name in drawn})
-    return plot_style.save(chart, path)
-
-
-def _draw(panel: Any, points: list[Point], adapter: str) -> Any:
-    seen = method_style(adapter)
-    order, width, size = (3, 1.8, 6.0) if seen.principal else (2, 0.9, 4.0)
-    style = {"color": seen.color, "marker": seen.marker, "zorder": order}
-    best = lowest(points)
-    (line,) = panel.plot(*_places(best), linewidth=width, markersize=size, **style)
-    panel.plot(*_places(points), linestyle="", markersize=0.6 * size, alpha=0.5, **style)
-    failing = [point for point in points if point.value == inf]
-    panel.plot(*_places(failing), linestyle="", markersize=size, markerfacecolor="white", **style)
-    bar = {"color": seen.color, "linewidth": 0.9, "alpha": 0.4, "zorder": 1}
-    for point in points if seen.principal else ():
-        if point.value < inf:
-            at = 1e3 * point.seconds
-            panel.plot([at, at], [point.low, min(point.high, BAND)], **bar)
-            panel.plot([at, 1e3 * point.seconds_p95], [point.value, point.value], **bar)
-    return line
-
-
-def _places(points: Sequence[Point]) -> tuple[list[float], list[float]]:
-    return [1e3 * point.seconds for point in points], [min(point.value, BAND) for point in points]
-
-
-def _dress(panel: Any, quantity: Quantity, what: str) -> None:
-    from matplotlib.ticker import LogLocator, NullLocator
-
-    plot_style.plain_log(panel)
-    panel.set_yscale("log")
-    panel.yaxis.set_minor_locator(NullLocator())  # ten decades have a hundred, and each is laid out
-    panel.yaxis.set_major_locator(LogLocator(numticks=12))
-    panel.set_ylim(0.5 * quantity.floor, 2.0 * BAND)
-    panel.axhspan(0.35 * BAND, 2.0 * BAND, color="#f4dddd", zorder=0)
-    panel.axhline(COARSE, color=plot_style.GREY, linewidth=0.9, linestyle="--", zorder=1)
-    panel.set_title("shaded: no answer to more than half", loc="right", fontsize=8, color=plot_style.GREY)
-    panel.set_title(quantity.title, loc="left", fontsize=10)
-    panel.set(xlabel=f"time of {what} [ms]", ylabel=quantity.label)
+    """One panel a quantity: median error over median time at every budget of a method."""
+    what = "a frame" if results.moving(family) else "a solve"
+    panels = []
+    for quantity in results.quantities(family):
+        lines = {name: curve(results, family, name, quantity) for name in adapters}
+        heading = f"{title}: {quantity.title}"
+        panels.append(Panel(heading, f"time of {what} [ms]", quantity.label, lines, "xy", "o", [COARSE]))
+    return chart(panels, path)
 
 
 def overview(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -119,23 +119,18 @@ class HardCase:
         return kind in self.also or (kind == self.expected and (kind != "honest" or miss <= self.near))
 
 
-class Group:
-    """Cases under one heading, in the order of reports."""
+QUESTIONS: dict[str, Callable[[], Question]] = {}
+"""What each case asks, by its name."""
 
-    def __init__(self, title: str, **shared: Any) -> None:
-        """Begin with none; `shared` are attributes that all of them have."""
-        self.title, self.shared = title, shared
-        self.cases: list[HardCase] = []
 
-    def case(self, name: str, title: str, *, why: str, acceptable: str, **facts: Any) -> Callable[[_Ask], _Ask]:
-        """Make the case that asks what the decorated function returns; `facts` are further attributes."""
+def asks(name: str) -> Callable[[_Ask], _Ask]:
+    """Make the decorated function the question of a case; `cases.toml` has all else of it."""
 
-        def added(question: _Ask) -> _Ask:
-            facts.update(self.shared)
-            self.cases.append(HardCase(name, self.title, title, why, acceptable, question, **facts))
-            return question
+    def kept(question: _Ask) -> _Ask:
+        QUESTIONS[name] = question
+        return question
 
-        return added
+    return kept
 
 
 def still(target: tuple[float, float, float], count: int) -> tuple[Frame, ...]:

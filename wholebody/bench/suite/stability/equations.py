@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from functools import partial
+from math import inf, nan
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.bodies import Builder, planar_arm, spatial_arm
-from wholebody.bench.suite.stability.case import FRAME, Group, Nonsense, Posed
+from wholebody.bench.suite.stability.case import FRAME, Nonsense, Posed, asks
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box
 from wholebody.methods.solve import as_method
@@ -18,26 +19,13 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.drag import Drag
 
-LOOPS = Group("Loops and shared joints")
-NUMBERS = Group("Numbers")
-
 BAR = np.array([-1.0, 1.1, 0.9, 0.3])
 """Start of a four-bar linkage, an arm in a plane whose tip is held."""
 
-ARMS = 12
 BENT = np.array([-0.6, 0.8, 0.5])
-NAN, INFINITE = float("nan"), float("inf")
 
 
-@LOOPS.case(
-    "redundant-loop",
-    "Redundant loop",
-    why="A linkage in a plane is closed by holding its last link: six equations, of which three say the same as the "
-    "plane, and all of them twice. The Jacobian has twelve rows of rank three: normal equations without care are "
-    "singular.",
-    acceptable="Solved: one degree of freedom is left and the goal lies on its way. Or a clear refusal.",
-    also=("refusal",),
-)
+@asks("redundant-loop")
 def redundant_loop() -> Posed:
     """The crank's end is to go where it is after a turn that the loop allows."""
     figure, start = planar_arm((0.3, 0.5, 0.4, 0.1), 0.02), BAR
@@ -48,17 +36,7 @@ def redundant_loop() -> Posed:
     return Posed(Problem(scene, start, goals=[goal], constraints=[Hold("tip"), Hold("tip")]))
 
 
-@LOOPS.case(
-    "inconsistent-loop",
-    "Inconsistent loop",
-    why="The end of a chain is held at two places 5 cm apart. No posture keeps both: a hard equality has no solution.",
-    acceptable="An honest answer that says so (the least that can be missed is 25 mm), or a clear refusal.",
-    expected="honest",
-    best=None,
-    can_hold=False,
-    also=("refusal",),
-    near=np.inf,
-)
+@asks("inconsistent-loop")
 def inconsistent_loop() -> Posed:
     """Both places are within reach."""
     figure, start = planar_arm((0.3, 0.5, 0.4, 0.1), 0.02), BAR
@@ -70,21 +48,15 @@ def inconsistent_loop() -> Posed:
     return Posed(Problem(scene, start, goals=[goal], constraints=holds))
 
 
-@LOOPS.case(
-    "dense-column",
-    "Dense column",
-    why="Twelve arms share one hub, and each has a goal. Every goal depends on the hub: its columns of the Jacobian "
-    "are full, and the normal equations of a sparse method fill up with them.",
-    acceptable="Solved: all goals were taken from one posture.",
-)
+@asks("dense-column")
 def dense_column() -> Posed:
     """A hub that slides and turns."""
     figure = _star()
     scene = Scene(figure)
-    start = np.array([0.0, 0.0, 0.0] + [0.4, 0.8] * ARMS)
-    witness = start + np.array([0.15, 0.1, 0.4] + [0.2, -0.4] * ARMS)
+    start = np.array([0.0, 0.0, 0.0] + [0.4, 0.8] * 12)
+    witness = start + np.array([0.15, 0.1, 0.4] + [0.2, -0.4] * 12)
     state = scene.state(witness)
-    goals = [Point(f"tip{k}", state.frame(figure.frame_id(f"tip{k}")).translation.copy()) for k in range(1, ARMS + 1)]
+    goals = [Point(f"tip{k}", state.frame(figure.frame_id(f"tip{k}")).translation.copy()) for k in range(1, 13)]
     return Posed(Problem(scene, start, goals=goals))
 
 
@@ -93,8 +65,8 @@ def _star() -> Figure:
     slide = builder.joint("px", "slide_x")
     slide = builder.joint("pz", "slide_z", parent=slide)
     hub = builder.joint("ry", "hub", parent=slide)
-    for k in range(ARMS):
-        angle = 2.0 * np.pi * k / ARMS
+    for k in range(12):
+        angle = 2.0 * np.pi * k / 12
         rim = 0.15 * np.array([np.cos(angle), 0.0, -np.sin(angle)])
         upper = builder.joint("ry", f"upper{k + 1}", parent=hub, at=rim)
         builder.model.jointPlacements[upper] = pin.SE3(pin.utils.rotate("y", angle), rim)
@@ -113,32 +85,13 @@ def _scaled(size: float) -> Posed:
     return Posed(Problem(scene, np.array([-0.9, 0.3, 0.2]), goals=[goal]))
 
 
-NUMBERS.case(
-    "1-cm-scale",
-    "An arm of 1 cm",
-    why="Everything is a hundredth of the usual size: a tolerance of 0.1 mm is a whole link, and damping, trust "
-    "regions and contact distances in metres are as large as the arm.",
-    acceptable="Solved to 10 µm.",
-    tolerance=1e-5,
-)(partial(_scaled, 0.01))
+asks("1-cm-scale")(partial(_scaled, 0.01))
 
 
-NUMBERS.case(
-    "100-m-scale",
-    "An arm of 100 m",
-    why="Everything is a hundred times the usual size: 0.1 mm is a millionth of the arm, steps bounded to centimetres "
-    "never arrive, and contact queries within centimetres see nothing.",
-    acceptable="Solved to 0.1 mm.",
-)(partial(_scaled, 100.0))
+asks("100-m-scale")(partial(_scaled, 100.0))
 
 
-@NUMBERS.case(
-    "goal-1e-12-away",
-    "A goal 1e-12 m away",
-    why="The goal is a picometre from where the tip is: differences drown in rounding, lengths divide by nearly "
-    "nothing.",
-    acceptable="Solved at once.",
-)
+@asks("goal-1e-12-away")
 def tiny_difference() -> Posed:
     """From a bent arm."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3)))
@@ -146,66 +99,36 @@ def tiny_difference() -> Posed:
     return Posed(Problem(scene, BENT, goals=[Point("tip", tip + (1e-12, 0.0, 0.0))]))
 
 
-@NUMBERS.case(
-    "weight-1e-12",
-    "A goal of weight 1e-12",
-    why="The only goal has the weight 1e-12: where goals are costs beside others, it is lost among tolerances.",
-    acceptable="Solved: a goal is met if it can be, whatever its weight.",
-)
+@asks("weight-1e-12")
 def tiny_weight() -> Posed:
     """Within easy reach."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3)))
     return Posed(Problem(scene, BENT, goals=[Point("tip", (0.7, 0.0, 0.5), weight=1e-12)]))
 
 
-@NUMBERS.case(
-    "not-a-number",
-    "NaN and infinity",
-    why="NaN passes every comparison: a check like `error > tolerance` lets it through, and it comes out of the method "
-    "as a posture of NaN or an endless loop.",
-    acceptable="A clear refusal of each: an InputError that says where and how to correct it.",
-    expected="refusal",
-    best=None,
-)
+@asks("not-a-number")
 def not_numbers() -> Nonsense:
     """A start, a goal, a goal in the middle of a drag, a thing's place, and the method's own tolerance."""
     return Nonsense(
         {
-            "NaN in the start": lambda adapter: _solve(adapter, start=NAN),
-            "NaN in a goal": lambda adapter: _solve(adapter, goal=NAN),
-            "infinity in a goal": lambda adapter: _solve(adapter, goal=INFINITE),
-            "NaN in a thing's place": lambda adapter: _solve(adapter, box=NAN),
-            "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((NAN, 0.0, 0.5)),
+            "NaN in the start": lambda adapter: _solve(adapter, start=nan),
+            "NaN in a goal": lambda adapter: _solve(adapter, goal=nan),
+            "infinity in a goal": lambda adapter: _solve(adapter, goal=inf),
+            "NaN in a thing's place": lambda adapter: _solve(adapter, box=nan),
+            "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((nan, 0.0, 0.5)),
             "NaN in where a drag is": _step_from_nowhere,
-            "NaN as tolerance": lambda adapter: adapter.make(NAN, None).solve(_reach()),
+            "NaN as tolerance": lambda adapter: adapter.make(nan, None).solve(_reach()),
         }
     )
 
 
-@NUMBERS.case(
-    "two-iterations",
-    "A budget of two iterations",
-    why="The method may take two iterations for a reach across a table: it is stopped anywhere, and has to know it.",
-    acceptable="An honest answer of what was reached, outside of the table and within limits.",
-    expected="honest",
-    near=np.inf,
-    also=("solved", "refusal"),
-)
+@asks("two-iterations")
 def few_iterations() -> Posed:
     """An arm of six joints over a table."""
     return Posed(_across(), iterations=2)
 
 
-@NUMBERS.case(
-    "qp-iteration-limit",
-    "A QP that hits its iteration limit",
-    why="OSQP may take five iterations for each quadratic program, and everything that would finish its answer exactly "
-    "is taken away: every step is built on an answer that is none. Methods without such programs get one iteration.",
-    acceptable="An honest answer, outside of the table and within limits; or solved all the same.",
-    expected="honest",
-    near=np.inf,
-    also=("solved", "refusal"),
-)
+@asks("qp-iteration-limit")
 def qp_limit() -> Posed:
     """The same reach."""
     return Posed(_across(), hindered=True)
@@ -225,7 +148,7 @@ def _solve(adapter: Adapter, **changed: float) -> object:
 
 
 def _step_from_nowhere(adapter: Adapter) -> object:
-    return as_method(adapter.make(1e-5, None)).tracker(_reach(), FRAME).step(np.array([-0.6, NAN, 0.5]))
+    return as_method(adapter.make(1e-5, None)).tracker(_reach(), FRAME).step(np.array([-0.6, nan, 0.5]))
 
 
 def _across() -> Problem:
