@@ -16,8 +16,7 @@ from typing import Any
 from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import write_rows, write_text
+from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import command, count, listed, measuring, option, publish, publish_page, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
 

@@ -12,9 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody.base.errors import FileFormatError
-from wholebody.bench.machine import machine, sentence
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import filled, of, read_rows, replace_section, write_rows
+from wholebody.bench.tables import filled, machine, of, read_rows, replace_section, sentence, write_rows
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
 

@@ -16,9 +16,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from wholebody.bench.machine import sentence
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import summed_programs
+from wholebody.bench.tables import sentence, summed_programs
 
 if TYPE_CHECKING:
     from jinja2 import Environment

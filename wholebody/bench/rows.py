@@ -15,8 +15,8 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from wholebody.bench import plot_style
-from wholebody.bench.machine import sentence
 from wholebody.bench.statistics import Interval
+from wholebody.bench.tables import sentence
 
 Figure = float | int | str | Interval
 _R = TypeVar("_R")

@@ -70,10 +70,9 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
-    from wholebody.bench.machine import machine
     from wholebody.bench.measure.frames import drag_rows, frame_panels, is_clean
     from wholebody.bench.rows import chart, report
-    from wholebody.bench.tables import write_rows, write_text
+    from wholebody.bench.tables import machine, write_rows, write_text
     from wholebody.cli.picture import make_folder
     from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named

@@ -33,9 +33,8 @@ exit code: 1 if a frame overlaps by more than the tolerance, passes through some
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.machine import machine
     from wholebody.bench.measure.frames import is_held, loop_report
-    from wholebody.bench.tables import write_text
+    from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.tracking import SCENES, build_scene
     from wholebody.tracking.loop import OVERLAPS

@@ -41,9 +41,8 @@ exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.machine import machine
     from wholebody.bench.measure.frames import world_report
-    from wholebody.bench.tables import write_text
+    from wholebody.bench.tables import machine, write_text
     from wholebody.cli.tables import print_rows
     from wholebody.dynamics.scenes import WORLD_SCENES
 

@@ -11,9 +11,8 @@ import pytest
 from tests.bench.following import followed
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.figure_track import figure_tracks
 from wholebody.bench.measure.step import taking
-from wholebody.bench.measure.track import CLEARANCE, Track, judge
+from wholebody.bench.measure.track import CLEARANCE, Track, figure_tracks, judge
 from wholebody.bench.suite.adapters.registry import installed_tools, make_tool
 from wholebody.cli import main
 

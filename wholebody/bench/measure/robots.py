@@ -26,8 +26,6 @@ if TYPE_CHECKING:
     from wholebody.scene.scene import Scene
 
 LONGEST = 300.0  # s: after which a description is given up
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
-"""How far from the default posture towards a random one a target's posture is: the first that is free of contact."""
 
 
 def examine(path: str, reaches: int) -> dict[str, Figure]:
@@ -83,7 +81,9 @@ def _free_posture(figure: Body, scene: Scene, count: int, number: int) -> Array:
 
     for draw in range(100):
         other = random_postures(figure.model, count, 7 + draw)[number]
-        for share in SHARES:
+        # How far from the default posture towards a random one a target's posture is: the first that is free of
+        # contact.
+        for share in (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625):
             q = np.asarray(pin.interpolate(figure.model, figure.neutral, other, share))
             if not len(scene.contacts(q, within=0.0).number):
                 return q

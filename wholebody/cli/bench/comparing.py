@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import InputError
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import write_rows, write_text
+from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import folders, listed, publish, quick, seed
 from wholebody.cli.command import command, count, option
 

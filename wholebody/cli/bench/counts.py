@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from wholebody.base.errors import InputError
-from wholebody.bench.machine import machine
+from wholebody.bench.tables import machine
 from wholebody.cli.bench.command import measuring, publish
 from wholebody.cli.bench.measuring import chosen
 from wholebody.cli.command import count, option

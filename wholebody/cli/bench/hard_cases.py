@@ -9,8 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import read_rows
+from wholebody.bench.tables import machine, read_rows
 from wholebody.cli.bench.command import Chart, folders, listed, measuring, publish, seed
 from wholebody.cli.command import command, count, option
 
@@ -36,16 +35,16 @@ if TYPE_CHECKING:
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
     from wholebody.bench.suite.adapters.registry import adapters, installed
-    from wholebody.bench.suite.stability import catalogue, page
-    from wholebody.bench.suite.stability.verdict import result
+    from wholebody.bench.suite.stability import catalogue
+    from wholebody.bench.suite.stability.verdict import METHODS, matrix, report, result
 
-    asked = adapters(arguments.methods or [name for name in page.METHODS if installed(name)])
+    asked = adapters(arguments.methods or [name for name in METHODS if installed(name)])
     chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
     facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
     found = result(chosen, [adapter.name for adapter in asked], cells)
     _print(found)
-    rows, text = list(found.rows.values()), page.report(found, asked, facts)
-    charts = {"stability": Chart(partial(page.matrix, found), "Cases by methods: a colour and a sign a cell")}
+    rows, text = list(found.rows.values()), report(found, asked, facts)
+    charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
     publish(
         "stability",
         text,

@@ -10,9 +10,8 @@ from pathlib import Path
 
 from wholebody.base import checks
 from wholebody.base.files import make_folder
-from wholebody.bench.machine import machine
 from wholebody.bench.rows import Panel, Row, chart, report
-from wholebody.bench.tables import write_rows
+from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
 from wholebody.cli.command import count, option
 
@@ -44,8 +43,7 @@ def _charts(name: str, panels: Sequence[Panel], caption: str) -> dict[str, Chart
 def step(arguments: argparse.Namespace) -> None:
     """Measure steps."""
     from wholebody.bench.measure import step
-    from wholebody.bench.measure.figure_track import figure_tracks
-    from wholebody.bench.measure.track import VARIANTS, track
+    from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
     from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
 
     tools = chosen_tools(arguments.tools)
@@ -282,7 +280,7 @@ def world(arguments: argparse.Namespace) -> int:
 
 def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     """What measures each part; names are checked before anything is measured."""
-    from wholebody.bench.measure import closed_forms, drops, long_run, throws
+    from wholebody.bench.measure import closed_forms, drops, throws
 
     quick = arguments.quick
     known = {drop.name: drop for drop in drops.drops()}
@@ -294,7 +292,7 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
         "closed": closed_forms.closed_forms(),
         "throws": throws.all_throws(1 if quick else 3, quick),
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
-        "long": (long_run.long_run(each) for each in (minutes,)),
+        "long": (throws.long_run(each) for each in (minutes,)),
     }
 
 

@@ -14,10 +14,9 @@ import wholebody as wb
 from tests.bench.following import followed
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.measure.track import CLEARANCE, Track, judge, track
-from wholebody.bench.suite.adapters.mjcf import mjcf
 from wholebody.bench.suite.adapters.own import MovingPoint
 from wholebody.bench.suite.adapters.registry import chosen_tools, installed_tools, make_tool, tool_differences
-from wholebody.bench.suite.adapters.urdf import Frames, own_frame
+from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 
 LIMIT = {"pink": 1e-4}
 """Radians by which a tool may exceed a limit here: pink leaves DAQP at its own tolerance."""

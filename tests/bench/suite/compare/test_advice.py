@@ -7,11 +7,9 @@ from math import inf
 import numpy as np
 import pytest
 
-from wholebody.bench.suite.compare.advice import advice, choices, standings
+from wholebody.bench.suite.compare.advice import OURS, advice, best, choices, standings
 from wholebody.bench.suite.compare.charts import curve, groups
-from wholebody.bench.suite.compare.paired import OURS, best
-from wholebody.bench.suite.compare.record import ANSWERED, FLOOR, OVERTIME, REFUSED, Record
-from wholebody.bench.suite.compare.results import EFFORT, WORST, Results
+from wholebody.bench.suite.compare.results import ANSWERED, EFFORT, FLOOR, OVERTIME, REFUSED, WORST, Record, Results
 from wholebody.bench.suite.compare.summary import summaries
 
 CASES = range(5)

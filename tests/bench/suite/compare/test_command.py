@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.suite.compare.record import Record
+from wholebody.bench.suite.compare.results import Record
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import run as group
 

@@ -14,9 +14,8 @@ from wholebody.base.errors import InputError
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.suite.compare import report as publishing
-from wholebody.bench.suite.compare.record import ANSWERED, OVERTIME, REFUSED, Record
+from wholebody.bench.suite.compare.results import ANSWERED, OVERTIME, REFUSED, Chunk, Record, Store
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.store import Chunk, Store
 from wholebody.bench.tables import read_rows
 
 FACTS = {"wholebody": "0", "processor": "a fast one", "date": "2030-01-02"}

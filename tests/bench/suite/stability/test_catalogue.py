@@ -8,10 +8,9 @@ import pytest
 from wholebody.assessment.posture import assess
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.stability.asking import ask
+from wholebody.bench.suite.stability.asking import ask, judge
 from wholebody.bench.suite.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.suite.stability.catalogue import QUICK, cases, names
-from wholebody.bench.suite.stability.judging import judge
 from wholebody.bench.suite.stability.verdict import decide
 
 FAST = (

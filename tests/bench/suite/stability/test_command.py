@@ -11,11 +11,9 @@ import pytest
 
 from wholebody.bench.suite.adapters import registry
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.stability import page
-from wholebody.bench.suite.stability.asking import Cell, ask
+from wholebody.bench.suite.stability.asking import Cell, ask, judge
 from wholebody.bench.suite.stability.catalogue import cases
-from wholebody.bench.suite.stability.judging import judge
-from wholebody.bench.suite.stability.verdict import Result, StabilityRow, result
+from wholebody.bench.suite.stability.verdict import Result, StabilityRow, report, result
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import stability
 
@@ -63,7 +61,7 @@ def found() -> Result:
 
 
 def test_the_report_tells_every_case_with_its_verdicts(found: Result) -> None:
-    text = page.report(found, adapters(METHODS), {"wholebody": "1"})
+    text = report(found, adapters(METHODS), {"wholebody": "1"})
     for case in found.cases:
         assert f"### {case.title}\n\n{case.why}\n\n*Acceptable.* {case.acceptable}" in text
     assert "| ● honest best effort: best known | `qp` |" in text

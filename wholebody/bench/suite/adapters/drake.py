@@ -23,13 +23,7 @@ from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-SHARE = 0.25  # of the tolerance, to which goals and holds are asked: a box of this half width, and an angle
-ROOM = 2e-5  # m: kept beyond clearances; drake's distances of hulls and ellipsoids are exact to about this
-INFLUENCE = 0.01  # m: pairs nearer than this beyond the clearance take part: drake's default
-RESTING = 4e-5  # m: by which pairs that rest may be nearer: the smooth maximum of two of them is above each
-NEAR_TURN = 0.5  # rad: within which axes at right angles tell an orientation apart from its opposites
 SLAB = 50.0  # m: edges of the box that stands for a half-space
-ITERATIONS = 500  # most of SNOPT's major ones
 
 
 def drake_adapter() -> Adapter:
@@ -62,8 +56,9 @@ class Drake(OneCall["_Plant"]):
 
     def found(self, built: _Plant, problem: Problem) -> tuple[Array | None, bool]:
         """The answer of the program."""
-        program = _Program(built, problem, SHARE * self.tolerance)
-        iterations = ITERATIONS if self.iterations is None else self.iterations
+        # of the tolerance, to which goals and holds are asked: a box of this half width, and an angle
+        program = _Program(built, problem, 0.25 * self.tolerance)
+        iterations = 500 if self.iterations is None else self.iterations  # most of SNOPT's major ones
         return program.solved(problem.scene.figure.clamp(problem.start), iterations)
 
 
@@ -87,7 +82,8 @@ class _Plant:
         self._addresses: list[tuple[str, Any]] = []
         for index in range(1, self._model.njoints):
             self._add_joint(index)
-        self.least = problem.clearance + ROOM
+        # m: kept beyond clearances; drake's distances of hulls and ellipsoids are exact to about this
+        self.least = problem.clearance + 2e-5
         self._pieces: dict[tuple[int, float], Any] = {}
         pairs = self._paired(problem)
         self.plant.Finalize()
@@ -159,7 +155,8 @@ class _Plant:
                 pairs.append(
                     (
                         self._piece(pieces, pair.first, 0.0),
-                        self._piece(pieces, pair.second, lower + RESTING if surface and lower > 0.0 else 0.0),
+                        # m: by which pairs that rest may be nearer: the smooth maximum of two of them is above each
+                        self._piece(pieces, pair.second, lower + 4e-5 if surface and lower > 0.0 else 0.0),
                     )
                 )
         return pairs
@@ -195,7 +192,8 @@ class _Program:
         with TOOL:
             self._ik = InverseKinematics(plant.plant, plant.context)
             if plant.paired:
-                self._ik.AddMinimumDistanceLowerBoundConstraint(plant.least, INFLUENCE)
+                # m: pairs nearer than this beyond the clearance take part: drake's default
+                self._ik.AddMinimumDistanceLowerBoundConstraint(plant.least, 0.01)
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
                 place = problem.scene.model.frames[goal.place.frame].placement * pin.SE3(
@@ -262,7 +260,8 @@ class _Program:
         from pydrake.math import RotationMatrix
 
         there, here = (self._plant.bodies[at.joint].body_frame() for at in (residual.base, residual.place))
-        self._ik.AddOrientationConstraint(there, RotationMatrix(wanted), here, RotationMatrix(own), NEAR_TURN)
+        # rad: within which axes at right angles tell an orientation apart from its opposites
+        self._ik.AddOrientationConstraint(there, RotationMatrix(wanted), here, RotationMatrix(own), 0.5)
         for axis in range(3):  # its cosine is flat where it is met: right angles between axes are exact
             right = 0.5 * np.pi
             self._ik.AddAngleBetweenVectorsConstraint(

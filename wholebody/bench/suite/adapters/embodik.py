@@ -18,14 +18,9 @@ from wholebody.methods.base import named_terms
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 
-STEP = 0.01  # s: its examples' time step
 DAMPING = 0.1  # its examples'
 GAIN = 10.0  # 1/s: its examples', for positions and orientations
-POSTURE = 1e-2  # its examples' weight of the posture task, which ranks below the goals
 LARGER, AT = 10.0, 0.02  # its examples' largest factor on the time step, and m of error from which it grows
-ROWS = 5  # collision rows: the most that its documentation recommends
-ITERATIONS = 1000  # most steps: near a goal, one makes up for a tenth of what is left
-PATIENCE = 5  # calls without motion before it counts as at rest: its joint limits give way after three
 
 
 def embodik_adapter() -> Adapter:
@@ -49,7 +44,8 @@ class EmbodikLoop(Loop):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
-        super().__init__(tolerance, ITERATIONS if iterations is None else iterations)
+        # most steps: near a goal, one makes up for a tenth of what is left
+        super().__init__(tolerance, 1000 if iterations is None else iterations)
 
     def build(self, problem: Problem) -> Stepper:
         """Write and read the model."""
@@ -78,7 +74,7 @@ class _EmbodikStepper:
             self._read()
         problem = self._problem
         self._solver = solver = embodik.KinematicsSolver(self._robot)
-        solver.dt = STEP
+        solver.dt = 0.01  # s: its examples' time step
         solver.set_damping(DAMPING)
         solver.set_tolerance(DAMPING)
         self._options, self._targets = embodik.PositionStepOptions(), list[Any]()
@@ -86,7 +82,8 @@ class _EmbodikStepper:
             self._goal(goal)
         for cost in posture_costs(problem)[-1:]:
             task = solver.add_posture_task("posture")
-            task.priority, task.weight, task.solve_mode = 1, POSTURE, embodik.TaskSolveMode.MIN_ERROR
+            # its examples' weight of the posture task, which ranks below the goals
+            task.priority, task.weight, task.solve_mode = 1, 1e-2, embodik.TaskSolveMode.MIN_ERROR
             task.set_target_configuration(self._theirs(cost.reference))
             task.set_joint_weights(self._spread(cost.weights))
         options = self._options
@@ -105,7 +102,7 @@ class _EmbodikStepper:
 
         del weight, damping  # its posture task ranks below the goals, and its damping is its own
         theirs = self._theirs(q)
-        for _ in range(PATIENCE):
+        for _ in range(5):  # calls without motion before it counts as at rest: its joint limits give way after three
             self._options.continuity_command_revision += 1  # a new command: it holds still 0.3 mm from an old one
             with TOOL:
                 answer = self._solver.solve_position_step(theirs, self._targets, self._options)
@@ -144,7 +141,8 @@ class _EmbodikStepper:
         usual = Counter(asked.values()).most_common(1)[0][0]
         self._solver.configure_collision_constraint(
             min_distance=usual, include_pairs=[(f"{first}_0", f"{second}_0") for first, second in asked],
-            nearest_points_all_pairs=False, max_constraints=ROWS,
+            # collision rows: the most that its documentation recommends
+            nearest_points_all_pairs=False, max_constraints=5,
         )  # fmt: skip
         for (first, second), distance in asked.items():
             if distance != usual:

@@ -24,8 +24,7 @@ from wholebody.bench.suite.adapters.loop import (
     posture_costs,
     size,
 )
-from wholebody.bench.suite.adapters.mjcf import ROOT, mjcf
-from wholebody.bench.suite.adapters.urdf import Frames, own_frame
+from wholebody.bench.suite.adapters.urdf import ROOT, Frames, mjcf, own_frame
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem

@@ -17,9 +17,6 @@ from wholebody.bench.suite.adapters.urdf import add_model_joint
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 
-SHARE = 0.5  # of the tolerance, whose square is optik's bound of the squared error
-LONGEST = 1.0  # s: of its restarts
-
 
 def optik_adapter() -> Adapter:
     """The method: `Robot.ik` of optik."""
@@ -99,7 +96,9 @@ class _Chain:
         """A posture (nq,) whose frame is at a target; None if none is found."""
         import optik
 
-        settings = optik.SolverConfig(solution_mode="speed", max_time=LONGEST, tol_f=(SHARE * tolerance) ** 2)
+        # of the tolerance, whose square is optik's bound of the squared error
+        # s: of its restarts
+        settings = optik.SolverConfig(solution_mode="speed", max_time=1.0, tol_f=(0.5 * tolerance) ** 2)
         with TOOL:
             answer: Any = self._robot.ik(settings, target.homogeneous, q[self._places], self._tip)
         if answer is None:

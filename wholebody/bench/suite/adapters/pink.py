@@ -20,7 +20,6 @@ from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
 
-GAIN = 1.0  # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot come back
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step of a reach
 
@@ -99,7 +98,9 @@ class _PinkStepper:
             [
                 SelfCollisionBarrier(
                     min(NEAREST, pairs),
-                    gain=OUT if room else GAIN,
+                    # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot
+                    # come back
+                    gain=OUT if room else 1.0,
                     safe_displacement_gain=self._safe,
                     d_min=self._least + room,
                 )

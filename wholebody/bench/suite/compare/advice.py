@@ -1,18 +1,84 @@
-"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one."""
+"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one.
+
+Methods are compared on the problems that both were given, by the ratio of two figures with its interval: medians over
+different problems say nothing of two methods, and a ratio whose interval holds 1 names no winner.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
 from wholebody.bench.report import spanned, words
-from wholebody.bench.statistics import LEVEL, NOTHING, Interval, paired_difference, ratio
-from wholebody.bench.suite.compare import paired
-from wholebody.bench.suite.compare.paired import OURS, named
-from wholebody.bench.suite.compare.record import COARSE
-from wholebody.bench.suite.compare.results import Results, middle
+from wholebody.bench.statistics import LEAST, LEVEL, NOTHING, Interval, paired_difference, ratio
+from wholebody.bench.suite.compare.results import COARSE, FLOOR, WORST, Results, effort_excess, middle
 from wholebody.bench.suite.compare.summary import GOOD, Summary
+
+OURS = "qp"
+"""Our default method; "qp/..." is the same method with other settings for its programs."""
+
+Figures = Mapping[tuple[str, int], float]
+"""One positive figure a problem, by the name of its set and its number."""
+
+
+def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
+    """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
+
+    A method that has too few problems in common with the least is left out. Where the least itself has too few problems
+    to compare with anybody, nobody is told apart.
+    """
+    order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
+    if order and len(found[order[0]]) < LEAST:
+        return tuple(order)
+    for first in order:
+        others = {name: ratio(found[name], found[first]) for name in order if name != first}
+        if not any(each.high < 1.0 for each in others.values()):
+            return first, *(name for name, each in others.items() if each.cases >= LEAST and each.low <= 1.0)
+    return tuple(order[:1])
+
+
+def times(results: Results, families: Sequence[str], adapter: str) -> Figures:
+    """Return the seconds of a method for every problem of some sets that it solves at the default budget."""
+    return {
+        (family, record.number): max(record.seconds, 1e-9)
+        for family in families
+        for record in results.taken(family, adapter)
+        if record.success(COARSE)
+    }
+
+
+def efforts_of(results: Results, family: str, adapter: str) -> Figures:
+    """Return the effort above the best known, as a share, for every problem that a method solves."""
+    found = {
+        (family, record.number): effort_excess(record, results.best(record))
+        for record in results.default(family, adapter)
+        if record.answered
+    }
+    return {key: value for key, value in found.items() if isfinite(value)}
+
+
+def errors_of(results: Results, family: str, adapter: str) -> Figures:
+    """Return the worst errors of a method at the budget where their median is least, on what it solved at all."""
+    cases = results.swept(family, adapter)
+    chosen: dict[tuple[str, int], float] = {}
+    least = inf
+    for level in results.levels(family, adapter):
+        _, values = results.values(family, adapter, level, WORST, cases)
+        if len(values) and middle(values) < least:
+            least = middle(values)
+            chosen = {(family, number): float(value) for number, value in zip(sorted(cases), values, strict=True)}
+    return {key: max(value, FLOOR) if isfinite(value) else 1.0 for key, value in chosen.items()}
+
+
+def named(adapters: Sequence[str]) -> str:
+    """Return methods in words; several settings of our default method are listed behind its name."""
+    ours = [name for name in adapters if f"{name}/".startswith(f"{OURS}/")]
+    if len(ours) < 2:
+        return ", ".join(f"`{name}`" for name in adapters)
+    listed = f"`{OURS}` (any of {', '.join(f'`{name}`' for name in ours)})"
+    names = dict.fromkeys(listed if name in ours else f"`{name}`" for name in adapters)
+    return ", ".join(names)
 
 
 class Choice(NamedTuple):
@@ -74,11 +140,11 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     }
     order = sorted(solved, key=lambda name: -sum(solved[name].values()))
     leading = tuple(name for name in order if paired_difference(solved[order[0]], solved[name]) > 1.0 - LEVEL)
-    fast = paired.best({name: paired.times(results, [family], name) for name in good})
-    errors = {name: paired.errors(results, family, name) for name in good}
-    exact = paired.best(errors)
-    efforts = {name: paired.efforts(results, family, name) for name in good} if not results.moving(family) else {}
-    cheap = paired.best(efforts)
+    fast = best({name: times(results, [family], name) for name in good})
+    errors = {name: errors_of(results, family, name) for name in good}
+    exact = best(errors)
+    efforts = {name: efforts_of(results, family, name) for name in good} if not results.moving(family) else {}
+    cheap = best(efforts)
     return Choice(
         family,
         fast, next((row.median_ms.value for row in rows if fast and row.method == fast[0]), nan),
@@ -95,7 +161,7 @@ def reference(results: Results) -> str:
 
 def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
     """All methods, the most dependable first, and of equal ones the fastest."""
-    base = paired.times(results, results.sets, reference(results))
+    base = times(results, results.sets, reference(results))
     found = []
     for adapter in results.adapters:
         mine = [row for row in rows if row.method == adapter]
@@ -110,7 +176,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
                 worst.success if worst else NOTHING,
-                ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
+                ratio(times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
             )
@@ -124,7 +190,7 @@ def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
     most = max((one.dependable for one in ranked), default=0)
     if most:
         names = [one.method for one in ranked if one.dependable == most]
-        alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
+        alike = best({name: times(results, results.sets, name) for name in names})
         lowest = min(row.success.low for row in rows if row.method in alike and row.dependable)
         said.append(
             f"**If in doubt, take {named(alike)}:** at least {100 * GOOD:.0f} % of the problems given are solved in "

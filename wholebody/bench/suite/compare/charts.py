@@ -14,9 +14,8 @@ import numpy as np
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import method_style
 from wholebody.bench.rows import Panel, chart
-from wholebody.bench.suite.compare.paired import OURS
-from wholebody.bench.suite.compare.record import COARSE
-from wholebody.bench.suite.compare.results import Quantity, Results, middle
+from wholebody.bench.suite.compare.advice import OURS
+from wholebody.bench.suite.compare.results import COARSE, Quantity, Results, middle
 from wholebody.bench.suite.compare.summary import Summary
 
 MOST = 6  # methods in a chart

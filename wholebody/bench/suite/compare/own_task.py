@@ -18,7 +18,7 @@ from wholebody.base.runner import ONE_THREAD, Child, EndedError, allow, allow_pr
 from wholebody.bench import rows as tables
 from wholebody.bench.rows import Figure, Panel, Row
 from wholebody.bench.suite.adapters.base import Adapter
-from wholebody.bench.suite.compare.record import ANSWERED, COARSE, DEFAULT, FAILED, OVERTIME, Record
+from wholebody.bench.suite.compare.results import ANSWERED, COARSE, DEFAULT, FAILED, OVERTIME, Record
 from wholebody.bench.suite.compare.solving import BUILDING, Ready, solve
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.problem import Problem

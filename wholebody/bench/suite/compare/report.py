@@ -8,14 +8,12 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from wholebody.bench.report import page, render
-from wholebody.bench.suite.compare.advice import advice, choices, reference, standings
+from wholebody.bench.suite.compare.advice import advice, choices, named, reference, standings
 from wholebody.bench.suite.compare.charts import chart_name, draw_all, groups
 from wholebody.bench.suite.compare.lock import NAME as LOCK
 from wholebody.bench.suite.compare.lock import locked, write_lock
-from wholebody.bench.suite.compare.paired import named
-from wholebody.bench.suite.compare.record import COARSE, DEFAULT, FLOOR
+from wholebody.bench.suite.compare.results import COARSE, DEFAULT, FLOOR, Store
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.store import Store
 from wholebody.bench.suite.compare.summary import GOOD, Material, kernel_of, left_out, material
 from wholebody.bench.tables import replace_section, write_rows, write_text
 

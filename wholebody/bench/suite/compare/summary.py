@@ -8,10 +8,19 @@ from math import inf, nan
 
 from wholebody.bench.report import words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
-from wholebody.bench.suite.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED, frame_cap
-from wholebody.bench.suite.compare.results import Results, effort_excess, middle
+from wholebody.bench.suite.compare.results import (
+    COARSE,
+    FAILED,
+    FINE,
+    OVERTIME,
+    REFUSED,
+    Chunk,
+    Results,
+    effort_excess,
+    frame_cap,
+    middle,
+)
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.store import Chunk
 from wholebody.bench.tables import filled, of, summed_programs
 
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable

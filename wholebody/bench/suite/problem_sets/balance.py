@@ -11,8 +11,10 @@ from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import (
     FEET,
     TIPS,
+    MassAbove,
     alone,
     bent,
+    fitted,
     floor_scene,
     human,
     is_free,
@@ -23,7 +25,6 @@ from wholebody.bench.suite.problem_sets.bodies import (
     until_found,
 )
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.fitting import MassAbove, fitted
 
 given = numbers("balance")
 

@@ -15,9 +15,8 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.suite.problem_sets.bodies import alone, bent, is_free, movable, until_found
+from wholebody.bench.suite.problem_sets.bodies import alone, bent, fitted, is_free, movable, until_found
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.fitting import fitted
 from wholebody.figures.postures import lowest, support
 
 given = numbers("drivers")

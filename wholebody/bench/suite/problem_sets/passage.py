@@ -11,6 +11,7 @@ from wholebody.bench.suite.problem_sets.bodies import (
     ROOM,
     alone,
     bent,
+    fitted,
     floor_scene,
     human,
     is_free,
@@ -20,7 +21,6 @@ from wholebody.bench.suite.problem_sets.bodies import (
     until_found,
 )
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.fitting import fitted
 from wholebody.bench.suite.problem_sets.things import Occupied
 
 given = numbers("passage")

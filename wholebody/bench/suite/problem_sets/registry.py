@@ -11,7 +11,6 @@ from wholebody.bench.suite.problem_sets import (
     closed_loop,
     drag,
     drivers,
-    held_out,
     passage,
     reaching,
     robot_arm,
@@ -46,9 +45,9 @@ SETS = _sets(
 
 NAMED = _sets(
     {
-        "uniform_witnesses": held_out.uniform,
-        "other_people": held_out.people,
-        "other_clutter": held_out.clutter,
+        "uniform_witnesses": reaching.uniform,
+        "other_people": reaching.people,
+        "other_clutter": reaching.clutter,
         "robots": robots.posed,
         "drivers": drivers.posed,
     }

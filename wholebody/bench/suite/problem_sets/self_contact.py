@@ -12,6 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import (
     alone,
     bent,
+    fitted,
     floor_scene,
     human,
     is_free,
@@ -20,7 +21,6 @@ from wholebody.bench.suite.problem_sets.bodies import (
     until_found,
 )
 from wholebody.bench.suite.problem_sets.case import numbers
-from wholebody.bench.suite.problem_sets.fitting import fitted
 
 given = numbers("self_contact")
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from wholebody.base.checks import known
 from wholebody.base.files import parsed_toml
-from wholebody.bench.suite.stability import equations, posed, streams  # noqa: F401
+from wholebody.bench.suite.stability import posed, streams  # noqa: F401
 from wholebody.bench.suite.stability.case import QUESTIONS, HardCase
 
 QUICK = (

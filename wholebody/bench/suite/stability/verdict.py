@@ -1,6 +1,6 @@
 """Decides what answers are worth, by rules, in order: solved, an honest best effort, a clear refusal, or WRONG.
 
-All verdicts together are a result, of which everything is drawn and written.
+All verdicts together are a result, of which the report is written and the matrix of cases and methods is drawn.
 """
 
 from __future__ import annotations
@@ -9,19 +9,17 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple, cast
+from pathlib import Path
+from typing import Any, NamedTuple, cast
 
-from wholebody.bench.suite.stability.asking import Cell
+from wholebody.bench import plot_style
+from wholebody.bench.report import render
+from wholebody.bench.suite.adapters.base import Adapter
+from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
-from wholebody.bench.suite.stability.judging import INSIDE, Judged
 from wholebody.bench.tables import filled
 
-BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
-FAST = 0.01  # share by which a joint may be faster than its bound: rounding, and steps along curves
-NOT_HELD = ("infeasible", "stalled")  # statuses that say that something may be violated
-SAME = 2e-5  # m: nearer to the best known answer than this is as good
-LEAST_SENTENCE = 15  # letters of a refusal that says anything
 
 SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "wrong": "✗"}
 WORDS: dict[Kind, str] = {
@@ -76,12 +74,13 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
     if answer.taken:
         return "takes " + ", ".join(answer.taken)
     if answer.refusal:
-        return "" if len(answer.refusal) >= LEAST_SENTENCE else f"refuses with {answer.refusal!r} only"
+        # letters of a refusal that says anything
+        return "" if len(answer.refusal) >= 15 else f"refuses with {answer.refusal!r} only"
     if case.expected == "refusal":
         return "answers"
     if not judged.finite:
         return "NaN"
-    if judged.limit_violation > BEYOND:
+    if judged.limit_violation > 1e-6:  # rad, m: farther than this is out of limits
         return f"{judged.limit_violation:.2g} rad out of limits"
     if judged.passed:
         return f"{length(judged.dip)} inside on the way: {judged.passed}"
@@ -90,13 +89,14 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
 
 def _missed(case: HardCase, answer: Answer, judged: Judged) -> str:
     """What lengths tell: overlap, constraints, speed, and what the method says of them."""
-    doubts = answer.status in NOT_HELD
+    doubts = answer.status in ("infeasible", "stalled")  # statuses that say that something may be violated
     allowed = judged.start_penetration + INSIDE if doubts else INSIDE
     if judged.penetration > allowed:
         return f"{length(judged.penetration)} inside{_said(answer)}"
     if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
         return f"a constraint missed by {length(judged.constraint_violation)} (or mrad){_said(answer)}"
-    if judged.speed_excess > FAST:
+    # share by which a joint may be faster than its bound: rounding, and steps along curves
+    if judged.speed_excess > 0.01:
         return f"{1.0 + judged.speed_excess:.1f} times too fast"
     if answer.status == "solved" and judged.goal_error > case.tolerance:
         return f"claims solved, {length(judged.goal_error)} left"
@@ -117,7 +117,8 @@ def _short(judged: Judged, known: float | None, miss: float) -> str:
         return f"{length(judged.penetration)} inside, not deeper"
     if not known:
         return f"{length(judged.goal_error)} left"
-    return "best known" if miss <= SAME else f"+{length(miss)}"
+    # m: nearer to the best known answer than this is as good
+    return "best known" if miss <= 2e-5 else f"+{length(miss)}"
 
 
 def length(metres: float) -> str:
@@ -231,3 +232,52 @@ def _known(cells: Iterable[Cell]) -> dict[str, float]:
             name = cell.case.name
             found[name] = min(found.get(name, math.inf), cell.judged.goal_error)
     return found
+
+
+METHODS = ("qp", "qp/osqp", "newton/slack", "newton/barrier", "ccd", "dls", "placo", "pink", "mink")
+"""One or two of each algorithm, for a chart that can be read; others are asked by name."""
+
+COLORS = {
+    "✓": ("#8fd0b5", "solved"),
+    "●": ("#f6ec9c", "honest, as good as can be"),
+    "○": ("#fbf7d9", "honest, a better answer exists"),
+    "–": ("#d9d9d9", "clear refusal"),
+    "✗": ("#e8794a", "WRONG"),
+}
+"""Told apart by people with any colour vision, and by their signs in print."""
+
+
+def report(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str]) -> str:
+    """The counts, the cases by methods, every case in words, and every wrong answer."""
+    return render("stability.md", result=result, kinds=WORDS, adapters=adapters, facts=facts)
+
+
+def matrix(result: Result, path: Path) -> tuple[Path, Path]:
+    """Draw all verdicts; return the paths of the SVG and the PNG."""
+    width = max(8.0, 3.1 + 0.6 * len(result.methods))
+    chart, axes = plot_style.figure(1, 1, (width, 1.5 + 0.22 * len(result.cases)))
+    axis = axes[0][0]
+    for row, case in enumerate(result.cases):
+        for column, method in enumerate(result.methods):
+            _cell(axis, row, column, result.verdicts[case.name, method].symbol)
+    axis.set(xlim=(-0.5, len(result.methods) - 0.5), ylim=(len(result.cases) - 0.5, -0.5))
+    axis.set_xticks(range(len(result.methods)), [name.replace("/", "\n") for name in result.methods], fontsize=8.5)
+    axis.xaxis.tick_top()
+    axis.set_yticks(range(len(result.cases)), [case.title for case in result.cases], fontsize=8.5)
+    axis.tick_params(length=0)
+    axis.grid(visible=False)
+    for side in axis.spines.values():
+        side.set_visible(False)
+    from matplotlib.patches import Patch
+
+    handles = [Patch(facecolor=color, label=f"{symbol}  {words}") for symbol, (color, words) in COLORS.items()]
+    chart.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)
+    return plot_style.save(chart, path)
+
+
+def _cell(axis: Any, row: int, column: int, symbol: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    axis.add_patch(Rectangle((column - 0.48, row - 0.45), 0.96, 0.9, facecolor=COLORS[symbol][0], edgecolor="none"))
+    weight = "bold" if symbol == "✗" else "normal"
+    axis.text(column, row, symbol, fontsize=8, ha="center", va="center", color="#111111", fontweight=weight)
