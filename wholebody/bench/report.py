@@ -6,18 +6,14 @@ A template has the words and the columns; who calls `render` has the figures.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from functools import cache
-from itertools import groupby
 from math import isfinite
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import sentence, summed_programs
+from wholebody.bench.tables import sentence
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -71,13 +67,9 @@ def _environment(templates: Path) -> Environment:
     )
     made.filters |= {
         "f": formatted,
-        "groups": groups,
         "measured": sentence,
-        "quantile": quantile,
-        "scaled": scaled,
         "span": spanned,
         "strong": strong,
-        "summed": summed_programs,
         "upfirst": upfirst,
         "words": words,
     }
@@ -103,24 +95,6 @@ def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends
         return ""
     low, high = (formatted(scale * each, ends or spec, none="∞") for each in (found.low, found.high))
     return f"{formatted(scale * found.value, spec, unit, none='∞')} [{low}, {high}]"
-
-
-def groups(rows: Sequence[Any], name: str) -> Iterator[list[Any]]:
-    """Rows with the same value of an attribute, in the order in which the values come first."""
-    order = {value: place for place, value in enumerate(dict.fromkeys(getattr(row, name) for row in rows))}
-    for _, found in groupby(sorted(rows, key=lambda row: order[getattr(row, name)]), key=attrgetter(name)):
-        yield list(found)
-
-
-def quantile(values: Iterable[float], share: float) -> float:
-    """The quantile of some values; not a number where there are none."""
-    listed = list(values)
-    return float(np.quantile(listed, share)) if listed else float("nan")
-
-
-def scaled(value: float) -> str:
-    """A number with two digits at least, and no more than it needs; nothing for one that is not a number."""
-    return "" if value != value else f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
 
 
 def strong(count: int) -> str:

@@ -89,7 +89,7 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
     """Write a failure: the script that repeats it, and what was found."""
     place = folder / case.name
-    write_text(place / "repeat.py", SCRIPT.format(**case._asdict()))
+    write_text(place / "repeat.py", SCRIPT.format(seed=case.seed, number=case.number, kind=case.kind))
     write_text(place / "found.txt", verdict.words + "\n")
 
 

@@ -27,11 +27,11 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution, Status
 
 METHODS: tuple[Any, ...] = (
-    *("qp",) * 12,
+    *(wb.QP(),) * 12,
     wb.QP(tolerance=1e-8),
     wb.QP(measures=False),
     wb.QP(solver="daqp"),
-    *(name for name in installed_methods() if name != "qp"),
+    *(method_named(name) for name in installed_methods() if name != "qp"),
 )
 MEASURES: tuple[Any, ...] = (
     None, None, None, [], [wb.Effort(), wb.Discomfort(weight=0.1)], [wb.Displacement()],
@@ -72,7 +72,7 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
     solution = wb.solve(problem, method=method)
     seconds = process_time() - began
     found = judge(problem, terms.goals, terms.constraints, solution.q)
-    return verdict(problem, found, solution, tolerance=_tolerance(method), witness=known, seconds=seconds)
+    return verdict(problem, found, solution, tolerance=float(method.tolerance), witness=known, seconds=seconds)
 
 
 def scene_of(figure: Body, things: Sequence[Thing]) -> wb.Scene:
@@ -189,12 +189,6 @@ def _hold(
     if figure.people and rng.random() < 0.1:
         terms.feasible = False  # whether the witness balances is not looked at
         terms.constraints.append(wb.Balance() if rng.random() < 0.7 else wb.ReachCones())
-
-
-def _tolerance(method: Any) -> float:
-    """Of a method, given by name or configured, metres and radians."""
-    known: Any = method_named(method) if isinstance(method, str) else method
-    return float(known.tolerance)
 
 
 def verdict(

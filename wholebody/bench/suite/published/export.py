@@ -19,7 +19,6 @@ from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import wilson
 from wholebody.bench.suite.problem_sets.bodies import human
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet, generator
-from wholebody.bench.suite.published.answers import INDEX, VERSION, dumped
 from wholebody.bench.suite.published.bodies import BodyFiles, body_files
 from wholebody.bench.suite.published.problems import (
     away,
@@ -29,6 +28,7 @@ from wholebody.bench.suite.published.problems import (
     problem_name,
     witness_content,
 )
+from wholebody.bench.suite.published.reading import INDEX, VERSION, dumped
 from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
 
 STATIC = Path(__file__).parent / "static"

@@ -16,7 +16,7 @@ from wholebody.bench import plot_style
 from wholebody.bench.plot_style import Style, method_style
 from wholebody.bench.report import page, render, spanned, words
 from wholebody.bench.statistics import ratio
-from wholebody.bench.suite.published.answers import read_answers, read_index
+from wholebody.bench.suite.published.answers import read_answers
 from wholebody.bench.suite.published.judging import (
     ANSWERED,
     Judged,
@@ -27,6 +27,7 @@ from wholebody.bench.suite.published.judging import (
     left_out,
     set_score,
 )
+from wholebody.bench.suite.published.reading import read_index
 from wholebody.bench.suite.published.rebuilt import EXACT
 from wholebody.bench.tables import write_text
 

@@ -18,7 +18,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import read_text
-from wholebody.bench.suite.published.answers import read_json
+from wholebody.bench.suite.published.reading import read_json
 
 SOLVED = 1e-3  # m, rad: worst of goals and of all that must hold, up to which a problem counts as solved
 EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts as the best known
