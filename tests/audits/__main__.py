@@ -17,8 +17,9 @@ from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
 from wholebody.bench.tables import machine, write_rows, write_text
-from wholebody.cli.bench.command import command, count, listed, measuring, option, publish, publish_page, seed
+from wholebody.cli.bench.command import listed, measuring, publish, publish_page, seed
 from wholebody.cli.bench.measuring import CLIPS, chosen, clips
+from wholebody.cli.command import command, count, option
 
 QUICK = 45  # quadratic programs
 
