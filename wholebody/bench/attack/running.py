@@ -17,15 +17,15 @@ from pathlib import Path
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs
-from wholebody.bench.attack import arguments, contacts, files, solves, streams, sweeps
+from wholebody.bench.attack import arguments, contacts, files, solves, ways
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 
 CASES = {
     "argument": arguments.case,
     "file": files.case,
     "solve": solves.case,
-    "stream": streams.case,
-    "sweep": sweeps.case,
+    "stream": ways.stream,
+    "sweep": ways.sweep,
     "contact": contacts.case,
 }
 

@@ -14,9 +14,8 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.base import Adapter, few
+from wholebody.bench.suite.adapters.base import Adapter, OneCall, few
 from wholebody.bench.suite.adapters.loop import kept_apart, placements, posture_costs
-from wholebody.bench.suite.adapters.one_call import OneCall
 from wholebody.bench.suite.adapters.urdf import axis_of
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem

@@ -11,7 +11,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.bench.suite.adapters.one_call import Outside
+from wholebody.bench.suite.adapters.base import Outside
 from wholebody.figures.figure import Figure
 from wholebody.methods import differential
 from wholebody.methods.base import named_terms

@@ -11,8 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
-from wholebody.bench.suite.adapters.base import Adapter
-from wholebody.bench.suite.adapters.one_call import OneCall
+from wholebody.bench.suite.adapters.base import Adapter, OneCall
 from wholebody.bench.suite.adapters.urdf import add_model_joint
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
