@@ -24,6 +24,7 @@ import wholebody as wb
 from wholebody import tracking
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.figures.state import State
+from wholebody.geometry.shapes import Compound
 from wholebody.motion import measures
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
 from wholebody.view import Viewer
@@ -372,6 +373,9 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "ReachCones", Call(wb.ReachCones, {"names": ["left_shoulder"]}, on_a_person)
     yield "RangeOfMotion", Call(wb.RangeOfMotion, {"names": ["neck"]}, on_a_person)
     yield "Cylinder", Call(wb.Cylinder, {"radius": 0.1, "length": 0.2}, lambda shape: shape.pieces())
+    parts = ((wb.Sphere(0.1), pin.SE3.Identity()),)
+    yield "Compound", Call(Compound, {"parts": parts}, lambda shape: shape.pieces())
+    yield "Compound.pieces", Call(Compound(parts).pieces, {})
     yield "Torus", Call(wb.Torus, {"radius": 0.1, "tube": 0.02}, lambda shape: shape.pieces())
     task = wb.read_task(path / "task.toml")
     given = {"problem": task.problem, "path": path / "written.toml", "title": "one line"}
@@ -437,6 +441,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Assessment.met", Call(judged.met, {"tolerance": 0.1})
     yield "Assessment.summary", Call(judged.summary, {})
     yield "read_task", Call(wb.read_task, {"path": path / "task.toml"})
+    (path / "cell.xml").write_text(
+        '<mujoco><worldbody><body name="arm"><joint name="j"/><geom size="0.1"/></body></worldbody></mujoco>'
+    )
+    yield "read_scene", Call(wb.read_scene, {"path": path / "cell.xml", "root": "arm", "concavity": None})
 
     used = partial(easily, path)
     settings = {

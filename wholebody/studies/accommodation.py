@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
-from wholebody.figures.anthropometry import STATURE_RANGE, table
+from wholebody.figures.anthropometry import STATURE, table
 from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.records import Records
@@ -76,7 +76,7 @@ def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[st
         mean, deviation = _statures(sex)
         for k in range(count):
             part = (k + 0.5) / count
-            stature = float(np.clip(mean + deviation * ndtri(part), *STATURE_RANGE))
+            stature = float(np.clip(mean + deviation * ndtri(part), STATURE.low, STATURE.high))
             found[f"{sex} P{100.0 * part:.3g}"] = {"sex": sex, "stature": stature}
     if not found:
         raise InputError("people: sexes is empty; give 'male', 'female' or both")

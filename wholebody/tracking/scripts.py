@@ -54,7 +54,7 @@ class ScenePlan:
         """
         if frames is not None:
             frames = whole(frames, "frames", 1, MOST_FRAMES)
-        SEED.check(seed, "seed")
+        SEED(seed, "seed")
         dt = number(dt, "dt", 1e-3, 1.0, "s")  # s: least and greatest from frame to frame
         figure = load(self.figure)
         track = script(figure, self.keys(figure), dt=dt, seed=seed, name=name)

@@ -94,7 +94,7 @@ def test_the_attack_goes_on_after_hangs_crashes_and_errors() -> None:
     assert "hangs" in found[1].words
     assert "SIGKILL" in found[2].words
     assert "ZeroDivisionError" in found[3].words
-    assert "Sphere radius" in found[4].words
+    assert "Sphere: radius" in found[4].words
 
 
 @pytest.mark.usefixtures("in_place_of_cases")

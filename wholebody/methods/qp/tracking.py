@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import flag, number, posture, time_step
+from wholebody.base.checks import flag, posture, time_step
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
@@ -127,7 +127,7 @@ class QPTracker(NotCopyable):
         Raises:
             InputError: as for `step`.
         """
-        enough = OF_A_FRAME if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        enough = OF_A_FRAME if tolerance is None else TOLERANCE(tolerance, "tolerance")
         exact = enough < OF_A_FRAME
         # a bound on speeds is one of the way of a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS[exact]
