@@ -8,16 +8,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, cast
+from typing import Any, NamedTuple
 
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
+from wholebody.bench.rows import Figure, Row
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
-from wholebody.bench.tables import filled
 
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
 
@@ -129,53 +128,20 @@ def length(metres: float) -> str:
 
 
 @dataclass(frozen=True)
-class StabilityRow:
-    """One method's answer to one case; errors in m and rad.
-
-    Attributes:
-        verdict: "solved", "honest", "refusal" or "wrong".
-        acceptable: whether the case accepts it.
-        figure: the worst figure, in a few words.
-        status: what the method says.
-        goal_error, best: largest goal error left, and that of the best answer known.
-        frames: postures that were judged.
-        sentence: what the method says in words, or its refusal.
-    """
-
-    case: str
-    method: str
-    verdict: str
-    acceptable: bool
-    figure: str
-    status: str
-    goal_error: float
-    best: float
-    penetration: float
-    limit_violation: float
-    constraint_violation: float
-    frames: int
-    seconds: float
-    sentence: str
-
-
-@dataclass(frozen=True)
 class Result:
     """All cells with their verdicts.
 
     Attributes:
         cases: in the order of reports.
         methods: in the order in which they were asked.
-        rows: by case's name and method.
+        verdicts: by case's name and method.
+        rows: the same with figures.
     """
 
     cases: tuple[HardCase, ...]
     methods: tuple[str, ...]
-    rows: Mapping[tuple[str, str], StabilityRow]
-
-    @cached_property
-    def verdicts(self) -> dict[tuple[str, str], Verdict]:
-        """By case's name and method."""
-        return {key: Verdict(cast(Kind, row.verdict), row.figure, row.acceptable) for key, row in self.rows.items()}
+    verdicts: Mapping[tuple[str, str], Verdict]
+    rows: tuple[Row, ...]
 
     def count(self, method: str, kind: Kind) -> int:
         """How many of a method's verdicts are of one kind."""
@@ -184,7 +150,7 @@ class Result:
     @property
     def minutes(self) -> float:
         """How long all answers took together, by the clock."""
-        return sum(row.seconds for row in self.rows.values()) / 60.0
+        return float(sum(row["seconds"] for row in self.rows)) / 60.0
 
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
@@ -210,17 +176,31 @@ def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Iterable[Ce
     placed = {(cell.case.name, cell.method): cell for cell in cells}
     best = _known(placed.values()) | {case.name: case.best for case in cases if case.best is not None}
     keys = [(case.name, method) for case in cases for method in methods]
-    return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys})
+    verdicts, rows = {}, []
+    for key in keys:
+        cell, known = placed[key], best.get(key[0])
+        verdicts[key] = decide(cell.case, cell.answer, cell.judged, known)
+        rows.append(_row(cell, verdicts[key], math.nan if known is None else known))
+    return Result(tuple(cases), tuple(methods), verdicts, tuple(rows))
 
 
-def _row(cell: Cell, best: float | None) -> StabilityRow:
-    case, answer = cell.case, cell.answer
-    verdict = decide(case, answer, cell.judged, best)
-    return filled(
-        StabilityRow, verdict, answer, cell.judged, case=case.name, method=cell.method, verdict=verdict.kind,
-        best=math.nan if best is None else best, frames=len(answer.postures),
-        sentence=answer.refusal or answer.message,
-    )  # fmt: skip
+def _row(cell: Cell, verdict: Verdict, best: float) -> Row:
+    answer, judged = cell.answer, cell.judged
+    figures: dict[str, Figure] = {
+        "verdict": verdict.kind,
+        "acceptable": verdict.acceptable,
+        "figure": verdict.figure,
+        "status": answer.status,
+        "goal error": judged.goal_error,
+        "best known": best,
+        "penetration": judged.penetration,
+        "limit violation": judged.limit_violation,
+        "constraint violation": judged.constraint_violation,
+        "frames": len(answer.postures),
+        "seconds": answer.seconds,
+        "sentence": answer.refusal or answer.message,
+    }
+    return Row(cell.case.name, cell.method, figures)
 
 
 def _known(cells: Iterable[Cell]) -> dict[str, float]:
