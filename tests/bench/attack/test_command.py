@@ -27,7 +27,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     docs, out = tmp_path / "docs", tmp_path / "out"
     docs.mkdir()
     (docs / "reliability.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
-    words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--out", str(out))
+    words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
     _, rows = read_rows(out / "attack.csv", Row)
     wrong = [row for row in rows if row.outcome == "wrong"]
