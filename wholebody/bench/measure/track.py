@@ -213,7 +213,7 @@ def judge(track: Track, postures: Array) -> Verdict:
     for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
         least.append(pairs.least)
         near.append(int((pairs.distance < WITHIN).sum()))
-        # m: a pair nearer than the clearance and this is in contact
+        # A pair nearer than the clearance and 1 mm is in contact.
         touching.append(int((pairs.distance < track.clearance + 1e-3).sum()))
         error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
         for foot, there in zip(feet, stood, strict=True):
@@ -283,7 +283,7 @@ def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tupl
             moves = np.zeros((2, figure.model.nv))
             for move, q in zip(moves, pair, strict=True):
                 move[dofs] = pin.difference(figure.model, start, q)[dofs]
-                # rad, m: that a joint moves to each of the two postures; a way of two seconds keeps the speed bound
+                # A joint moves by 1 rad or m at most to each posture: a way of two seconds keeps the speed bound.
                 move *= share * min(1.0, 1.0 / max(float(np.abs(move).max()), 1e-12))
             there, back = (
                 np.array([pin.integrate(figure.model, start, move) for move in smooth_way(np.vstack(places), steps)])
@@ -307,12 +307,12 @@ def _least(scene: wb.Scene, q: Array) -> float:
 
 def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
     """Put the objects clear of both ways, and a block about where the second one takes the tip farthest."""
-    # postures along the way that the objects are put clear of
+    # Objects are put clear of twelve postures along each way.
     taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // 12)] for way in ways]))
     tips = np.vstack(places)
     occupied = np.vstack([taken.centres, tips])
     low, high = occupied.min(axis=0), occupied.max(axis=0)
-    # m: size of what the objects of the standing human surround; those of a figure are scaled with its own
+    # The objects of the standing human surround 2 m; those of a figure are scaled with its own size.
     size = float((high - low).max()) / 2.0
     if block:
         _add_block(scene, places[1], size)

@@ -55,7 +55,7 @@ class Drake(OneCall["_Plant"]):
 
     def found(self, built: _Plant, problem: Problem) -> tuple[Array | None, bool]:
         """The answer of the program."""
-        # of the tolerance, to which goals and holds are asked: a box of this half width, and an angle
+        # Goals and holds are asked to a quarter of the tolerance: a box of this half width, and an angle.
         program = _Program(built, problem, 0.25 * self.tolerance)
         iterations = 500 if self.iterations is None else self.iterations  # most of SNOPT's major ones
         return program.solved(problem.scene.figure.clamp(problem.start), iterations)
@@ -81,7 +81,7 @@ class _Plant:
         self._addresses: list[tuple[str, Any]] = []
         for index in range(1, self._model.njoints):
             self._add_joint(index)
-        # m: kept beyond clearances; drake's distances of hulls and ellipsoids are exact to about this
+        # drake's distances of hulls and ellipsoids are exact to about 2e-5 m.
         self.least = problem.clearance + 2e-5
         self._pieces: dict[tuple[int, float], Any] = {}
         pairs = self._paired(problem)
@@ -154,7 +154,7 @@ class _Plant:
                 pairs.append(
                     (
                         self._piece(pieces, pair.first, 0.0),
-                        # m: by which pairs that rest may be nearer: the smooth maximum of two of them is above each
+                        # Pairs that rest may be 4e-5 m nearer: the smooth maximum of two of them is above each.
                         self._piece(pieces, pair.second, lower + 4e-5 if surface and lower > 0.0 else 0.0),
                     )
                 )
@@ -191,7 +191,7 @@ class _Program:
         with TOOL:
             self._ik = InverseKinematics(plant.plant, plant.context)
             if plant.paired:
-                # m: pairs nearer than this beyond the clearance take part: drake's default
+                # Pairs nearer than 1 cm beyond the clearance take part: drake's default.
                 self._ik.AddMinimumDistanceLowerBoundConstraint(plant.least, 0.01)
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
@@ -259,7 +259,7 @@ class _Program:
         from pydrake.math import RotationMatrix
 
         there, here = (self._plant.bodies[at.joint].body_frame() for at in (residual.base, residual.place))
-        # rad: within which axes at right angles tell an orientation apart from its opposites
+        # Within 0.5 rad, axes at right angles tell an orientation apart from its opposites.
         self._ik.AddOrientationConstraint(there, RotationMatrix(wanted), here, RotationMatrix(own), 0.5)
         for axis in range(3):  # its cosine is flat where it is met: right angles between axes are exact
             right = 0.5 * np.pi

@@ -44,7 +44,7 @@ class EmbodikLoop(Loop):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
-        # most steps: near a goal, one makes up for a tenth of what is left
+        # Near a goal, a step makes up for a tenth of what is left.
         super().__init__(tolerance, 1000 if iterations is None else iterations)
 
     def build(self, problem: Problem) -> Stepper:
@@ -82,7 +82,7 @@ class _EmbodikStepper:
             self._goal(goal)
         for cost in posture_costs(problem)[-1:]:
             task = solver.add_posture_task("posture")
-            # its examples' weight of the posture task, which ranks below the goals
+            # The weight is that of its examples; the posture task ranks below the goals.
             task.priority, task.weight, task.solve_mode = 1, 1e-2, embodik.TaskSolveMode.MIN_ERROR
             task.set_target_configuration(self._theirs(cost.reference))
             task.set_joint_weights(self._spread(cost.weights))
@@ -141,7 +141,7 @@ class _EmbodikStepper:
         usual = Counter(asked.values()).most_common(1)[0][0]
         self._solver.configure_collision_constraint(
             min_distance=usual, include_pairs=[(f"{first}_0", f"{second}_0") for first, second in asked],
-            # collision rows: the most that its documentation recommends
+            # The most collision rows that its documentation recommends.
             nearest_points_all_pairs=False, max_constraints=5,
         )  # fmt: skip
         for (first, second), distance in asked.items():

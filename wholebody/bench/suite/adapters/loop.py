@@ -91,10 +91,10 @@ class Loop(Outside[Stepper], ABC):
         stepper, room = self.ready(problem), self._room(problem)
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
         most = 200 if self.iterations is None else self.iterations  # most, where nothing else is said
-        # of the measures' weight from one iteration to the next
+        # The weight of the measures fades to 0.6 from one iteration to the next.
         settings = Settings(self.tolerance, most, longest, 0.6, best=True)
         if room:
-            # fewest of a frame where things move: rows keep what is beyond a clearance, and ask for the goal beside
+            # Where things move, rows keep what is beyond a clearance, and ask for the goal beside it.
             settings = with_values(settings, best=False, least=min(10, most))
         with problem.borrow() as workspace, Control(None, progress) as control:
             stepper.begin(room)
@@ -111,8 +111,8 @@ class Loop(Outside[Stepper], ABC):
         if before is None or before.shape != places.shape:
             return self._kept
         moved = float(np.linalg.norm(places - before, axis=1).max(initial=0.0))
-        # m: pairs keep at least this beyond their clearances where things move: pink's default
-        # times as far as a thing moved in a frame, pairs keep beyond their clearances
+        # Where things move, pairs keep 2 cm beyond their clearances, pink's default, and 1.5 times as
+        # far as a thing moved in a frame.
         self._kept = max(self._kept, 0.02, 1.5 * moved) if moved else self._kept
         return self._kept
 

@@ -95,8 +95,7 @@ class _Chain:
         """A posture (nq,) whose frame is at a target; None if none is found."""
         import optik
 
-        # of the tolerance, whose square is optik's bound of the squared error
-        # s: of its restarts
+        # optik bounds the squared error; its restarts end after 1 s.
         settings = optik.SolverConfig(solution_mode="speed", max_time=1.0, tol_f=(0.5 * tolerance) ** 2)
         with TOOL:
             answer: Any = self._robot.ik(settings, target.homogeneous, q[self._places], self._tip)

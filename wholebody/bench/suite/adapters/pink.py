@@ -98,7 +98,7 @@ class _PinkStepper:
             [
                 SelfCollisionBarrier(
                     min(NEAREST, pairs),
-                    # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot
+                    # All that is free of a gap may be used up in one iteration: with less, held feet cannot
                     # come back
                     gain=OUT if room else 1.0,
                     safe_displacement_gain=self._safe,

@@ -145,7 +145,7 @@ def _shape(scene: Scene, piece: Any, path: Path) -> tuple[ElementTree.Element, p
     elif isinstance(shape, coal.Box):
         ElementTree.SubElement(inner, "box", size=exact(2.0 * np.array(shape.halfSide)))
     elif isinstance(shape, coal.Halfspace) and not piece.parentJoint:
-        # of the figure's size: edges of the box that stands for a half-space; its height is a quarter of that
+        # A box stands for a half-space: eight sizes of the figure wide, a quarter of that high.
         edge = 8.0 * size(scene.figure)
         ElementTree.SubElement(inner, "box", size=exact(np.array([edge, edge, 0.25 * edge])))
         shift = _slab(scene, piece, 0.125 * edge)

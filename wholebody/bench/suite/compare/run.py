@@ -197,14 +197,14 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: floa
                 if number < (given := allowed[family.name, adapter.name]).cases
             )
             if solves:
-                # times its equal share that a method's sweep of one case may take: others leave something over
+                # A sweep of one case may take three times its share: others leave something over.
                 most = 3.0 * plan.share
                 yield Task(family, number, seed_of(settings.seed, number), solves, settings.cap, most)
 
 
 def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:
     """The methods in another order for every case: nobody is always the first to wake a cold cache."""
-    # methods by which the order is turned from case to case: far apart, so that a family does not stay together
+    # The order is turned by five methods from case to case, so that a family does not stay together.
     first = 5 * number % len(adapters)
     return adapters[first:] + adapters[:first]
 

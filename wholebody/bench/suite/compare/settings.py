@@ -72,7 +72,7 @@ class Settings:
 
         A set whose goals move has as many cases as the others; the plan gives a method as many as its share allows.
         """
-        # swept cases of other sets for one whose goals move, which is hundreds of solves at every budget
+        # A case whose goals move is hundreds of solves at every budget.
         return self.cases, self.sweep // 4 if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
@@ -83,7 +83,7 @@ class Settings:
         """
         unused = FEASIBILITY_ONLY if moving else 0
         listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
-        # budgets of a set whose goals move: a case is hundreds of solves
+        # A case whose goals move is hundreds of solves.
         most = min(self.levels, 3) if moving else self.levels
         if len(listed) <= most:
             return listed

@@ -93,7 +93,7 @@ def warmed(which: Which, adapter: Adapter, cap: float) -> float:
     _warm.add(key)
     allow_processor(cap)
     began = time.perf_counter()
-    # frames of a moving case that a method sees before it is timed
+    # Of a moving case a method sees three frames before it is timed.
     solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:3])))
     return time.perf_counter() - began
 

@@ -141,7 +141,7 @@ def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
     if len(row) != count:
         raise FileFormatError(f"{where} has {len(row)} numbers; {name} takes {count}, one a coordinate of {body}")
     for place, value in enumerate(row):
-        # of a number in a posture [rad, m]; more is refused as a mistake
+        # A number of more than 1e6 rad or m is a mistake.
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= 1e6:
             raise FileFormatError(f"{where}[{place}] is {shown(value)}; give finite radians and metres")
     q = np.array(row, dtype=float)

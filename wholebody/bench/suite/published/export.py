@@ -180,7 +180,7 @@ def _best(case: Case, body: BodyFiles, rebuilt: Rebuilt, proof: Score) -> float:
     """Least effort known: of the witness, and of an exact answer of our own method, without a limit of time."""
     problem = copy.copy(case.problem)
     problem.measures = tuple(term for term in problem.measures if isinstance(term, wb.Effort))
-    # m, rad: asked of the solve that finds an effort to compare with
+    # The effort to compare with is that of an exact answer.
     found = wb.QP(tolerance=1e-7, time_limit=math.inf).solve(problem)
     score = rebuilt.score(np.array(body.posture(found.q)))
     return min(proof.effort, score.effort) if score.worst <= EXACT else proof.effort

@@ -131,7 +131,7 @@ def _judged(folder: Path, name: str, seed: str, answer: Answer | None, best: flo
     score = worst_of([problem.score(q, frame) for frame, q in enumerate(answer.postures)])
     solved = score.worst <= SOLVED
     above = score.effort / best - 1.0 if solved and best else nan
-    # m, rad: the stricter of the two accuracies
+    # 1e-4 m and rad is the stricter of the two accuracies.
     return Judged(name, seed, ANSWERED, "", score, solved, score.worst <= 1e-4, above, answer.seconds)
 
 
@@ -182,7 +182,7 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _row(row: SetScore) -> dict[str, Any]:
-    # in the file of a verdict, low and high alone
+    # In the file of a verdict they are low and high alone.
     return {
         name.removeprefix("share_") if name in ("share_low", "share_high") else name: value
         for name, value in flat(row).items()
@@ -248,7 +248,7 @@ def left_out(verdict: Verdict) -> list[str]:
     if failed:
         listed = ", ".join(f"{name} {count}" for name, count in failed.most_common())
         said.append(f"Answered and not solved: {failed.total()}; what is worst of each: {listed}.")
-    # rad, m: a joint that is more than a turn out of its limits was hardly meant
+    # A joint that is more than a turn out of its limits was hardly meant.
     far = [one for one in verdict.judged if one.outcome == ANSWERED and one.score.limits > 6.3]
     if far:
         how = f"{len(far)}, {far[0].problem} first, by {far[0].score.limits:.3g}"

@@ -89,7 +89,7 @@ def _followed(question: Stream, answer: Answer) -> Judged:
     for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
         for name, place in frame.moved.items():
             scene.move(name, at=place)
-        # m: by which the straight way between two postures may go in deeper than its ends
+        # The straight way between two postures may go in deeper than its ends by 1 mm.
         depth, owners = depth_between(scene, before, q, 1e-3)
         if depth > deepest_way:
             passed, deepest_way = f"{owners}, frame {number}", depth

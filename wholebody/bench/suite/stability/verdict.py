@@ -73,7 +73,7 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
     if answer.taken:
         return "takes " + ", ".join(answer.taken)
     if answer.refusal:
-        # letters of a refusal that says anything
+        # A shorter refusal says nothing.
         return "" if len(answer.refusal) >= 15 else f"refuses with {answer.refusal!r} only"
     if case.expected == "refusal":
         return "answers"
@@ -94,7 +94,7 @@ def _missed(case: HardCase, answer: Answer, judged: Judged) -> str:
         return f"{length(judged.penetration)} inside{_said(answer)}"
     if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
         return f"a constraint missed by {length(judged.constraint_violation)} (or mrad){_said(answer)}"
-    # share by which a joint may be faster than its bound: rounding, and steps along curves
+    # Rounding, and steps along curves, make a joint faster than its bound by less than 1 %.
     if judged.speed_excess > 0.01:
         return f"{1.0 + judged.speed_excess:.1f} times too fast"
     if answer.status == "solved" and judged.goal_error > case.tolerance:
@@ -116,7 +116,7 @@ def _short(judged: Judged, known: float | None, miss: float) -> str:
         return f"{length(judged.penetration)} inside, not deeper"
     if not known:
         return f"{length(judged.goal_error)} left"
-    # m: nearer to the best known answer than this is as good
+    # An answer within 20 µm of the best known one is as good.
     return "best known" if miss <= 2e-5 else f"+{length(miss)}"
 
 
