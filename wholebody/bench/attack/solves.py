@@ -155,10 +155,10 @@ def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generato
         axis = rng.normal(size=3)
         return wb.Axis(name, axis, direction=at.rotation @ axis, weight=weight)
     if kind == "CenterOfMass":
-        return wb.CenterOfMass(mass, axes=("xy", "xyz")[int(rng.integers(2))], weight=weight)
+        return wb.CenterOfMass(mass.copy(), axes=("xy", "xyz")[int(rng.integers(2))], weight=weight)
     if kind == "Posture" and rng.random() < 0.3:
         return wb.Posture(q, weight=weight)
-    return wb.Point(name, at.translation, weight=weight)
+    return wb.Point(name, at.translation.copy(), weight=weight)
 
 
 def _hold(
@@ -179,7 +179,7 @@ def _hold(
         place = data.oMf[model.getFrameId(name)].translation
         sides: tuple[Literal["on"], Literal["above"]] = ("on", "above")
         side = sides[int(rng.integers(2))]
-        terms.constraints.append(wb.Plane(name, normal, point=place, side=side))
+        terms.constraints.append(wb.Plane(name, normal, point=place.copy(), side=side))
     joints = figure.figure.joints
     if rng.random() < 0.15 and len(joints) > 1:
         some = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]

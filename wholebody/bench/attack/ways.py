@@ -193,7 +193,7 @@ def _things(figure: Body, start: Array, rng: np.random.Generator) -> list[Thing]
 def _targets(figure: Body, start: Array, frame: str, count: int, rng: np.random.Generator) -> list[Array]:
     """Places (3,): along a line, or jumping between places that the figure can reach and places that it cannot."""
     postures = (start, figure.near(start, 1.0, rng), figure.near(start, 0.5, rng))
-    places = [figure.figure.placement(q, frame).translation for q in postures]
+    places = [figure.figure.placement(q, frame).translation.copy() for q in postures]
     places[2] = places[2] + rng.normal(size=3) * figure.size * float(rng.choice([0.0, 0.3]))
     if rng.random() < 0.3:
         return [places[int(rng.integers(3))] for _ in range(count)]
