@@ -312,10 +312,11 @@ class Mesh(Shape):
     """A triangle mesh, split into convex pieces when they are first needed.
 
     Attributes:
-        source: path of an OBJ, STL, glTF, GLB or COLLADA file, a pair of arrays (vertices (n, 3), faces (m, 3)), or
-            an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
+        source: path of an OBJ, STL, PLY, glTF, GLB or COLLADA file, a pair of arrays (vertices (n, 3), faces (m, 3)),
+            or an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
         scale: metres for each unit of the file: 0.001 for millimetres.
-        up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y.
+        up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y. If left out,
+            "y" for glTF and GLB files, as their standard says, and "z" for everything else.
         max_vertices: most vertices of a piece of a decomposition; convex parts keep all of theirs.
         threshold: concavity of the pieces of a decomposition, as a share of the part's size: smaller is closer, with
             more pieces.
@@ -330,7 +331,7 @@ class Mesh(Shape):
 
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
     scale: Annotated[float, Range(1e-12, 1e12, wanted="metres for each unit of the file, such as 0.001")] = 1.0
-    up: Literal["z", "y"] = "z"
+    up: Literal["z", "y"] | None = None
     max_vertices: Annotated[int, Range(8, 256, whole=True)] = 32
     threshold: Annotated[float, Range(0.01, 1.0)] = 0.05
     vertices: Array = field(init=False, repr=False)
@@ -338,6 +339,9 @@ class Mesh(Shape):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.up is None:
+            gltf = isinstance(self.source, (str, PathLike)) and str(self.source).lower().endswith((".gltf", ".glb"))
+            object.__setattr__(self, "up", "y" if gltf else "z")
         if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
             object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):

@@ -99,8 +99,8 @@ def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import dressed
     from wholebody.motion.stance import StanceFeet
+    from wholebody.motion.worn_equipment import dressed
 
     allow_processor(most)
     figure = load("human")

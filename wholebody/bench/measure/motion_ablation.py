@@ -5,9 +5,11 @@ A constant decides something here where it changes whether a clip is free, its f
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
 from functools import partial
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.clips import synthetic
 from wholebody.bench.rows import Row, measured_ms
-from wholebody.bench.suite.ablation import FACTORS, changed, constants_in
+from wholebody.bench.suite.ablation import FACTORS, Constant, changed, constants_in, replaced
 
 Case = tuple[str, str, str, int]
 """Clip, what is worn, method, and of how many frames one is taken: a trajectory of all frames takes too long here."""
@@ -32,19 +34,14 @@ CASES: tuple[Case, ...] = (
 )
 USED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(
-        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.banded_qp",
-         "trajectory.starts"),
+        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.banded_qp"),
         ("trajectory",),
     ),
-    **dict.fromkeys(("bisection.method", "bisection.prediction", "bisection.recursion"), ("bisection",)),
-    "per_frame": ("frames",),
-    **dict.fromkeys(("following", "one_side", "repair", "faults"), ("bisection", "frames")),
-    **dict.fromkeys(("dips", "stance_places"), ("trajectory", "bisection", "frames")),
-}  # fmt: skip
+    "bisection.prediction": ("bisection",),
+    "repair": ("bisection", "frames"),
+    **dict.fromkeys(("one_side", "faults", "stance"), ("trajectory", "bisection", "frames")),
+}
 """Modules of `wholebody.motion`, and the methods on whose cases their constants are changed."""
-
-INPUTS = ("MOST_FRAMES", "MOST_BUFFER", "MOST_ROOM", "NAMED", "GOLDEN")
-"""Limits of what may be given, of messages, and a number of mathematics."""
 
 
 @dataclass(frozen=True)
@@ -67,7 +64,7 @@ def freed(cases: Sequence[Case], figure: Any) -> Freed:
     from wholebody.motion import measures
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.clip import Clip
-    from wholebody.motion.ready_equipment import dressed
+    from wholebody.motion.worn_equipment import dressed
 
     figures, answers, total = list[tuple[float, ...]](), list[Array](), 0.0
     for name, worn, method, every in cases:
@@ -99,14 +96,31 @@ def ablation(
     for module in only:
         mine = [case for case in cases if case[2] in USED[module]]
         before = freed(mine, figure) if mine else None
-        for constant in constants_in([f"wholebody.motion.{module}"])[0] if before else ():
-            for change, factor in FACTORS.items() if constant.name not in INPUTS else ():
+        name = f"wholebody.motion.{module}"
+        for constant in (*constants_in([name])[0], *_settings(name)) if before else ():
+            for change, factor in FACTORS.items():
                 value = constant.times(factor)
                 if before and value != constant.value:
-                    with changed(constant, value):
+                    with changed(constant, value) if "." not in constant.name else _set(constant, value):
                         rows.append(_row(f"{module}.{constant.name}", change, before, freed(mine, figure)))
                     tell(f"{rows[-1].case}, {change}: {rows[-1].figures}")
     return rows
+
+
+def _settings(module: str) -> list[Constant]:
+    """The numbers of a module's record `SETTINGS`, if it has one; named "SETTINGS.radius"."""
+    record = getattr(import_module(module), "SETTINGS", None)
+    values = {} if record is None else asdict(record)
+    return [Constant(module, f"SETTINGS.{name}", value) for name, value in values.items()]
+
+
+@contextmanager
+def _set(constant: Constant, value: Any) -> Iterator[None]:
+    """Give a number of a module's settings another value for a while."""
+    owner = import_module(constant.module)
+    settings = replace(owner.SETTINGS, **{constant.name.partition(".")[2]: value})
+    with replaced([(owner, "SETTINGS")], settings):
+        yield
 
 
 def _row(name: str, change: str, before: Freed, after: Freed) -> Row:
