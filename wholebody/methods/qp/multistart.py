@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import chain, islice
+from itertools import chain
 
 import numpy as np
 
@@ -103,7 +103,7 @@ class Search:
             return
         contacts = self._from_before_contact()
         feasible = ((self._feasibility_first(q), "by feasibility first") for q in (start,))
-        if any(self._accept(*found) for found in chain(islice(contacts, 1), feasible, contacts)):
+        if any(self._accept(*found) for found in chain(contacts, feasible)):
             return
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
@@ -132,9 +132,7 @@ class Search:
             self.problem, self.subproblem, self.lineariser, self.solver, self.settings.seed, self.trace, self.control
         ):
             self.spent += local.iterations
-            yield self._feasibility_first(local.q), "from before contact"
-            if self.control.spent > FOR_WAYS:
-                return
+            yield self._descend(local.q, full_step=True), "from before contact"
 
     def _restart_for_measure(self) -> None:
         """Where all is met, look for a lower minimum of the measures, from other starts that are screened first."""
