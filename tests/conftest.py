@@ -68,7 +68,7 @@ LONG = (
     ),
     *("view/test_server.py", "tracking/test_moving_things.py", "tasks/test_rhythm.py", "view/test_legend.py"),
     *("tracking/test_scenes.py", "dynamics/test_scenes.py", "view/test_timeline.py"),
-    *("tracking/test_dragging.py", "audits/test_challenge.py", "base/test_runner.py", "methods/newton/test_method.py"),
+    *("tracking/test_dragging.py", "base/test_runner.py", "methods/newton/test_method.py"),
     *(
         "view/surface/test_surface.py",
         "bench/suite/stability/test_command.py",

@@ -10,19 +10,16 @@ import argparse
 import shutil
 import sys
 from collections.abc import Sequence
-from functools import partial
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
-from tests.audits.templates import TEMPLATES
 from wholebody.base.checks import number
 from wholebody.base.errors import WholebodyError
 from wholebody.base.files import make_folder
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import write_rows, write_text
-from wholebody.cli.bench.command import Chart, command, count, listed, measuring, option, publish, publish_page, seed
-from wholebody.cli.bench.moving import CLIPS, clips
+from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.bench.command import listed, measuring, publish, publish_page, seed
+from wholebody.cli.bench.measuring import CLIPS, chosen, clips
+from wholebody.cli.command import command, count, option
 
 QUICK = 45  # quadratic programs
 
@@ -83,26 +80,6 @@ def qp(arguments: argparse.Namespace) -> None:
     totals = summaries(rows, solvers)
     report = qp_report(rows, totals, facts)
     publish("qp", report, arguments, facts=facts, tables={"qp-programs": rows, "qp": totals})
-
-
-@measuring(
-    "challenge",
-    "a standing person dragged down onto a chair, by newton and qp",
-    "Drag a standing person down onto a chair by the pelvis, and judge every posture and way between.",
-    count("--frames", 240, "of the way"),
-)
-def challenge(arguments: argparse.Namespace) -> None:
-    """Measure the challenge."""
-    from tests.audits import challenge
-    from wholebody.bench.measure.drag import drag_chart
-    from wholebody.cli.demo import packaged_tasks
-
-    facts, task = machine(), packaged_tasks()[challenge.TASK]
-    rows, every = challenge.measure(task, 60 if arguments.quick else arguments.frames, print)
-    tables: dict[str, list[Any]] = {"challenge": rows, "challenge-frames": list(chain.from_iterable(every.values()))}
-    caption = "Time of a frame and what is left to the goal, frame by frame"
-    charts = {"challenge": Chart(partial(drag_chart, every), caption)}
-    publish("challenge", challenge.report(rows, facts), arguments, facts=facts, tables=tables, charts=charts)
 
 
 @measuring(
@@ -186,11 +163,11 @@ def regress(arguments: argparse.Namespace) -> int:
 def loads(arguments: argparse.Namespace) -> None:
     """Measure and report; --quick takes one clip, cut to half a second."""
     from tests.audits import loads
-    from wholebody.bench.measure.motion import cases
+    from wholebody.bench.measure.clips import EQUIPMENT
 
     longest = number(arguments.longest, "--longest", 0.2, 1e4, "s")
     few, longest = (1, 0.5) if arguments.quick else (None, longest)
-    worn = cases.chosen(arguments.equipment or ["nothing"], cases.EQUIPMENT, "--equipment")[:few]
+    worn = chosen(arguments.equipment or ["nothing"], EQUIPMENT, "--equipment")[:few]
     facts, rows = machine(), []
     for row in loads.rows(clips(arguments, few), worn, longest):
         rows.append(row)
@@ -199,37 +176,7 @@ def loads(arguments: argparse.Namespace) -> None:
     publish("loads", loads.report(rows, facts), arguments)
 
 
-@measuring(
-    "figures",
-    "figures 4.1 to 4.7 of Degenhardt's thesis, drawn anew",
-    "Free the clips of the figures of collisions, and draw each as a strip of pictures and as curves.",
-    option("--clips", type=Path, required=True, metavar="DIR", help="folder of recordings (BVH)"),
-    listed("--only", "numbers of figures (default: all)", "FIGURE"),
-    count("--jobs", 1, "cases at a time"),
-)
-def redrawn(arguments: argparse.Namespace) -> None:
-    """Draw."""
-    from tests.audits import motion_figures as figures
-    from wholebody.bench.measure.motion import cases
-    from wholebody.bench.report import render
-    from wholebody.figures import load
-
-    recordings = {path.stem: path for path in cases.recordings(arguments.clips)}
-    names = cases.chosen(arguments.only, [drawing.number for drawing in figures.DRAWINGS], "--only")
-    folder, figure, drawn = arguments.out / "figures", load("human"), []
-    for drawing in figures.DRAWINGS:
-        if drawing.number in names:
-            drawn.append(figures.redraw(drawing, recordings, figure, folder, arguments.jobs))
-            print(f"figure {drawing.number}: {drawn[-1].strip}, {drawn[-1].curves}", flush=True)
-    publish("motion-figures", render("motion_figures.md", TEMPLATES, figures=drawn), arguments)
-    if arguments.update_docs is not None:
-        place = arguments.update_docs / "assets" / "motion"
-        make_folder(place)
-        for path in (path for one in drawn for path in (one.strip, one.curves)):
-            shutil.copyfile(path, place / path.name)
-
-
-COMMANDS = (newton, qp, challenge, human, regress, loads, redrawn)
+COMMANDS = (newton, qp, human, regress, loads)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -15,10 +15,7 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from tests.audits.templates import TEMPLATES
-from wholebody.base.arrays import Array
-from wholebody.base.errors import WholebodyError
-from wholebody.bench.measure.newton_shapes import (
+from tests.audits.newton_shapes import (
     LINK,
     SHAPES,
     chain,
@@ -28,6 +25,9 @@ from wholebody.bench.measure.newton_shapes import (
     ring,
     three_bar,
 )
+from tests.audits.templates import TEMPLATES
+from wholebody.base.arrays import Array
+from wholebody.base.errors import WholebodyError
 from wholebody.bench.report import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy

@@ -9,7 +9,7 @@ import pytest
 
 from tests.audits import newton
 from tests.audits.__main__ import main
-from wholebody.bench.measure.newton_shapes import median_us
+from tests.audits.newton_shapes import median_us
 from wholebody.bench.tables import read_rows
 
 

@@ -7,21 +7,19 @@ from pathlib import Path
 
 import pytest
 
+from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
-from wholebody.bench.measure.reaches import ReachRow
-from wholebody.bench.measure.solve import MemoryRow, SolveRow
-from wholebody.bench.measure.step import StepRow, StepTime
 from wholebody.bench.measure.track import VARIANTS
+from wholebody.bench.rows import Panel, chart, shares
 from wholebody.bench.suite.adapters.registry import STEPPING
-from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.cli.bench import run as group
 
 MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
+    group.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["bench", *words])
     return int(arguments.run(arguments))
 
@@ -40,31 +38,27 @@ def test_step(tmp_path: Path, docs: Path, capsys: pytest.CaptureFixture[str], mo
     pytest.importorskip("placo", reason="placo is not installed, with which steps are compared")
     words = ("--repeats", "2", "--steps", "6", "--tools", "wholebody/daqp", "placo", "--out", str(tmp_path / "out"))
     assert bench("step", *words, "--update-docs", str(docs)) == 0
-    facts, rows = read_rows(tmp_path / "out" / "step.csv", StepRow)
-    assert facts["steps"] == "6"
-    assert [(row.reach, row.tool) for row in rows] == [
-        (reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo")
-    ]
+    rows = csv_rows(tmp_path / "out" / "step-time.csv")
+    each = [(reach, tool) for reach in reaches for tool in ("wholebody/daqp", "placo")]
+    assert [(row["case"], row["tool"]) for row in rows] == each
     for row in rows:
-        assert 0.0 < row.median_us <= row.p95_us
-        assert (row.pairs >= 700) == (row.reach != "alone")
-        assert row.limit_violation < 1e-9
-        assert row.tool != "placo" or row.ratio.value == row.ratio_p95.value == 1.0
-    _, times = read_rows(tmp_path / "out" / "step-times.csv", StepTime)
-    assert len(times) == len(reaches) * 2 * 2 * 6
+        assert 0.0 < float(row["median µs"]) <= float(row["p95 µs"])
+        assert row["tool"] != "placo" or float(row["median × placo"]) == float(row["p95 × placo"]) == 1.0
+    for row in csv_rows(tmp_path / "out" / "step-result.csv"):
+        assert (int(row["pairs"]) >= 700) == (row["case"] != "alone")
+        assert float(row["beyond limits rad"]) < 1e-9
     page = (docs / "results.md").read_text()
-    assert "| placo |" in page
-    assert "assets/bench/step-times.svg" in page
-    assert (docs / "assets" / "bench" / "step-times.svg").read_text().startswith("<?xml")
-    assert (tmp_path / "out" / "step-distances.png").read_bytes().startswith(b"\x89PNG")
+    assert "| contact | placo |" in page
+    assert "assets/bench/step.svg" in page
+    assert (docs / "assets" / "bench" / "step.svg").read_text().startswith("<?xml")
+    assert (tmp_path / "out" / "step.png").read_bytes().startswith(b"\x89PNG")
     assert "1342 pairs" in capsys.readouterr().out
 
 
 def test_reaches(tmp_path: Path, docs: Path) -> None:
     words = ("--count", "2", "--first", "5", "--methods", "qp/daqp", "--out", str(tmp_path / "out"))
     assert bench("solve", "--parts", "reaches", *words, "--update-docs", str(docs)) == 0
-    _, rows = read_rows(tmp_path / "out" / "reaches.csv", ReachRow)
-    assert [row.seed for row in rows] == [5, 6]
+    assert [row["case"] for row in csv_rows(tmp_path / "out" / "reaches.csv")] == ["seed 5", "seed 6"]
     assert "seeds 5 to 6" in (docs / "results.md").read_text()
 
 
@@ -78,8 +72,7 @@ def test_a_chart_that_fails_loses_no_measurement(tmp_path: Path, monkeypatch: py
     out = tmp_path / "out"
     with pytest.raises(RuntimeError, match="no chart"):
         bench("solve", "--parts", "reaches", "--count", "1", "--first", "5", "--methods", "qp/daqp", "--out", str(out))
-    _, rows = read_rows(out / "reaches.csv", ReachRow)
-    assert [row.seed for row in rows] == [5]
+    assert [row["case"] for row in csv_rows(out / "reaches.csv")] == ["seed 5"]
     assert (out / "reaches.md").is_file()
 
 
@@ -102,41 +95,26 @@ def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.Monke
     monkeypatch.setenv("WHOLEBODY_CHROMIUM", str(tmp_path / "none"))
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
     assert bench("solve", "--parts", "task", *words) == 0
-    _, rows = read_rows(tmp_path / "out" / "solve.csv", SolveRow)
-    assert [row.way for row in rows] == ["cold", "warm"]
-    assert all(row.median_ms > 0.0 and row.pairs > 0 for row in rows)
-    _, (memory,) = read_rows(tmp_path / "out" / "memory.csv", MemoryRow)
-    assert 50.0 < memory.peak_mb < 2000.0  # an interpreter with Pinocchio, not a machine full
+    rows = csv_rows(tmp_path / "out" / "solve.csv")
+    assert [row["problem and method"] for row in rows] == ["new", "used before"]
+    assert all(float(row["median ms"]) > 0.0 and int(row["pairs"]) > 0 for row in rows)
+    (memory,) = csv_rows(tmp_path / "out" / "memory.csv")
+    assert 50.0 < float(memory["peak MB"]) < 2000.0  # an interpreter with Pinocchio, not a machine full
     assert "shelf" in (docs / "results.md").read_text()
 
 
 def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
-    from wholebody.bench.measure import step as steps
-
-    times = [
-        StepTime(reach, tool, 1, step, 100.0 + 13.0 * step, 90.0, 20.0 - step)
-        for reach in VARIANTS
-        for tool in ("placo", "wholebody")
-        for step in range(1, 30)
-    ]
-    for draw in (steps.step_times, steps.least_distances):
-        once, again = (draw(times, tmp_path / name) for name in ("a", "b"))
-        assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
-
-
-def test_a_tool_that_does_not_take_a_figure_is_named_in_the_chart(tmp_path: Path) -> None:
-    from wholebody.bench.measure import step as steps
-
-    times = [StepTime(reach, "wholebody", 1, 1, 100.0, 90.0, 20.0) for reach in ("arm, free", "robot, free")]
-    times += [StepTime("arm, free", "mink", 1, 1, 300.0, 290.0, 20.0)]
-    svg, _ = steps.step_times(times, tmp_path / "times")
-    assert svg.is_file()
+    times = {tool: [100.0 + 13.0 * step for step in range(30)] for tool in ("placo", "wholebody")}
+    distances = {tool: (range(30), [20.0 - step for step in range(30)]) for tool in times}
+    panels = [shares("free", "time [µs]", times), Panel("free", "step", "mm", distances, levels=(0.0, 10.0))]
+    once, again = (chart(panels, tmp_path / name) for name in ("a", "b"))
+    assert [path.read_bytes() for path in once] == [path.read_bytes() for path in again]
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert set(STEPPING) <= set(plot_style.COLORS)
-    assert plot_style.method_style("qp").color == plot_style.COLORS["wholebody"]  # the same method in another chart
-    assert len(set(plot_style.COLORS.values())) == len(plot_style.COLORS)
+    assert {name.replace("wholebody", "qp") for name in STEPPING} <= set(plot_style.STYLES)
+    assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
+    assert len({style.color for style in plot_style.STYLES.values()}) == len(plot_style.STYLES)
 
 
 @pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--jobs", "0"), ("solve", "--count", "-1")])

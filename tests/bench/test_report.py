@@ -5,13 +5,12 @@ from __future__ import annotations
 from itertools import pairwise
 from math import inf, nan
 from pathlib import Path
-from types import SimpleNamespace
 
 import jinja2
 import pytest
 
 from wholebody.bench import report
-from wholebody.bench.report import TEMPLATES, formatted, groups, quantile, render, scaled, strong, upfirst, words
+from wholebody.bench.report import TEMPLATES, formatted, render, strong, upfirst, words
 
 
 @pytest.mark.parametrize("path", sorted(TEMPLATES.iterdir()), ids=lambda path: path.name)
@@ -49,12 +48,4 @@ def test_numbers_that_are_not_finite_are_left_out() -> None:
     assert formatted(1.234, ".1f", " %") == "1.2 %"
     assert formatted(nan, ".1f", " %") == ""
     assert formatted(inf, ".1f", none="never") == "never"
-    assert [scaled(value) for value in (0.123, 12.3, nan)] == ["0.12", "12", ""]
-    assert quantile([1.0, 2.0, 4.0], 0.5) == 2.0
-    assert str(quantile([], 0.5)) == "nan"
     assert (strong(0), strong(2), upfirst("a b"), words("a_b")) == ("0", "**2**", "A b", "a b")
-
-
-def test_rows_are_grouped_in_the_order_in_which_they_come() -> None:
-    rows = [SimpleNamespace(name=name, number=number) for number, name in enumerate("baba")]
-    assert [[row.number for row in found] for found in groups(rows, "name")] == [[0, 2], [1, 3]]

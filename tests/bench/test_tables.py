@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody.base.errors import FileFormatError
-from wholebody.bench.machine import machine, sentence
-from wholebody.bench.measure.step import StepRow
-from wholebody.bench.measure.step_goals import goal_lines
-from wholebody.bench.statistics import NOTHING, Interval
-from wholebody.bench.tables import filled, of, read_rows, replace_section, write_rows
+from wholebody.bench.statistics import Interval
+from wholebody.bench.tables import filled, machine, of, read_rows, replace_section, sentence, write_rows
 
 PAGE = "# Results\n\nbefore\n\n<!-- bench:step -->\nold\n<!-- /bench:step -->\n\nafter\n"
 
@@ -129,28 +126,17 @@ def test_an_interval_has_three_columns_and_comes_back(tmp_path: Path) -> None:
     assert read_rows(tmp_path / "rows.csv", Spanned)[1] == rows
 
 
-def step_row(**changes: object) -> StepRow:
-    blank: dict[str, object] = {"str": "free", "int": 1, "float": 1.0, "Interval": Interval(1.0, 1.0, 1.0)}
-    values = {field.name: blank[str(field.type)] for field in fields(StepRow)}
-    return StepRow(**{**values, **changes})  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class Mapped:
+    name: str
+    figures: dict[str, object]
 
 
-def test_what_fell_short_is_said() -> None:
-    rows = [
-        step_row(
-            tool="wholebody",
-            reach="contact",
-            least_mm=8.5,
-            ratio=Interval(0.4, 0.39, 0.42),
-            ratio_p95=Interval(1.2, 1.0, 1.3),
-        ),
-        step_row(tool="placo", reach="contact"),
+def test_a_mapping_has_a_column_an_entry_and_what_a_row_lacks_is_empty(tmp_path: Path) -> None:
+    rows = [Mapped("a", {"ms": 1.0}), Mapped("b", {"ms": Interval(2.0, 1.0, 3.0), "said": "no"})]
+    write_rows(tmp_path / "rows.csv", {}, rows)
+    assert (tmp_path / "rows.csv").read_text().splitlines() == [
+        "name,ms,ms_low,ms_high,said",
+        "a,1.0,,,",
+        "b,2.0,1.0,3.0,no",
     ]
-    (line,) = goal_lines(rows)
-    assert "median 0.400 [0.390, 0.420] of placo's (at most 0.08: missed)" in line
-    assert "p95 1.200 [1.000, 1.300] of placo's (at most 0.1: missed)" in line
-    assert "1.5 mm short of the clearance (at most 0.001: missed)" in line
-    assert "acceleration 1.00 rad/s² (at most 1: reached)" in line
-    assert not goal_lines([step_row(tool="wholebody/piqp", reach="free", ratio=Interval(0.5, 0.5, 0.5))])
-    alone = step_row(tool="wholebody", reach="alone", ratio=NOTHING, ratio_p95=NOTHING)
-    assert "nothing to compare with" in goal_lines([alone])[0]

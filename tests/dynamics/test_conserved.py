@@ -9,10 +9,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.world.closed_forms import colliding
-from wholebody.bench.measure.world.drops import drops
-from wholebody.bench.measure.world.engines import ENGINES
-from wholebody.bench.measure.world.measuring import Judge
+from wholebody.bench.measure.closed_forms import colliding
+from wholebody.bench.measure.drops import ENGINES, Judge, drops
 from wholebody.dynamics.rigid_bodies import RigidBodies
 from wholebody.dynamics.settings import SKIN
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.motion.cases import synthetic
+from wholebody.bench.measure.clips import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import MethodResult, Run

@@ -10,67 +10,54 @@ from typing import Any, NamedTuple
 
 from wholebody.bench.statistics import Interval
 
-COLORS = {
-    "wholebody": "#0072b2",
-    "wholebody/active_set": "#004166",
-    "wholebody/osqp": "#4b6a9b",
-    "wholebody/daqp": "#56b4e9",
-    "wholebody/quadprog": "#7f9fc4",
-    "wholebody/proxqp": "#9fb8d0",
-    "wholebody/piqp": "#b3c6e0",
-    "placo": "#d55e00",
-    "placo/pruned": "#e8a06a",
-    "mink": "#009e73",
-    "pink": "#cc79a7",
-}
-"""Of the tools that make a step: Okabe and Ito's colours, which people with any colour vision tell apart; our own with
-other settings are further blues."""
-
 
 class Style(NamedTuple):
-    """Colour and marker of a method; the principal ones are drawn wide and with their spread."""
+    """Colour and marker of a method."""
 
     color: str
     marker: str
-    principal: bool
 
 
-_STYLES = {
-    "qp": Style(COLORS["wholebody"], "o", True),
-    "qp/active_set": Style(COLORS["wholebody/active_set"], ".", False),
-    "qp/osqp": Style(COLORS["wholebody/osqp"], "o", True),
-    "qp/daqp": Style(COLORS["wholebody/daqp"], ".", False),
-    "qp/quadprog": Style(COLORS["wholebody/quadprog"], ".", False),
-    "qp/proxqp": Style(COLORS["wholebody/proxqp"], ".", False),
-    "qp/piqp": Style(COLORS["wholebody/piqp"], ".", False),
-    "newton": Style("#e69f00", "s", True),
-    "newton/slack": Style("#e69f00", "s", True),
-    "newton/barrier": Style("#a06a00", "D", True),
-    "newton/kkt": Style("#f3cf7a", "s", False),
-    "ccd": Style("#000000", "v", True),
-    "dls": Style("#8c8c8c", "X", True),
-    "placo": Style(COLORS["placo"], "P", True),
-    "mink": Style(COLORS["mink"], "h", True),
-    "pink": Style(COLORS["pink"], "*", True),
+STYLES = {
+    "qp": Style("#0072b2", "o"),
+    "qp/active_set": Style("#004166", "."),
+    "qp/osqp": Style("#4b6a9b", "o"),
+    "qp/daqp": Style("#56b4e9", "."),
+    "qp/quadprog": Style("#7f9fc4", "."),
+    "qp/proxqp": Style("#9fb8d0", "."),
+    "qp/piqp": Style("#b3c6e0", "."),
+    "newton/slack": Style("#e69f00", "s"),
+    "newton/barrier": Style("#a06a00", "D"),
+    "newton/kkt": Style("#f3cf7a", "s"),
+    "ccd": Style("#000000", "v"),
+    "dls": Style("#8c8c8c", "X"),
+    "placo": Style("#d55e00", "P"),
+    "placo/pruned": Style("#e8a06a", "."),
+    "mink": Style("#009e73", "h"),
+    "pink": Style("#cc79a7", "*"),
 }
-_SOLVERS = ("#35507a", "#5f86b3", "#8aa0c0")
-"""Shades for the QP method with further solvers: one family, seen at a glance."""
-_OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99")
+"""Of methods: Okabe and Ito's colours, which people with any colour vision tell apart; qp with other settings has
+further blues."""
+
+OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99", "#332288", "#88ccee", "#cc6677", "#ddcc77")
+GREY = "#666666"
 
 
-def method_style(adapter: str) -> Style:
-    """Return the style of a method; one that is not known here has a style of its own, by its name."""
-    if adapter in _STYLES:
-        return _STYLES[adapter]
-    number = sha256(adapter.encode()).digest()[0]
-    if adapter.startswith("qp/"):
-        return Style(_SOLVERS[number % len(_SOLVERS)], ".", False)
-    return Style(_OTHERS[number % len(_OTHERS)], "p", True)
+def method_style(name: str) -> Style:
+    """Return the style of a method, or of a tool that makes a step, of which qp is called wholebody.
+
+    One that is not known here has a style of its own, by its name.
+    """
+    method = "newton/slack" if name == "newton" else name.replace("wholebody", "qp")
+    number = sha256(method.encode()).digest()[0]
+    shades = ("#35507a", "#5f86b3", "#8aa0c0") if method.startswith("qp/") else OTHERS
+    return STYLES.get(method, Style(shades[number % len(shades)], "p"))
 
 
-_SETTINGS = {
+SETTINGS = {
     "svg.hashsalt": "wholebody",  # names inside the file do not depend on chance
     "svg.fonttype": "none",
+    "savefig.dpi": 150,
     "font.family": "DejaVu Sans",
     "font.size": 10.0,
     "axes.spines.top": False,
@@ -81,7 +68,6 @@ _SETTINGS = {
     "grid.linewidth": 0.6,
     "figure.facecolor": "white",
 }
-PNG_DPI = 150
 
 
 def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
@@ -91,7 +77,7 @@ def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any
     matplotlib.use("agg")
     from matplotlib import pyplot
 
-    matplotlib.rcParams.update(_SETTINGS)
+    matplotlib.rcParams.update(SETTINGS)
     chart, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
     return chart, axes
 
@@ -108,7 +94,7 @@ def save(chart: Any, path: Path) -> tuple[Path, Path]:
     path.parent.mkdir(parents=True, exist_ok=True)
     svg, png = path.with_suffix(".svg"), path.with_suffix(".png")
     chart.savefig(svg, metadata={"Date": None})
-    chart.savefig(png, dpi=PNG_DPI, metadata={"Software": None})
+    chart.savefig(png, metadata={"Software": None})
     pyplot.close(chart)
     return svg, png
 
@@ -163,16 +149,14 @@ def shares_and_times(
     return save(chart, path)
 
 
-DECADES = 2.6  # beyond which the labels of 2 and 5 would overlap their neighbours
-
-
 def plain_log(axis: Any) -> None:
     """Make the x axis logarithmic, with 1, 2, 5, 10, ... written out; over many decades 1, 10, 100, ... alone."""
     from matplotlib.ticker import LogLocator, NullLocator
 
     class Plain(LogLocator):
         def tick_values(self, vmin: float, vmax: float) -> Any:
-            self.set_params(subs=(1.0,) if vmax > 10.0**DECADES * vmin else (1.0, 2.0, 5.0))
+            wide = vmax > 10.0**2.6 * vmin  # beyond, the labels of 2 and 5 would overlap their neighbours
+            self.set_params(subs=(1.0,) if wide else (1.0, 2.0, 5.0))
             return super().tick_values(vmin, vmax)
 
     axis.set_xscale("log")

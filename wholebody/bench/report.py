@@ -5,19 +5,15 @@ A template has the words and the columns; who calls `render` has the figures.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+import re
+from collections.abc import Mapping
 from functools import cache
-from itertools import groupby
 from math import isfinite
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
-from wholebody.bench.machine import sentence
 from wholebody.bench.statistics import Interval
-from wholebody.bench.tables import summed_programs
+from wholebody.bench.tables import sentence
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -34,11 +30,28 @@ def render(name: str, templates: Path = TEMPLATES, /, **values: Any) -> str:
     return "\n".join(lines)
 
 
-def html(text: str) -> str:
-    """Markdown with tables as HTML."""
+def page(title: str, text: str, charts: Mapping[str, Path], subtitle: str = "") -> str:
+    """Markdown as one HTML page that needs no network; images of the SVG charts, by their names, are put within."""
     from markdown_it import MarkdownIt
 
-    return str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+    body = str(MarkdownIt("commonmark", {"html": False}).enable("table").render(text))
+    body = re.sub(r"<td[^>]*>([^<]{35,})</td>", r'<td class="text">\1</td>', body)  # texts break into lines
+    picture = r'<p><img src="[^"]*?([^"/]+)\.svg" alt="([^"]*)" ?/?></p>'
+    body = re.sub(picture, lambda found: _within(charts[found[1]], found[2]), body)
+    sections = [(_anchor(name), name) for name in re.findall(r"<h2>(.*?)</h2>", body)]
+    body = re.sub(r"<h2>(.*?)</h2>", lambda found: f'<h2 id="{_anchor(found[1])}">{found[1]}</h2>', body)
+    return render("page.html", title=title, subtitle=subtitle, sections=sections, body=body)
+
+
+def _anchor(title: str) -> str:
+    return re.sub(r"[^a-z0-9]+", "-", title.lower()).strip("-")
+
+
+def _within(svg: Path, caption: str) -> str:
+    """A chart within a page. Names in it are of one file, and there are many files in the page."""
+    drawn = svg.read_text(encoding="utf-8")
+    drawn = re.sub(r'(\bid="|href="#|url\(#)', rf"\g<1>{svg.stem}-", drawn[drawn.index("<svg") :])
+    return f"<figure>{drawn}<figcaption>{caption}</figcaption></figure>"
 
 
 @cache
@@ -54,13 +67,9 @@ def _environment(templates: Path) -> Environment:
     )
     made.filters |= {
         "f": formatted,
-        "groups": groups,
         "measured": sentence,
-        "quantile": quantile,
-        "scaled": scaled,
         "span": spanned,
         "strong": strong,
-        "summed": summed_programs,
         "upfirst": upfirst,
         "words": words,
     }
@@ -86,24 +95,6 @@ def spanned(found: Interval, spec: str, scale: float = 1.0, unit: str = "", ends
         return ""
     low, high = (formatted(scale * each, ends or spec, none="∞") for each in (found.low, found.high))
     return f"{formatted(scale * found.value, spec, unit, none='∞')} [{low}, {high}]"
-
-
-def groups(rows: Sequence[Any], name: str) -> Iterator[list[Any]]:
-    """Rows with the same value of an attribute, in the order in which the values come first."""
-    order = {value: place for place, value in enumerate(dict.fromkeys(getattr(row, name) for row in rows))}
-    for _, found in groupby(sorted(rows, key=lambda row: order[getattr(row, name)]), key=attrgetter(name)):
-        yield list(found)
-
-
-def quantile(values: Iterable[float], share: float) -> float:
-    """The quantile of some values; not a number where there are none."""
-    listed = list(values)
-    return float(np.quantile(listed, share)) if listed else float("nan")
-
-
-def scaled(value: float) -> str:
-    """A number with two digits at least, and no more than it needs; nothing for one that is not a number."""
-    return "" if value != value else f"{value:.2g}" if value < 10.0 else f"{value:.0f}"
 
 
 def strong(count: int) -> str:

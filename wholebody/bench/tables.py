@@ -5,15 +5,64 @@ from __future__ import annotations
 import csv
 import dataclasses
 import io
+import os
+import platform
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar, get_type_hints
 
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import Interval
+from wholebody.version import __version__
+
+PACKAGES = (
+    "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
+    "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
+)  # fmt: skip
+THREADS = "OMP_NUM_THREADS"
+
+
+def machine() -> dict[str, str]:
+    """Return what a reader has to know of the machine and of the versions, in the order in which it is written."""
+    usable = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    facts = {
+        "wholebody": __version__,
+        "processor": _processor(),
+        "cores": str(usable),
+        "load": f"{os.getloadavg()[0]:.1f} in the minute before",
+        "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[1] or 'unknown libc'}",
+        "python": platform.python_version(),
+        THREADS: os.environ.get(THREADS, "not set"),
+    }
+    facts["numba"] = _version("numba") or "not installed"  # our own linearisation is faster with it
+    installed = {name: _version(name) for name in PACKAGES}
+    return facts | {name: version for name, version in installed.items() if version}
+
+
+def sentence(facts: Mapping[str, str]) -> str:
+    """Say the facts in one paragraph of Markdown."""
+    return "Measured with " + "; ".join(f"{name} {value}" for name, value in facts.items()) + "."
+
+
+def _processor() -> str:
+    info = Path("/proc/cpuinfo")
+    if info.is_file():
+        for line in info.read_text(encoding="utf-8", errors="replace").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return ""
+
 
 _R = TypeVar("_R")
 
@@ -27,24 +76,29 @@ def write_text(path: Path, text: str) -> None:
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
 
-    An interval has three columns, of which the ends are called NAME_low and NAME_high.
+    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
     """
     text = io.StringIO()
     for name, value in facts.items():
         text.write(f"# {name}: {value}\n")
-    text.write(_line(flat(rows[0])))
-    for row in rows:
-        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in flat(row).values()]))
+    cells = [flat(row) for row in rows]
+    names = list(dict.fromkeys(name for each in cells for name in each))
+    text.write(_line(names))
+    for each in cells:
+        values = [each.get(name, "") for name in names]
+        text.write(_line([repr(value) if isinstance(value, float) else str(value) for value in values]))
     write_text(path, text.getvalue())
 
 
 def flat(row: Any) -> dict[str, Any]:
-    """The fields of a row by name, and the ends of those that are intervals."""
+    """The fields of a row by name, the ends of those that are intervals, and the entries of those that are mappings."""
+    given = {field.name: getattr(row, field.name) for field in dataclasses.fields(row)}
     cells: dict[str, Any] = {}
-    for field in dataclasses.fields(row):
-        value = cells[field.name] = getattr(row, field.name)
-        if isinstance(value, Interval):
-            cells |= {field.name: value.value, f"{field.name}_low": value.low, f"{field.name}_high": value.high}
+    for field, value in given.items():
+        for name, each in value.items() if isinstance(value, Mapping) else [(field, value)]:
+            cells[name] = each
+            if isinstance(each, Interval):
+                cells |= {name: each.value, f"{name}_low": each.low, f"{name}_high": each.high}
     return cells
 
 

@@ -105,19 +105,8 @@ def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
         option("--overlap", default="qp", metavar="METHOD", help=overlap),
         option("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)"),
         option("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)"),
-        *folders(out),
-    )
-
-
-def folders(out: str) -> tuple[Option, Option]:
-    """`--out`, with a folder where it is left out, and `--update-docs`."""
-    return (
         option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
-        option(
-            "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-            help="write tables and charts into the documentation too (default folder: docs)",
-        ),
-    )  # fmt: skip
+    )
 
 
 def check_overlaps(chosen: Iterable[str]) -> None:

@@ -11,7 +11,6 @@ from wholebody.cli.command import command, option
 from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
-    from wholebody.bench.measure.drag import DragRow
     from wholebody.problem import Problem
     from wholebody.taskfile import Task
     from wholebody.tracking.dragging import Dragged, DragJudgement
@@ -71,10 +70,11 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.live:
         return live(arguments)
     arguments.method = arguments.method or "newton"
-    from wholebody.bench.machine import machine
-    from wholebody.bench.measure.drag import drag_chart, drag_frames, drag_report, drag_summary
-    from wholebody.bench.tables import write_rows, write_text
+    from wholebody.bench.measure.frames import drag_rows, frame_panels, is_clean
+    from wholebody.bench.rows import chart, report
+    from wholebody.bench.tables import machine, write_rows, write_text
     from wholebody.cli.picture import make_folder
+    from wholebody.cli.tables import print_rows
     from wholebody.methods.solve import method_named
     from wholebody.taskfile import read_task
     from wholebody.tracking.paths import spread
@@ -87,15 +87,22 @@ def run(arguments: argparse.Namespace) -> int:
     make_folder(out)
     dragged, judged = followed(task.problem, places, arguments.method, goal, f"{task.path.stem}, {arguments.method}")
     name, facts = f"{task.path.stem}-{arguments.method}", machine()
-    row, frames = drag_summary(task.path.stem, dragged, judged), drag_frames(task.path.stem, dragged, judged)
+    row, frames = drag_rows(task.path.stem, dragged, judged)
     write_rows(out / f"{name}.csv", facts, frames)
-    write_text(out / f"{name}.md", drag_report([row], facts) + "\n")
-    drag_chart({row.method: frames}, out / name)
+    meaning = (
+        "Left to the goal is the distance of what is dragged from where the goal is in that frame; at the end its "
+        "angle, in mrad, where that is more. Depths are found by coal over every pair of pieces; between frames "
+        "stands a bound, found by a continuous sweep, on how much deeper any pair gets on the way than at its deeper "
+        "end. Jerk is the third difference of the joint angles, rad/s³; CPU is the time that the processor worked on a "
+        "frame; holds are in mm or mrad."
+    )
+    write_text(out / f"{name}.md", report(meaning, {"": [row]}, facts) + "\n")
+    chart(frame_panels(frames, ("ms", "CPU ms"), ("left mm",)), out / name)
     _animation(task, dragged, out / f"{name}.html")
-    show([row])
+    print_rows([row])
     print(f"end: {dragged.end.message}")
     print(f"wrote {out}")
-    return 0 if row.clean and dragged.end.solved else 1
+    return 0 if is_clean(row) and dragged.end.solved else 1
 
 
 def live(arguments: argparse.Namespace) -> int:
@@ -143,21 +150,6 @@ def followed(problem: Problem, places: Any, method: str, goal: int, label: str) 
         )  # fmt: skip
         bar.update(work, description="judging every pair of every frame")
         return dragged, judge_drag(problem, dragged, goal=goal)
-
-
-def show(rows: list[DragRow]) -> None:
-    """Print the table."""
-    from rich.console import Console
-
-    from wholebody.cli.tables import table
-
-    times = table(
-        "task", "method", "frames", "mean ms", "p95", "max", "CPU", "iter", "left mm", "max mm", "at the end",
-        "deepest mm", "between mm", "limits", "holds", "jerk", "end",
-    )  # fmt: skip
-    for row in rows:
-        times.add_row(*row.cells)
-    Console(width=max(170, Console().width)).print(times)
 
 
 def _goal(problem: Problem, number: int | None) -> int:

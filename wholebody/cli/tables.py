@@ -14,7 +14,10 @@ from wholebody.figures.state import State
 from wholebody.taskfile.result import goals_left
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from wholebody.assessment.posture import Assessment
+    from wholebody.bench.rows import Row
     from wholebody.figures import Figure
     from wholebody.problem import Problem
     from wholebody.solution import Solution
@@ -48,6 +51,16 @@ def table(*columns: str, title: str = "") -> Table:
     for number, column in enumerate(columns):
         made.add_column(column, justify="right" if number else "left", header_style="dim", overflow="fold")
     return made
+
+
+def print_rows(rows: Sequence[Row]) -> None:
+    """Print measurements: a line a figure, a column a row."""
+    from wholebody.bench.rows import shown
+
+    made = table("", *(f"{row.case}, {row.tool}" for row in rows))
+    for name in dict.fromkeys(name for row in rows for name in row.figures):
+        made.add_row(name, *(shown(row.figures[name]) if name in row.figures else "" for row in rows))
+    Console().print(made)
 
 
 def show_solution(console: Console, task: Task, solution: Solution) -> None:

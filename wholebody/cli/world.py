@@ -10,7 +10,7 @@ from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
 from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
-    from wholebody.bench.measure.world_runs import WorldRow
+    from wholebody.bench.rows import Row
     from wholebody.dynamics.overlaps import Overlap
     from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
@@ -41,9 +41,9 @@ exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
-    from wholebody.bench.machine import machine
-    from wholebody.bench.measure.world_runs import report
-    from wholebody.bench.tables import write_text
+    from wholebody.bench.measure.frames import world_report
+    from wholebody.bench.tables import machine, write_text
+    from wholebody.cli.tables import print_rows
     from wholebody.dynamics.scenes import WORLD_SCENES
 
     names = scene_names(arguments, WORLD_SCENES, "world", files=True)
@@ -54,13 +54,10 @@ def run(arguments: argparse.Namespace) -> int:
     check_writable(arguments.out / f"{Path(names[0]).stem}.csv")
     facts = machine()
     rows = [_run_one(_scene(name, arguments), arguments, facts) for name in names]
-    _print(rows)
-    text = report(rows, facts)
-    write_text(arguments.out / "world.md", text + "\n")
+    print_rows(rows)
+    write_text(arguments.out / "world.md", world_report(rows, facts) + "\n")
     print(f"wrote {arguments.out}")
-    if arguments.update_docs is not None:
-        _update(arguments, text, names)
-    return 0 if all(row.deepest_mm <= 0.1 and not row.unavoided for row in rows) else 1  # mm
+    return 0 if all(row["deepest mm"] <= 0.1 and not row["not avoided"] for row in rows) else 1  # mm
 
 
 def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
@@ -76,8 +73,9 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
     return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
 
 
-def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> WorldRow:
-    from wholebody.bench.measure.world_runs import chart, frame_rows, summary
+def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, str]) -> Row:
+    from wholebody.bench.measure.frames import frame_panels, world_rows
+    from wholebody.bench.rows import chart
     from wholebody.bench.tables import write_rows
     from wholebody.cli.tables import progress_bar
     from wholebody.dynamics.overlaps import overlaps
@@ -96,12 +94,13 @@ def _run_one(scene: WorldScene, arguments: argparse.Namespace, facts: dict[str, 
             pushed.append(overlaps(scene.scene, frames[-1].wanted))
             bar.update(task, completed=len(frames))
     drawing = _animation(scene, frames, pushed, arguments.out, arguments.picture)
-    rows = frame_rows(name, frames, drawing, [sum(one.pairs for one in each) for each in pushed])
+    inside = [sum(one.pairs for one in each) for each in pushed]
+    summary, rows = world_rows(name, arguments.overlap, frames, drawing, inside)
     write_rows(arguments.out / f"{name}.csv", facts, rows)
-    chart(rows, scene.track.dt, arguments.out / name)
-    for row in [row for row in rows if row.note][:5]:
-        print(f"{name}, frame {row.frame}: {row.note}")
-    return summary(len(frames[-1].placements), rows)
+    chart(frame_panels(rows, ("energy J",), ("ms", "queries ms")), arguments.out / name)
+    for row in [row for row in rows if row["note"]][:5]:
+        print(f"{name}, frame {row['frame']}: {row['note']}")
+    return summary
 
 
 def _animation(
@@ -110,7 +109,7 @@ def _animation(
     """Write the animation, with PD_g of what the spring wanted; the seconds that each frame takes to draw."""
     import time
 
-    from wholebody.bench.measure.world_runs import moments
+    from wholebody.bench.measure.frames import moments
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
     from wholebody.view.viewed_scene import ViewedWorld
@@ -131,40 +130,3 @@ def _animation(
             chosen = [postures[number] for number in moments(frames)]
             write_filmstrip(viewer, chosen, out / f"{scene.name}-film.png", (460, 420))  # pixels of a moment
     return seconds
-
-
-def _update(arguments: argparse.Namespace, text: str, names: list[str]) -> None:
-    """Write the table and the charts of figures 7 and 8 into the documentation."""
-    import shutil
-
-    from wholebody.bench.tables import replace_section
-
-    docs = arguments.update_docs
-    folder = docs / "assets" / "bench"
-    folder.mkdir(parents=True, exist_ok=True)
-    # a hand and an avatar, as figures 7 and 8 of the paper
-    charted = [name for name in ("flick", "avatar_and_cartons") if name in names]
-    for name in charted:
-        shutil.copyfile(arguments.out / f"{name}.svg", folder / f"world-{name}.svg")
-    pictures = [f"![Energy and frame time: {name}](assets/bench/world-{name}.svg)" for name in charted]
-    replace_section(docs / "results.md", "world-scenes", "\n\n".join([*pictures, text]))
-    print(f"wrote {docs / 'results.md'}")
-
-
-def _print(rows: list[WorldRow]) -> None:
-    from rich.console import Console
-
-    from wholebody.cli.tables import table
-
-    shown = table(
-        "scene", "bodies", "frames", "median ms", "p99", "max", "impacts", "deepest mm", "not avoided",
-        "energy J, first", "last",
-    )  # fmt: skip
-    for row in rows:
-        shown.add_row(
-            row.scene, str(row.bodies), str(row.frames), f"{row.median_ms:.2f}", f"{row.p99_ms:.2f}",
-            f"{row.max_ms:.1f}", str(row.events), f"{row.deepest_mm:.4f}", str(row.unavoided),
-            f"{row.first_energy:.3g}", f"{row.last_energy:.3g}",
-        )  # fmt: skip
-    console = Console(width=max(120, Console().width))
-    console.print(shown)

@@ -199,4 +199,7 @@ def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping
         for total in totals
     }
     first = [row for row in rows if row.solver == totals[0].solver]
-    return render("qp.md", TEMPLATES, totals=totals, times=times, programs=first, facts=facts)
+    medians = {
+        name: float(np.median([getattr(row, name) for row in first])) for name in ("variables", "soft", "elastic")
+    }
+    return render("qp.md", TEMPLATES, totals=totals, times=times, programs=first, medians=medians, facts=facts)

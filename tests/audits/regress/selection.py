@@ -16,7 +16,7 @@ import numpy as np
 
 import wholebody as wb
 from tests.audits.regress.counting import counting, peak_bytes
-from wholebody.bench.measure.newton_shapes import LINK, chain
+from wholebody.bench.measure.scaling import assembly_chain
 from wholebody.bench.measure.track import track
 from wholebody.bench.suite.adapters.own import WholebodyTool
 from wholebody.bench.suite.problem_sets.registry import problem_set
@@ -153,7 +153,7 @@ def _drag(method: Method) -> Counted:
 
 def _assembly() -> Counted:
     """The end of a chain dragged in a circle."""
-    made, last, tip = chain(BODIES), f"b{BODIES - 1}", np.array((LINK, 0.0, 0.0))
+    made, last, tip = assembly_chain(BODIES).drop_goals(), f"b{BODIES - 1}", np.array((0.2, 0.0, 0.0))
     here, systems = made.placement(last).act(tip), 0
     for angle in np.linspace(0.0, 1.0, MOVES):
         target = here + (0.03 * np.cos(angle) - 0.05, 0.03 * np.sin(angle), -0.03)

@@ -12,14 +12,13 @@ import pytest
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
 from wholebody.bench.attack.report import Row
-from wholebody.bench.attack.running import Ended
 from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.cli.bench import run as group
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
+    group.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["bench", "attack", *words])
     return int(arguments.run(arguments))
 
@@ -28,7 +27,7 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     docs, out = tmp_path / "docs", tmp_path / "out"
     docs.mkdir()
     (docs / "reliability.md").write_text("<!-- bench:attack -->\nold\n<!-- /bench:attack -->\n")
-    words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--out", str(out))
+    words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
     _, rows = read_rows(out / "attack.csv", Row)
     wrong = [row for row in rows if row.outcome == "wrong"]
@@ -56,9 +55,9 @@ def test_other_runs_are_counted_too(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def two(cases: Iterator[Case], *_: object) -> Iterator[Ended]:
+    def two(cases: Iterator[Case], *_: object) -> Iterator[tuple[Case, Verdict]]:
         for case in islice(cases, 2):
-            yield Ended(case, None, Verdict("right", "nothing"))
+            yield case, Verdict("right", "nothing")
         raise KeyboardInterrupt
 
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.attack.case import Verdict
 from wholebody.bench.attack.judging import Pairs, judge
 from wholebody.bench.attack.solves import verdict
 from wholebody.bench.suite.stability.bodies import Builder, planar_arm, sliding_tool
@@ -91,9 +93,14 @@ def solved(arm: wb.Scene) -> tuple[wb.Problem, list[wb.Goal], wb.Solution]:
     return problem, goals, solution
 
 
+def judged(problem: wb.Problem, goals: Sequence[wb.Goal], solution: wb.Solution, *, witness: bool) -> Verdict:
+    found = judge(problem, goals, [], solution.q)
+    return verdict(problem, found, solution, tolerance=wb.QP().tolerance, witness=witness, seconds=0.1)
+
+
 def outcome(solved: tuple[wb.Problem, list[wb.Goal], wb.Solution], **changed: Any) -> tuple[str, str]:
     problem, goals, solution = solved
-    found = verdict(problem, goals, [], replace(solution, **changed), method="qp", witness=True, seconds=0.1)
+    found = judged(problem, goals, replace(solution, **changed), witness=True)
     return found.outcome, found.words
 
 
@@ -123,8 +130,8 @@ def test_an_answer_inside_of_something_is_wrong() -> None:
     solution = wb.solve(problem)
     inside = np.array([0.0, 0.0, 0.5])
     lie = replace(solution, q=inside, status="solved", assessment=wb.assess(problem, inside))
-    found = verdict(problem, goals, [], lie, method="qp", witness=False, seconds=0.1)
+    found = judged(problem, goals, lie, witness=False)
     assert found.outcome == "wrong"
     assert "missed by 0.1 m" in found.words
-    honest = verdict(problem, goals, [], solution, method="qp", witness=False, seconds=0.1)
+    honest = judged(problem, goals, solution, witness=False)
     assert honest.outcome == "right"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,13 +9,12 @@ import numpy as np
 import pytest
 
 from tests.bench.following import followed
+from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
-from wholebody.bench.measure.figure_track import figure_tracks
-from wholebody.bench.measure.step import StepRow, taking
-from wholebody.bench.measure.track import CLEARANCE, Track, judge
+from wholebody.bench.measure.step import taking
+from wholebody.bench.measure.track import CLEARANCE, Track, figure_tracks, judge
 from wholebody.bench.suite.adapters.registry import installed_tools, make_tool
-from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.cli import main
 
 TOOLS = [name for name in ("wholebody", "placo", "placo/pruned", "pink", "mink") if name in installed_tools()]
 LINK = '<link name="{}"><collision><geometry><sphere radius="0.02"/></geometry></collision></link>'
@@ -83,15 +81,12 @@ def test_a_figure_that_cannot_reach_is_refused(tmp_path: Path) -> None:
 
 def test_the_command_writes_the_same_tables(tmp_path: Path, root: Path) -> None:
     (tmp_path / "results.md").write_text("<!-- bench:step-figures -->\n<!-- /bench:step-figures -->")
-    parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
     out, file = str(tmp_path / "out"), str(root / "tests/data/arm/arm.urdf")
     words = ("--figure", file, "--repeats", "1", "--steps", "8", "--tools", "wholebody", "--out", out)
-    arguments = parser.parse_args(["bench", "step", *words, "--update-docs", str(tmp_path)])
-    assert arguments.run(arguments) == 0
-    _, rows = read_rows(tmp_path / "out" / "step-figures.csv", StepRow)
-    assert [row.reach for row in rows] == ["arm, free", "arm, contact", "arm, alone"]
+    assert main(["bench", "step", *words, "--update-docs", str(tmp_path)]) == 0
+    rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
+    assert [row["case"] for row in rows] == ["arm, free", "arm, contact", "arm, alone"]
     page = (tmp_path / "results.md").read_text()
-    assert "arm, contact reach" in page
+    assert "### arm, contact: result" in page
     assert "standing human" not in page
-    assert "Refused" not in page
+    assert "does not take" not in page

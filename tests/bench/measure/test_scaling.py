@@ -2,20 +2,28 @@
 
 from __future__ import annotations
 
-import argparse
-import math
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
 from wholebody.bench.measure import scaling
-from wholebody.bench.measure.chains import LENGTH, ROOM, TIP, chain, task
-from wholebody.bench.measure.scaling import SIMPLIFIED, ScalingRow, assembly_rows, exponent, rows
-from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.bench.measure.scaling import (
+    LENGTH,
+    ROOM,
+    SIMPLIFIED,
+    TIP,
+    assembly_rows,
+    chain,
+    exponent,
+    exponents,
+    rows,
+    task,
+)
+from wholebody.cli import main
 from wholebody.figures.state import State
 
 
@@ -61,29 +69,29 @@ def test_a_task_is_the_same_for_a_seed_and_leaves_its_start_free() -> None:
 
 def test_rows_say_what_was_measured() -> None:
     said: list[str] = []
-    found = list(rows({"things": (5, 20)}, ("qp",), 1, said.append))
-    assert [(row.size, row.method) for row in found] == [(5, "qp"), (5, SIMPLIFIED), (20, "qp"), (20, SIMPLIFIED)]
+    found = list(rows({"things around": (5, 20)}, ("qp",), 1, said.append))
+    assert [(row.case, row.tool) for row in found] == [
+        (f"{size} things around", method) for size in (5, 20) for method in ("qp", SIMPLIFIED)
+    ]
     assert len(said) == 4
     for whole, part in zip(found[::2], found[1::2], strict=True):
-        assert whole.status == part.status == "solved"
-        assert part.pairs < whole.pairs
-        assert whole.solve_ms > 0.0
-        assert whole.step_ms > 0.0
-    bodies = next(assembly_rows((5,), 1))
-    assert bodies.solve_ms > 0.0
-    assert math.isnan(bodies.step_ms)
+        assert whole["status"] == part["status"] == "solved"
+        assert part["pairs"] < whole["pairs"]
+        assert whole["a solve ms"] > 0.0
+        assert whole["a step ms"] > 0.0
+    (bodies,) = assembly_rows((5,), 1)
+    assert bodies["a solve ms"] > 0.0
+    assert [row.case for row in exponents([*found, bodies])] == ["things around", "things around", "joints"]
 
 
 def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    monkeypatch.setattr(scaling, "QUICK", {"joints": (3, 5), "pieces": (1, 2), "things": (4, 8)})
+    sizes = {"joints": (3, 5), "pieces of each segment": (1, 2), "things around": (4, 8)}
+    monkeypatch.setattr(scaling, "QUICK", sizes)
     (tmp_path / "results.md").write_text("<!-- bench:scaling -->\n<!-- /bench:scaling -->")
-    parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
     words = ["bench", "scaling", "--quick", "--methods", "ccd", "--out", str(tmp_path / "out")]
-    arguments = parser.parse_args([*words, "--update-docs", str(tmp_path)])
-    assert arguments.run(arguments) == 0
-    _, found = read_rows(tmp_path / "out" / "scaling.csv", ScalingRow)
-    assert {row.series for row in found} == {"joints", "pieces", "things"}
+    assert main([*words, "--update-docs", str(tmp_path)]) == 0
+    found = csv_rows(tmp_path / "out" / "scaling.csv")
+    assert {row["case"].partition(" ")[2] for row in found} == {*sizes}
     page = (tmp_path / "results.md").read_text()
     assert "assets/bench/scaling.svg" in page
     assert "| things around | ccd |" in page

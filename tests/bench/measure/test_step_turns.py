@@ -33,7 +33,7 @@ def test_every_tool_steps_the_same_frames_in_turn(short_free: Track, monkeypatch
     monkeypatch.setattr(module, "make_tool", Standing)
     monkeypatch.setattr(module, "TURN", 3)
     tools, steps = ("first", "second", "third"), len(short_free.targets)
-    rows, times = module.measure(short_free, tools, 2)
+    runs = module.measure(short_free, tools, 2)
     whole = [(name, frame) for name in tools for frame in range(steps)]
     each = len(whole)
     assert len(made) == 3 * each  # two repeats, and a round before them
@@ -46,5 +46,4 @@ def test_every_tool_steps_the_same_frames_in_turn(short_free: Track, monkeypatch
             assert {frame for _, frame in turn} == set(range(first, min(first + 3, steps)))
             begun.append(turn[0][0])
     assert {begun.count(name) for name in tools} == {3}  # each begins as many turns
-    assert [row.tool for row in rows] == [*tools]
-    assert len(times) == 2 * each
+    assert {name: len(mine) for name, mine in runs.items()} == dict.fromkeys(tools, 2)

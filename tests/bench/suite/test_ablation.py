@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.motion import ablated
+from wholebody.bench.measure import motion_ablation as ablated
+from wholebody.bench.rows import Row
 from wholebody.bench.suite import ablation
-from wholebody.bench.suite.ablation import Constant, Row, report
+from wholebody.bench.suite.ablation import Constant, report
+from wholebody.bench.suite.ablation import Row as Change
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
 from wholebody.methods.qp import working_set
-from wholebody.motion import per_frame
-
-CHANGES = ("free", "deepest_mm", "deviation", "jerk", "sliding_mm", "programs")
+from wholebody.motion import repair
 
 
 @pytest.fixture(scope="module")
@@ -89,7 +89,7 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
     assert rows == [replace(rows[0], what="nothing", change="off", differ=0, solved=0, iterations=0, left=0.0)]
     assert 0.1 < rows[0].time < 10.0
     assert len(told) == 1
-    text = report("qp", len(given), whole, [*rows, Row("x.Y", "halved", 0, 0, 0, 0.0, 1.0)], ["a.kernel"])
+    text = report("qp", len(given), whole, [*rows, Change("x.Y", "halved", 0, 0, 0, 0.0, 1.0)], ["a.kernel"])
     assert "`x.Y`" in text
     assert "a.kernel" in text
 
@@ -138,22 +138,19 @@ def test_every_mechanism_that_is_switched_off_is_there() -> None:
 
 
 def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods(monkeypatch) -> None:
-    monkeypatch.setattr(ablated, "USED", {"per_frame": ("frames",), "bisection.method": ("bisection",)})
-    told: list[str] = []
+    monkeypatch.setattr(ablated, "USED", {"repair": ("frames",), "bisection.prediction": ("bisection",)})
+    told, settings = list[str](), repair.SETTINGS
     figure = wb.load("human")
-    whole, rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
-    assert whole.free == (True,)
-    assert [row.what for row in rows[::2]] == ["per_frame.MARGIN", "per_frame.ROOM", "per_frame.LIFTS"]
-    assert {row.change for row in rows} == {"halved", "doubled"}
-    assert per_frame.MARGIN == 0.3
-    by_name = {(row.what, row.change): row for row in rows}
-    assert by_name["per_frame.MARGIN", "doubled"].differ == 1  # more frames are passed
-    text = ablated.report([*rows, replace(rows[0], what="x.Y", **dict.fromkeys(CHANGES, 0))])
-    assert "`per_frame.MARGIN`" in text
-    assert "nothing on these cases: " in text
-    assert "`x.Y`" in text.split("nothing on these cases: ")[1]
+    rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
+    assert {row.case for row in rows} <= {f"repair.SETTINGS.{name}" for name in asdict(settings)}
+    assert {row.tool for row in rows} == {"halved", "doubled"}
+    assert len(told) == len(rows)
+    assert repair.SETTINGS is settings
+    nothing = dict.fromkeys(("free", "deepest mm", "deviation rad", "jerk", "feet slide mm", "programs"), 0)
+    assert not ablated.matters(Row("x.Y", "halved", nothing))
+    assert ablated.matters(Row("x.Y", "halved", nothing | {"programs": 1}))
 
 
 def test_the_modules_whose_constants_are_changed_have_some() -> None:
     for module in ablated.USED:
-        assert ablation.constants_in([f"wholebody.motion.{module}"])[0], module
+        assert ablated.numbers_of(module), module

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure.reaches import reach
+from wholebody.bench.measure.solve import reach
 from wholebody.bench.suite.stability.posed import collinear_start
 from wholebody.methods.qp.multipliers import Multipliers, multipliers_of
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
@@ -92,6 +92,6 @@ def test_elastic_rows_count_by_their_names():
 
 def test_steps_do_not_swing_across_a_curved_constraint():
     """Judged by the measures alone, steps of this reach grew from one to the next until one was rejected, 88 in all."""
-    solution = wb.QP().solve(reach(26).problem)
+    solution = wb.QP().solve(reach(26)[0])
     assert solution.solved
     assert solution.iterations < 60

@@ -9,7 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.suite.problem_sets.robot_arm import SET as ROBOT_ARMS
+from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.stability.posed import cancelling
 
 LENGTHS = (0.5, 0.4)
@@ -309,7 +309,7 @@ def test_a_start_whose_contacts_cancel_ends_outside(honest):
 def test_an_arm_that_another_configuration_frees_is_not_called_out_of_reach(honest):
     """A witness proves that the goal is within reach; those that begin near the start all end blocked."""
     number, seed = 17, 12
-    case = ROBOT_ARMS.make(number, seed)
+    case = SETS["robot_arm"].make(number, seed)
     proof = wb.assess(case.problem, case.witness)
     assert proof.holds(1e-6)
     assert proof.goal_error < 1e-6

@@ -1,115 +1,226 @@
-"""Files that are not what they should be: mutated tasks, tracks, results, robots and meshes, and paths to nothing."""
+"""Files that are not what they should be: mutated tasks, tracks, results, robots and meshes, and paths to nothing.
+
+Mutations change bytes, lines, numbers, words and encodings, or put in what parsers have stumbled over.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack.case import CORPUS, Verdict, Written
-from wholebody.bench.attack.mutations import mutated
+from wholebody.bench.attack.case import CORPUS, Verdict
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
+from wholebody.taskfile import read_task
+from wholebody.taskfile.result import read
+from wholebody.tracking.track_files import read_track
 
-LONGEST = 1500  # characters of a refusal: more is no sentence
-HEAVIEST = 1e9  # kg, m, rad/s: numbers of a robot above this are slips
-PACKAGED = 0.15  # share of cases that begin with a file of the package
-NO_FILES = (
-    "/dev/zero",
-    "/dev/null",
-    "/",
-    "no-such-file",
-    "a" * 5000,
-    "a/" * 3000 + "b",
-    "nul\0l",
-    "",
-    ".",
-    "/dev/full",
+NUMBERS = (
+    b"nan", b"inf", b"-inf", b"NaN", b"Infinity", b"1e400", b"-1e308", b"1e300", b"1e-320", b"0", b"-0.0", b"-1",
+    b"9" * 400,
+    b"9" * 5000, b"0x7fffffff", b"1_000", b"1e5", b"+.5", b"1e", b"--1", b"1,5", b"\xd9\xa3", b"2147483648",
+    b"-9223372036854775809", b"3.5", b"1e-9", b"100.00001",
+)  # fmt: skip
+"""What a number becomes."""
+VALUES = (
+    b"true", b'"x"', b"''", b'""', b"[]", b"{}", b"[[[[1]]]]", b"null", b"None", b"2020-01-01", b'"""', b"[1, 'a', []]",
+    b"{ a = 1 }", b"\\ud800", b'"\\u0000"', b'"../../../../etc/passwd"', b'"/dev/null"', b'"' + b"a" * 5000 + b'"',
+    b'"."',
+)  # fmt: skip
+"""What a value becomes."""
+ODD = (
+    b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\x1b[31m", "é".encode(), "é".encode("latin-1"), "\u202e".encode(),
+    b"<", b">", b"&", b'"', b"'", b"[", b"]", b"{", b"}", b",", b"=", b"#", b"\n", b"\\", b"%s", b"&undefined;", b"]]>",
+)  # fmt: skip
+"""What is put in between."""
+BOMB = (
+    b'<?xml version="1.0"?>\n<!DOCTYPE robot [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">'
+    b'<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;"><!ENTITY d "&c;&c;&c;&c;&c;&c;&c;&c;&c;&c;">]>\n<robot name="&d;">'
 )
-ELSEWHERE = 0.01  # share of cases whose path leads to no file
+_NUMBER = re.compile(rb"(?<![A-Za-z_])-?\d+\.?\d*(?:[eE][-+]?\d+)?")
+_VALUE = re.compile(rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*')
+_WORD = re.compile(rb"[A-Za-z_]{2,}")
 
+
+def mutated(text: bytes, rng: np.random.Generator) -> bytes:
+    """Return a text with one to three mutations, seldom more."""
+    count = int(rng.choice([1, 1, 1, 2, 3, 10]))
+    for _ in range(count):
+        text = _WAYS[int(rng.integers(len(_WAYS)))](text, rng)
+    return text
+
+
+def _flip(text: bytes, rng: np.random.Generator) -> bytes:
+    found = bytearray(text or b"x")
+    for _ in range(int(rng.integers(1, 4))):
+        found[int(rng.integers(len(found)))] = int(rng.integers(256))
+    return bytes(found)
+
+
+def _span(text: bytes, rng: np.random.Generator) -> tuple[int, int]:
+    first = int(rng.integers(len(text) + 1))
+    return first, min(len(text), first + int(rng.integers(1, 60)))
+
+
+def _delete(text: bytes, rng: np.random.Generator) -> bytes:
+    first, last = _span(text, rng)
+    return text[:first] + text[last:]
+
+
+def _repeat(text: bytes, rng: np.random.Generator) -> bytes:
+    first, last = _span(text, rng)
+    return text[:last] + text[first:last] + text[last:]
+
+
+def _cut(text: bytes, rng: np.random.Generator) -> bytes:
+    return text[: int(rng.integers(len(text) + 1))]
+
+
+def _insert(text: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(text) + 1))
+    return text[:at] + ODD[int(rng.integers(len(ODD)))] + text[at:]
+
+
+def _replaced(text: bytes, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes], rng: np.random.Generator) -> bytes:
+    found = list(pattern.finditer(text))
+    if not found:
+        return text
+    one = found[int(rng.integers(len(found)))]
+    return text[: one.start()] + by(one.group()) + text[one.end() :]
+
+
+def _number(text: bytes, rng: np.random.Generator) -> bytes:
+    return _replaced(text, _NUMBER, lambda _: NUMBERS[int(rng.integers(len(NUMBERS)))], rng)
+
+
+def _value(text: bytes, rng: np.random.Generator) -> bytes:
+    return _replaced(text, _VALUE, lambda _: VALUES[int(rng.integers(len(VALUES)))], rng)
+
+
+def _word(text: bytes, rng: np.random.Generator) -> bytes:
+    words = _WORD.findall(text) or [b"x"]
+    return _replaced(text, _WORD, lambda _: words[int(rng.integers(len(words)))], rng)
+
+
+def _misspelt(text: bytes, rng: np.random.Generator) -> bytes:
+    def swapped(word: bytes) -> bytes:
+        at = int(rng.integers(len(word) - 1))
+        return word[:at] + word[at + 1 : at + 2] + word[at : at + 1] + word[at + 2 :]
+
+    return _replaced(text, _WORD, swapped, rng)
+
+
+def _lines(text: bytes, rng: np.random.Generator) -> bytes:
+    lines = text.split(b"\n")
+    a, b = int(rng.integers(len(lines))), int(rng.integers(len(lines)))
+    what = int(rng.integers(3))
+    if what == 0:
+        lines[a], lines[b] = lines[b], lines[a]
+    elif what == 1:
+        lines.insert(b, lines[a])
+    else:
+        del lines[a]
+    return b"\n".join(lines)
+
+
+def _encoded(text: bytes, rng: np.random.Generator) -> bytes:
+    what = int(rng.integers(6))
+    if what == 0:
+        return text.decode("utf-8", errors="replace").encode("utf-16")
+    if what == 1:
+        return b"\xef\xbb\xbf" + text
+    if what == 2:
+        return text.replace(b"\n", b"\r\n")
+    if what == 3:
+        return text.replace(b"\n", b"\r")
+    name = (b"klingon", b"utf-16", b"us-ascii", b"latin-1")[int(rng.integers(4))]
+    return text.replace(b'encoding="utf-8"', b'encoding="' + name + b'"')
+
+
+def _nested(text: bytes, rng: np.random.Generator) -> bytes:
+    depth = int(rng.choice((50, 3000, 200_000), p=[0.6, 0.3, 0.1]))
+    opening, closing = ((b"[", b"]"), (b"{a=", b"}"), (b"<link>", b"</link>"), (b'{"a":', b"}"))[int(rng.integers(4))]
+    return _replaced(text, _VALUE, lambda old: opening * depth + old + closing * depth, rng)
+
+
+def _bomb(text: bytes, rng: np.random.Generator) -> bytes:
+    return BOMB + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _insert(text, rng)
+
+
+def _empty(text: bytes, rng: np.random.Generator) -> bytes:
+    return (b"", b"\n", b"\x00" * 100, text * 50)[int(rng.integers(4))]
+
+
+_WAYS = (
+    *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, _flip, _delete, _delete, _repeat, _cut,
+    _insert,
+    _insert, _lines, _lines, _encoded, _nested, _bomb, _empty,
+)  # fmt: skip
+
+
+NO_FILES = (
+    "/dev/zero", "/dev/null", "/", "no-such-file", "a" * 5000, "a/" * 3000 + "b", "nul\0l", "", ".", "/dev/full",
+)  # fmt: skip
 ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
-TASK = {"task.toml": "everything.toml"} | ROBOT
 """Names of files that belong together, and where they are stored."""
-
-SCRIPT = '''"""{title}"""
-
-from pathlib import Path
-
-import wholebody as wb
-from wholebody.bench.attack import files
-{imports}
-HERE = Path(__file__).parent
-
-try:
-    verdict = files.sane({call})
-except wb.WholebodyError as error:
-    verdict = files.refused(error)
-print(verdict)
-'''
 
 
 class Reader(NamedTuple):
     """A way to read a file.
 
     Attributes:
-        imports: what its call needs.
-        call: Python, with `{path}` for the file's path.
+        read: reads the file at a path, and what lies beside it.
         files: what it reads, by names; the first one is mutated, another one now and then.
     """
 
-    imports: str
-    call: str
+    read: Callable[[Path], Any]
     files: Mapping[str, bytes]
 
 
-def written(rng: np.random.Generator) -> Written:
-    """Write a case."""
+def case(rng: np.random.Generator, folder: Path) -> Verdict:
+    """Read a mutated file, or seldom a path that leads to none."""
     reader = _reader(rng)
     contents = dict(reader.files)
     names = list(contents)
     chosen = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
-    path = f"HERE / {names[0]!r}"
-    if rng.random() < ELSEWHERE:
-        path = f"Path({NO_FILES[int(rng.integers(len(NO_FILES)))]!r})"
+    path = folder / names[0]
+    if rng.random() < 0.01:
+        path = Path(NO_FILES[int(rng.integers(len(NO_FILES)))])
     else:
         contents[chosen] = mutated(contents[chosen], rng)
-    call = reader.call.replace("{path}", path)
-    title = f"a {chosen} that is not what it should be"
-    return Written(SCRIPT.format(title=title, imports=reader.imports, call=call), contents)
+    for name, text in contents.items():
+        (folder / name).write_bytes(text)
+    try:
+        return sane(reader.read(path))
+    except wb.WholebodyError as error:
+        return refused(error)
 
 
 def _reader(rng: np.random.Generator) -> Reader:
     kind = str(rng.choice(["task", "robot", "mesh", "track", "result"], p=[0.3, 0.3, 0.1, 0.15, 0.15]))
+    task = {"task.toml": "everything.toml"} | ROBOT
     if kind == "mesh":
         name, stored = (("part.obj", "box.obj"), ("part.stl", "tetrahedron.stl"))[int(rng.integers(2))]
-        return Reader("", "wb.Mesh({path}).pieces()", _stored({name: stored}))
+        return Reader(lambda path: wb.Mesh(path).pieces(), _stored({name: stored}))
     if kind == "track":
-        call = "read_track({path}, wb.load(HERE / 'robot.urdf'))"
-        return Reader(
-            "from wholebody.tracking.track_files import read_track\n",
-            call,
-            _stored({"track.csv": "track.csv"} | ROBOT),
-        )
+        files = _stored({"track.csv": "track.csv"} | ROBOT)
+        return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
     if kind == "result":
-        return Reader(
-            "from wholebody.taskfile.result import read\n",
-            "read({path})",
-            _stored({"result.json": "result.json"} | TASK),
-        )
+        return Reader(read, _stored({"result.json": "result.json"} | task))
+    packaged = rng.random() < 0.15
     if kind == "robot":
-        if rng.random() < PACKAGED:
-            return Reader("", "wb.load({path})", {"hand.urdf": urdf_path("hand").read_bytes()})
-        return Reader("", "wb.load({path})", _stored(ROBOT))
-    imports = "from wholebody.taskfile import read_task\n"
-    if rng.random() < PACKAGED:
-        tasks = task_paths()
-        name = sorted(tasks)[int(rng.integers(len(tasks)))]
-        beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
-        return Reader(imports, "read_task({path})", {"task.toml": tasks[name].read_bytes(), **beside})
-    return Reader(imports, "read_task({path})", _stored(TASK))
+        return Reader(wb.load, {"hand.urdf": urdf_path("hand").read_bytes()} if packaged else _stored(ROBOT))
+    if not packaged:
+        return Reader(read_task, _stored(task))
+    tasks = task_paths()
+    name = sorted(tasks)[int(rng.integers(len(tasks)))]
+    beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
+    return Reader(read_task, {"task.toml": tasks[name].read_bytes(), **beside})
 
 
 def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
@@ -120,7 +231,7 @@ def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
 def refused(error: Exception) -> Verdict:
     """Judge a refusal: one sentence that a person can read."""
     words = str(error)
-    if len(words) > LONGEST:
+    if len(words) > 1500:
         return Verdict("wrong", f"a refusal of {len(words)} characters: {words[:100]!r}...")
     if not words.strip() or "\n" in words.strip():
         return Verdict("wrong", f"a refusal of other than one line: {words[:100]!r}")
@@ -160,10 +271,10 @@ def _figure(figure: wb.Figure) -> Verdict:
     limits = np.concatenate([model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit])
     if not (np.isfinite(masses).all() and np.isfinite(places).all() and np.isfinite(inner).all()):
         return Verdict("wrong", "a robot was taken whose masses or places are not made of finite numbers")
-    if (masses < 0.0).any() or masses.max() > HEAVIEST or np.abs(places).max() > HEAVIEST:
-        return Verdict(
-            "wrong", f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
-        )
+    most = 1e9  # kg, m: greater numbers of a robot are slips
+    if (masses < 0.0).any() or masses.max() > most or np.abs(places).max() > most:
+        words = f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
+        return Verdict("wrong", words)
     if np.isnan(limits).any() or (model.velocityLimit < 0.0).any():
         return Verdict("wrong", "a robot was taken with limits that are not numbers, or with negative velocities")
     for name in figure.postures:

@@ -24,7 +24,6 @@ from wholebody.scene.scene import Scene
 
 OWN = (wb.Balance, wb.ReachCones, wb.RangeOfMotion)
 """Constraints whose values are those of the package's own terms."""
-RESTING = 1e-6  # m: a pair that begins deeper than this begins inside, and is asked for the whole clearance
 
 
 @dataclass(frozen=True)
@@ -95,9 +94,12 @@ class Pairs:
         return found
 
     def asked(self, start: Array, clearance: float) -> Array:
-        """Distance (pairs,) asked of every pair: the clearance, or what a resting pair has at the start."""
+        """Distance (pairs,) asked of every pair: the clearance, or what a resting pair has at the start.
+
+        A pair that begins more than 1 µm deep begins inside, and is asked for the whole clearance.
+        """
         began = self.distances(start)
-        return np.where(began >= -RESTING, np.minimum(clearance, np.maximum(began, 0.0)), clearance)
+        return np.where(began >= -1e-6, np.minimum(clearance, np.maximum(began, 0.0)), clearance)
 
 
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
@@ -176,15 +178,10 @@ class _Body:
             return _angle(self._at(term.frame).rotation, pin.Quaternion(np.array(term.target, dtype=float)).matrix())
         if isinstance(term, wb.Axis):
             return self._axis(term)
-        if isinstance(term, wb.Relative):
-            wanted = self._between(self._before, term) if term.placement is None else _placement(term.placement)
-            return _apart(self._between(self._after, term), wanted, term.orientation)
         if isinstance(term, wb.Posture):
             way = pin.difference(self._model, np.array(term.target, dtype=float), self._q)
-            taking = np.zeros(self._model.nv, dtype=bool)
-            taking[self._places(term.joints)] = True
             slides = self._slides()
-            return float(max(np.linalg.norm(way[taking & slides]), np.linalg.norm(way[taking & ~slides])))
+            return float(max(np.linalg.norm(way[slides]), np.linalg.norm(way[~slides])))
         raise TypeError(f"the judge does not know the goal {type(term).__name__}")
 
     def constraint(self, term: Any) -> Iterator[float]:
@@ -199,20 +196,15 @@ class _Body:
             yield -height if term.side == "above" else abs(height)
         elif isinstance(term, wb.Freeze):
             way = pin.difference(self._model, self._start, self._q)
-            yield float(np.abs(way[self._places(term.joints)]).max(initial=0.0))
+            for name in term.joints:
+                joint = self._model.joints[1 if name == "root" else self._model.getJointId(name)]
+                yield float(np.abs(way[joint.idx_v : joint.idx_v + joint.nv]).max())
 
     def _axis(self, term: wb.Axis) -> float:
         there = self._at(term.frame)
         pointing = there.rotation @ np.array(term.axis, dtype=float)
-        wanted = (
-            np.array(term.direction, dtype=float)
-            if term.direction is not None
-            else np.array(term.toward, dtype=float) - there.translation
-        )
+        wanted = np.array(term.direction, dtype=float)
         return float(np.arctan2(np.linalg.norm(np.cross(pointing, wanted)), pointing @ wanted))
-
-    def _between(self, data: Any, term: wb.Relative) -> pin.SE3:
-        return self._at(term.to, data).actInv(self._at(term.frame, data))
 
     def _at(self, frame: str, data: Any = None) -> pin.SE3:
         return (self._after if data is None else data).oMf[self._model.getFrameId(frame)]
@@ -226,14 +218,6 @@ class _Body:
             elif "JointModelP" in joint.shortname():
                 slides[joint.idx_v : joint.idx_v + joint.nv] = True
         return slides
-
-    def _places(self, names: Any) -> list[int]:
-        """Places in the tangent of joints by name, "root" among them; all of them for None."""
-        if names is None:
-            return list(range(self._model.nv))
-        listed = [names] if isinstance(names, str) else names
-        joints = [self._model.joints[1 if name == "root" else self._model.getJointId(name)] for name in listed]
-        return [place for joint in joints for place in range(joint.idx_v, joint.idx_v + joint.nv)]
 
 
 def _placement(at: Any) -> pin.SE3:

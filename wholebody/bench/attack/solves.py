@@ -7,59 +7,37 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, get_args
+from pathlib import Path
+from time import process_time
+from typing import Any, Literal, get_args
 
 import numpy as np
 import pinocchio as pin
 
+import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.attack.bodies import Body, body
-from wholebody.bench.attack.case import Verdict, Written
+from wholebody.bench.attack.case import Verdict, chosen
 from wholebody.bench.attack.judging import Judged, Pairs, judge
 from wholebody.bench.attack.things import Thing, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
-from wholebody.methods import METHODS, installed_methods
+from wholebody.methods import installed_methods
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status
 
-CLEARANCES = (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3)
-ASKED_OF = (*("'qp'",) * 12, "wb.QP(tolerance=1e-8)", "wb.QP(measures=False)", "wb.QP(solver='daqp')") + tuple(
-    f"'{name}'" for name in installed_methods() if name != "qp"
+METHODS: tuple[Any, ...] = (
+    *(wb.QP(),) * 12,
+    wb.QP(tolerance=1e-8),
+    wb.QP(measures=False),
+    wb.QP(solver="daqp"),
+    *(method_named(name) for name in installed_methods() if name != "qp"),
 )
-MEASURES = (
-    "None", "None", "None", "[]", "[wb.Effort(), wb.Discomfort(weight=0.1)]", "[wb.Displacement()]",
-    "[wb.PotentialEnergy(weight=0.01)]", "[wb.Discomfort()]",
+MEASURES: tuple[Any, ...] = (
+    None, None, None, [], [wb.Effort(), wb.Discomfort(weight=0.1)], [wb.Displacement()],
+    [wb.PotentialEnergy(weight=0.01)], [wb.Discomfort()],
 )  # fmt: skip
-MOST = 8  # things, usually
-CROWD = 20  # things, seldom
 FARTHEST = 99.0  # m: goals farther than 100 m are refused
-
-HEAD = '''"""{title}"""
-
-from pathlib import Path
-from time import process_time
-
-import numpy as np
-
-import wholebody as wb
-{imports}
-HERE = Path(__file__).parent
-
-'''
-TAIL = """
-problem = wb.Problem(
-    scene, start, goals=goals, constraints=constraints, measures={measures}, clearance={clearance!r},
-)
-method = {method}
-began = process_time()
-solution = wb.solve(problem, method=method)
-seconds = process_time() - began
-verdict = solves.verdict(
-    problem, goals, constraints, solution, method=method, witness={witness}, seconds=seconds,
-)
-print(verdict)
-"""
 
 
 @dataclass
@@ -67,60 +45,57 @@ class Terms:
     """Goals and constraints, while they are being made up.
 
     Attributes:
-        goals, constraints: as Python.
+        goals, constraints: of a problem.
         feasible: whether the witness fits all of it.
     """
 
-    goals: list[str] = field(default_factory=list)
-    constraints: list[str] = field(default_factory=list)
+    goals: list[wb.Goal] = field(default_factory=list)
+    constraints: list[Any] = field(default_factory=list)
     feasible: bool = True
 
 
-def written(rng: np.random.Generator) -> Written:
-    """Write a solve."""
-    figure = body(rng)
-    clearance = float(CLEARANCES[int(rng.integers(len(CLEARANCES)))]) * min(1.0, figure.size)
-    start = start_posture(figure, rng)
+def case(rng: np.random.Generator, folder: Path) -> Verdict:
+    """Solve a problem."""
+    figure = body(rng, folder)
+    clearance = float(chosen(rng, (0.0, 0.0, 0.001, 0.005, 0.005, 0.05, 0.3))) * min(1.0, figure.size)
+    start = _start_posture(figure, rng)
     witness = figure.clear(start, float(rng.choice([0.1, 0.4, 1.0])), rng, clearance + 1e-4 * figure.size)
-    things = around(figure, start, witness, clearance, rng)
-    terms = random_terms(figure, start, witness, rng)
+    things = _around(figure, start, witness, clearance, rng)
+    terms = _random_terms(figure, start, witness, rng)
     known = witness is not None and terms.feasible and bool(terms.goals) and _clear(figure, witness, things, clearance)
-    chosen = ASKED_OF[int(rng.integers(len(ASKED_OF)))]
-    measures = MEASURES[int(rng.integers(len(MEASURES)))]
-    title = f"{figure.figure.name} among {len(things)} things; {'a posture that fits is known' if known else 'made up'}"
-    tail = TAIL.format(measures=measures, clearance=clearance, method=chosen, witness=known)
-    return Written(script_head(title, figure, start, things, terms, "solves") + tail, figure.files)
+    method, measures = chosen(rng, METHODS), chosen(rng, MEASURES)
+    problem = wb.Problem(
+        scene_of(figure, things), start, goals=terms.goals, constraints=terms.constraints, measures=measures,
+        clearance=clearance,
+    )  # fmt: skip
+    began = process_time()
+    solution = wb.solve(problem, method=method)
+    seconds = process_time() - began
+    found = judge(problem, terms.goals, terms.constraints, solution.q)
+    return verdict(problem, found, solution, tolerance=float(method.tolerance), witness=known, seconds=seconds)
 
 
-def script_head(title: str, figure: Body, start: Array, things: list[Thing], terms: Terms, judge: str) -> str:
-    """Return the script up to the problem: figure, scene, start, goals, constraints; `judge` is its judging module."""
-    imports = f"from wholebody.bench.attack import {judge}\n"
-    if "_path" in figure.call:
-        imports += "from wholebody.figures.packaged_urdf import task_paths, urdf_path\n"
-    lines = [
-        f"figure = {figure.call}",
-        "scene = wb.Scene(figure)",
-        *(thing.line(f"thing {number}") for number, thing in enumerate(things)),
-        f"start = np.array({start.tolist()!r})",
-        f"goals = [{', '.join(terms.goals)}]",
-        f"constraints = [{', '.join(terms.constraints)}]",
-    ]
-    return HEAD.format(title=title, imports=imports) + "\n".join(lines)
+def scene_of(figure: Body, things: Sequence[Thing]) -> wb.Scene:
+    """Return a scene of a figure and things, which are named by their numbers."""
+    scene = wb.Scene(figure.figure)
+    for number, thing in enumerate(things):
+        scene.add(thing.shape, name=f"thing {number}", at=thing.at)
+    return scene
 
 
-def start_posture(figure: Body, rng: np.random.Generator) -> Array:
-    """Return a posture (nq,) to start from: a named one, or one at random."""
+def _start_posture(figure: Body, rng: np.random.Generator) -> Array:
+    """A posture (nq,) to start from: a named one, or one at random."""
     names = figure.figure.postures
     q = figure.figure.clamp(figure.figure.posture(names[int(rng.integers(len(names)))]))
     return q if rng.random() < 0.5 else figure.near(q, float(rng.choice([0.05, 0.3, 1.0])), rng)
 
 
-def around(
+def _around(
     figure: Body, start: Array, witness: Array | None, clearance: float, rng: np.random.Generator
 ) -> list[Thing]:
-    """Return things: clear of the witness, some of them in the figure where it starts."""
+    """Things: clear of the witness, some of them in the figure where it starts."""
     placed = Occupied(figure.figure, [start] if witness is None else [start, witness])
-    count = CROWD if rng.random() < 0.05 else int(rng.integers(0, MOST + 1))
+    count = 20 if rng.random() < 0.05 else int(rng.integers(0, 9))
     room = clearance + 1e-3 * figure.size
     found: list[Thing | None] = []
     free = rng.random() < 0.4  # nothing is in the figure where it starts
@@ -139,8 +114,8 @@ def _clear(figure: Body, witness: Array, things: list[Thing], clearance: float) 
     return all(placed.distance(thing.shape, thing.placement, 0) > clearance for thing in things)
 
 
-def random_terms(figure: Body, start: Array, witness: Array | None, rng: np.random.Generator) -> Terms:
-    """Return goals and constraints: what the witness fits, what is out of reach, what contradicts."""
+def _random_terms(figure: Body, start: Array, witness: Array | None, rng: np.random.Generator) -> Terms:
+    """Goals and constraints: what the witness fits, what is out of reach, what contradicts."""
     terms, model = Terms(), figure.figure.model
     data, before = model.createData(), model.createData()
     pin.framesForwardKinematics(model, before, start)
@@ -155,35 +130,35 @@ def random_terms(figure: Body, start: Array, witness: Array | None, rng: np.rand
         way = rng.normal(size=3)
         way *= figure.size * float(rng.choice([0.02, 0.3, 1.0, 5.0, 40.0])) / np.linalg.norm(way)
         place = np.clip(data.oMf[model.getFrameId(str(frames[0]))].translation + way, -FARTHEST, FARTHEST)
-        terms.goals.append(f"wb.Point({str(frames[0])!r}, {number_text(place)})")
+        terms.goals.append(wb.Point(str(frames[0]), place))
         terms.feasible = False
     if aim == "contradicts":
         terms.feasible = False
         place = data.oMf[model.getFrameId(str(frames[0]))].translation
         for sign in (-1.0, 1.0):
-            terms.goals.append(f"wb.Point({str(frames[0])!r}, {number_text(place + sign * 0.1 * figure.size)})")
+            terms.goals.append(wb.Point(str(frames[0]), place + sign * 0.1 * figure.size))
         if rng.random() < 0.5:
-            terms.constraints.append(f"wb.Hold({str(frames[0])!r}, {number_text(place + 0.3 * figure.size)})")
+            terms.constraints.append(wb.Hold(str(frames[0]), place + 0.3 * figure.size))
     _hold(figure, start, witness, before, data, terms, rng)
     return terms
 
 
-def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generator) -> str:
+def _goal(name: str, at: pin.SE3, mass: Array, q: Array, rng: np.random.Generator) -> wb.Goal:
+    """One that a frame meets where it is, or that a posture meets as it is."""
     kind = rng.choice(["Point", "Point", "Point", "Frame", "Orientation", "Axis", "CenterOfMass", "Posture"])
-    weight = f", weight={float(np.exp(rng.uniform(-4.0, 4.0)))!r}" if rng.random() < 0.2 else ""
+    weight = float(np.exp(rng.uniform(-4.0, 4.0))) if rng.random() < 0.2 else 1.0
     if kind == "Frame":
-        return f"wb.Frame({name!r}, {xyzquat(at)}{weight})"
+        return wb.Frame(name, xyzquat(at), weight=weight)
     if kind == "Orientation":
-        return f"wb.Orientation({name!r}, {xyzquat(at)[3:]}{weight})"
+        return wb.Orientation(name, xyzquat(at)[3:], weight=weight)
     if kind == "Axis":
         axis = rng.normal(size=3)
-        return f"wb.Axis({name!r}, {number_text(axis)}, direction={number_text(at.rotation @ axis)}{weight})"
+        return wb.Axis(name, axis, direction=at.rotation @ axis, weight=weight)
     if kind == "CenterOfMass":
-        axes = ("xy", "xyz")[int(rng.integers(2))]
-        return f"wb.CenterOfMass({number_text(mass)}, axes={axes!r}{weight})"
+        return wb.CenterOfMass(mass.copy(), axes=("xy", "xyz")[int(rng.integers(2))], weight=weight)
     if kind == "Posture" and rng.random() < 0.3:
-        return f"wb.Posture(np.array({q.tolist()!r}){weight})"
-    return f"wb.Point({name!r}, {number_text(at.translation)}{weight})"
+        return wb.Posture(q, weight=weight)
+    return wb.Point(name, at.translation.copy(), weight=weight)
 
 
 def _hold(
@@ -196,61 +171,35 @@ def _hold(
         number = model.getFrameId(name)
         still = witness is not None and np.allclose(before.oMf[number].homogeneous, data.oMf[number].homogeneous)
         if still or rng.random() < 0.1:
-            terms.constraints.append(f"wb.Hold({name!r}{', orientation=False' if rng.random() < 0.3 else ''})")
+            terms.constraints.append(wb.Hold(name, orientation=bool(rng.random() >= 0.3)))
             terms.feasible &= bool(still)
     if rng.random() < 0.15:
         name = str(rng.permutation(figure.frames)[0])
         normal = rng.normal(size=3)
         place = data.oMf[model.getFrameId(name)].translation
-        side = ("on", "above")[int(rng.integers(2))]
-        terms.constraints.append(
-            f"wb.Plane({name!r}, {number_text(normal)}, point={number_text(place)}, side={side!r})"
-        )
+        sides: tuple[Literal["on"], Literal["above"]] = ("on", "above")
+        side = sides[int(rng.integers(2))]
+        terms.constraints.append(wb.Plane(name, normal, point=place.copy(), side=side))
     joints = figure.figure.joints
     if rng.random() < 0.15 and len(joints) > 1:
-        chosen = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]
+        some = [str(name) for name in rng.permutation(joints)[: int(rng.integers(1, len(joints)))]]
         way = pin.difference(model, start, start if witness is None else witness)
-        terms.feasible &= not way[figure.figure.dofs(chosen)].any()
-        terms.constraints.append(f"wb.Freeze(*{chosen!r})")
+        terms.feasible &= not way[figure.figure.dofs(some)].any()
+        terms.constraints.append(wb.Freeze(*some))
     if figure.people and rng.random() < 0.1:
         terms.feasible = False  # whether the witness balances is not looked at
-        terms.constraints.append("wb.Balance()" if rng.random() < 0.7 else "wb.ReachCones()")
-
-
-def number_text(values: Array) -> str:
-    """Return three numbers as Python."""
-    return repr(tuple(float(x) for x in values))
-
-
-ROUNDING = 2e-6  # m, rad: by which two ways of measuring may differ for pieces of up to a metre
-OF_SIZE = 1e-5  # of the size of the largest piece: coal's distances of ellipsoids are relative to it
-SHARE = 1.1  # of a method's tolerance, to which its answers may be off
-CLEARLY = 0.5  # share of the tolerance within which everything must hold for "infeasible" to be a false claim
-
-
-def tolerance_of(method: Any) -> float:
-    """Return the tolerance of a method, given by name or configured, metres and radians."""
-    chosen: Any = method_named(method) if method in METHODS else method
-    return float(chosen.tolerance)
+        terms.constraints.append(wb.Balance() if rng.random() < 0.7 else wb.ReachCones())
 
 
 def verdict(
-    problem: Problem,
-    goals: Sequence[Any],
-    constraints: Sequence[Any],
-    solution: Solution,
-    *,
-    method: Any,
-    witness: bool,
-    seconds: float,
+    problem: Problem, found: Judged, solution: Solution, *, tolerance: float, witness: bool, seconds: float
 ) -> Verdict:
-    """Judge what a method, by name or configured, answered in seconds of CPU time; what was asked is as in `judge`.
+    """Judge what was answered in seconds of CPU time, from what the judge found.
 
     `witness` says whether the problem was made from a posture that solves it.
     """
-    found = judge(problem, goals, constraints, solution.q)
     words, said = _words(found), f"{solution.method} says {solution.status!r}"
-    wrongs = _wrongs(problem, solution, found, tolerance_of(method))
+    wrongs = _wrongs(problem, solution, found, tolerance)
     if wrongs:
         return Verdict("wrong", f"{said}: {', '.join(wrongs)}; {words}", seconds, solution.status)
     gave_up = witness and solution.status != "solved"
@@ -263,9 +212,9 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
         return ["the posture or a distance at it is not made of numbers"]
     if solution.status not in get_args(Status):
         return [f"{solution.status!r} is no status"]
-    size = Pairs(problem.scene).size
-    rounding = ROUNDING + OF_SIZE * size
-    allowed = SHARE * tolerance + rounding
+    # Two ways of measuring may differ by this; coal's distances of ellipsoids are relative to their size.
+    rounding = 2e-6 + 1e-5 * Pairs(problem.scene).size
+    allowed = 1.1 * tolerance + rounding
     wrongs = []
     if found.unit > 1e-6:
         wrongs.append(f"a quaternion is {found.unit:.3g} off unit length")
@@ -273,7 +222,7 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
         wrongs.append(f"goals are missed by {found.goal:.3g} m or rad")
     if solution.status in ("solved", "unreachable") and found.violation > allowed:
         wrongs.append(f"what must hold is missed by {found.violation:.3g} m or rad")
-    if solution.status == "infeasible" and found.violation < CLEARLY * tolerance:
+    if solution.status == "infeasible" and found.violation < 0.5 * tolerance:
         wrongs.append(f"everything holds to {found.violation:.3g} m or rad")
     said = solution.assessment
     pairs = (

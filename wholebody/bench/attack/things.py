@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -12,13 +11,11 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.things import Occupied
 
-KINDS = ("box", "sphere", "capsule", "ellipsoid", "hull", "plate", "halfspace", "mesh")
-SHARES = (0.25, 0.15, 0.15, 0.1, 0.12, 0.12, 0.1, 0.01)
-THINNEST = 2e-4  # m
-LEAST, MOST = 2e-4, 300.0  # m: of a size
-FAR = 60.0  # m: things stand nearer than this
-TRIES = 20  # things that are tried for one that is clear
-HALVINGS = 60  # of a way, until a depth is met
+SHARES = {
+    "box": 0.25, "sphere": 0.15, "capsule": 0.15, "ellipsoid": 0.1, "hull": 0.12, "plate": 0.12, "halfspace": 0.1,
+    "mesh": 0.01,
+}  # fmt: skip
+"""Of kinds of things."""
 
 
 @dataclass(frozen=True)
@@ -27,12 +24,10 @@ class Thing:
 
     Attributes:
         shape: what it is.
-        call: Python that makes the shape.
         at: (7,) where it stands.
     """
 
     shape: wb.Shape
-    call: str
     at: tuple[float, ...]
 
     @property
@@ -40,42 +35,34 @@ class Thing:
         """Where it stands."""
         return pin.SE3(pin.Quaternion(np.array(self.at[3:])).matrix(), np.array(self.at[:3]))
 
-    def line(self, name: str) -> str:
-        """Return the line that adds it to a scene."""
-        return f"scene.add({self.call}, name={name!r}, at={self.at!r})"
 
-
-def shape(rng: np.random.Generator, size: float) -> tuple[wb.Shape, str]:
-    """Return a shape of about a size, metres, and Python that makes it."""
-    kind = str(rng.choice(KINDS, p=SHARES))
+def _shape(rng: np.random.Generator, size: float) -> wb.Shape:
+    """A shape of about a size, metres."""
+    kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))
     scale = size * float(np.exp(rng.uniform(np.log(0.02), np.log(0.6))))
 
     def length(low: float, high: float) -> float:
-        return float(np.clip(scale * rng.uniform(low, high), LEAST, MOST))
+        return float(np.clip(scale * rng.uniform(low, high), 2e-4, 300.0))
 
-    made: Any
     if kind == "box":
-        made = wb.Box((length(0.2, 1.0), length(0.2, 1.0), length(0.2, 1.0)))
-    elif kind == "plate":
-        made = wb.Box((length(0.5, 3.0), length(0.5, 3.0), max(THINNEST, 1e-3 * size)))
-    elif kind == "sphere":
-        made = wb.Sphere(length(0.2, 0.7))
-    elif kind == "capsule":
-        made = wb.Capsule(length(0.1, 0.4), length(0.3, 1.5))
-    elif kind == "ellipsoid":
-        made = wb.Ellipsoid((length(0.2, 0.8), length(0.2, 0.8), length(0.2, 0.8)))
-    elif kind == "halfspace":
+        return wb.Box((length(0.2, 1.0), length(0.2, 1.0), length(0.2, 1.0)))
+    if kind == "plate":
+        return wb.Box((length(0.5, 3.0), length(0.5, 3.0), max(2e-4, 1e-3 * size)))
+    if kind == "sphere":
+        return wb.Sphere(length(0.2, 0.7))
+    if kind == "capsule":
+        return wb.Capsule(length(0.1, 0.4), length(0.3, 1.5))
+    if kind == "ellipsoid":
+        return wb.Ellipsoid((length(0.2, 0.8), length(0.2, 0.8), length(0.2, 0.8)))
+    if kind == "halfspace":
         normal = rng.normal(size=3) if rng.random() < 0.5 else np.eye(3)[int(rng.integers(3))]
-        made = wb.HalfSpace((float(normal[0]), float(normal[1]), float(normal[2])))
-    elif kind == "hull":
-        cloud = rng.normal(size=(int(rng.integers(8, 40)), 3)) * [length(0.2, 0.5) for _ in range(3)]
-        return wb.Hull(cloud), f"wb.Hull(np.array({cloud.tolist()!r}))"
-    else:
-        return _corner(length(0.4, 1.0))
-    return made, f"wb.{made!r}"
+        return wb.HalfSpace((float(normal[0]), float(normal[1]), float(normal[2])))
+    if kind == "hull":
+        return wb.Hull(rng.normal(size=(int(rng.integers(8, 40)), 3)) * [length(0.2, 0.5) for _ in range(3)])
+    return _corner(length(0.4, 1.0))
 
 
-def _corner(size: float) -> tuple[wb.Shape, str]:
+def _corner(size: float) -> wb.Shape:
     """A mesh that is not convex: an angle of two walls."""
     outline = [(0.0, 0.0), (1.0, 0.0), (1.0, 0.2), (0.2, 0.2), (0.2, 1.0), (0.0, 1.0)]
     vertices = [(size * x, size * y, size * z) for z in (0.0, 0.5) for x, y in outline]
@@ -84,12 +71,11 @@ def _corner(size: float) -> tuple[wb.Shape, str]:
     for k in range(6):
         following = (k + 1) % 6
         faces += [(k, following, 6 + following), (k, 6 + following, 6 + k)]
-    call = f"wb.Mesh((np.array({vertices!r}), np.array({faces!r})))"
-    return wb.Mesh((np.array(vertices), np.array(faces))), call
+    return wb.Mesh((np.array(vertices), np.array(faces)))
 
 
-def somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
-    """Return a place about a figure."""
+def _somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
+    """A place about a figure."""
     middle, spread = _extent(placed)
     reach = 1.3 * spread + 0.5 * size
     return pin.SE3(pin.Quaternion(_turn(rng)).matrix(), middle + rng.uniform(-reach, reach, 3))
@@ -103,17 +89,17 @@ def _extent(placed: Occupied) -> tuple[Array, float]:
 
 def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, postures: list[int]) -> Thing | None:
     """Return a thing that leaves some room, metres, around a figure in some of its postures; None if none was found."""
-    for _ in range(TRIES):
-        made, call = shape(rng, size)
-        at = somewhere(rng, placed, size)
+    for _ in range(20):
+        made = _shape(rng, size)
+        at = _somewhere(rng, placed, size)
         if all(placed.distance(made, at, posture) > room for posture in postures):
-            return Thing(made, call, xyzquat(at))
+            return Thing(made, xyzquat(at))
     return None
 
 
 def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float) -> Thing | None:
     """Return a thing that is in the figure's first posture by a depth, metres; None where its shape does not let it."""
-    made, call = shape(rng, size)
+    made = _shape(rng, size)
     if not placed.places:
         return None
     start = placed.places[int(rng.integers(placed.count))]
@@ -127,16 +113,16 @@ def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float
 
     if placed.distance(made, at(near), 0) > -depth or placed.distance(made, at(far), 0) < -depth:
         return None
-    for _ in range(HALVINGS):
+    for _ in range(60):
         middle = 0.5 * (near + far)
         if placed.distance(made, at(middle), 0) < -depth:
             near = middle
         else:
             far = middle
     place = at(near)
-    if np.abs(place.translation).max() > FAR:
+    if np.abs(place.translation).max() > 60.0:
         return None
-    return Thing(made, call, xyzquat(place))
+    return Thing(made, xyzquat(place))
 
 
 def xyzquat(at: pin.SE3) -> tuple[float, ...]:

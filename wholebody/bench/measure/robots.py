@@ -6,9 +6,7 @@ A description is examined in a process of its own: it is loaded, and its tips re
 from __future__ import annotations
 
 import os
-import time
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 from xml.etree import ElementTree
@@ -20,103 +18,56 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import Child, EndedError
-from wholebody.bench.report import render
+from wholebody.bench.rows import Figure, Row, measured_ms, report
 from wholebody.geometry.mesh_cache import VARIABLE
 
 if TYPE_CHECKING:
-    from wholebody.figures.figure import Figure
+    from wholebody.figures.figure import Figure as Body
     from wholebody.scene.scene import Scene
 
 LONGEST = 300.0  # s: after which a description is given up
-REACHES = 12  # of each robot
-SEED = 7  # of the postures whose tips are the targets
-FAR = 100.0  # m: pairs farther apart in the default posture do not count
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
-"""How far from the default posture towards a random one a target's posture is: the first that is free of contact."""
-DRAWS = 100  # of random postures for a target, towards which nothing may be free
 
 
-@dataclass(frozen=True)
-class Loaded:
-    """What loading gave.
-
-    Attributes:
-        seconds: CPU time of `wholebody.load`, packages imported before.
-        refused: the sentence it was refused with; empty where it was loaded.
-        kind: "URDF" or "MJCF".
-        nv, pieces, pairs: degrees of freedom, convex pieces, and pairs that can touch.
-        notes: sentences on what was changed about the geometry.
-        left_out: pairs that overlap at zero and could not be parted.
-        free: least distance of any pair in the default posture, metres; inf without pairs.
-        solved: reaches that ended `solved`.
-        times, statuses: CPU seconds and status of each reach.
-    """
-
-    seconds: float
-    refused: str = ""
-    kind: str = "URDF"
-    nv: int = 0
-    pieces: int = 0
-    pairs: int = 0
-    notes: int = 0
-    left_out: int = 0
-    free: float = float("inf")
-    solved: int = 0
-    times: tuple[float, ...] = ()
-    statuses: tuple[str, ...] = ()
-
-    @property
-    def whole(self) -> bool:
-        """Whether all reaches were solved."""
-        return self.solved == len(self.times)
-
-    @property
-    def median(self) -> float:
-        """Median of the reaches' times."""
-        return float(np.median(self.times))
-
-
-def examine(path: str, reaches: int) -> Loaded:
-    """Load a description, and make some reaches; 0 loads only."""
+def examine(path: str, reaches: int) -> dict[str, Figure]:
+    """Load a description, and make some reaches (0 loads only); "refused" alone where it is refused."""
     import wholebody as wb
     from wholebody.figures.rest_posture import UNPARTED
     from wholebody.geometry import convex, meshes
 
     _ = convex, meshes
     wb.load("hand")  # what every load needs is imported
-    began = time.process_time()
     try:
-        figure = wb.load(path)
+        spent, _, figure = measured_ms(lambda: wb.load(path))
     except WholebodyError as error:
-        return Loaded(time.process_time() - began, refused=str(error))
-    seconds = time.process_time() - began
+        return {"refused": str(error)}
     scene = wb.Scene(figure)
-    contacts = scene.contacts(figure.neutral, within=FAR) if len(figure.geometry.collisionPairs) else None
-    found = Loaded(
-        seconds,
-        kind="MJCF" if path.endswith(".xml") else "URDF",
-        nv=figure.model.nv,
-        pieces=figure.geometry.ngeoms,
-        pairs=len(figure.geometry.collisionPairs),
-        notes=len(figure.notes),
-        left_out=sum(pair.reason == UNPARTED for pair in figure.excluded_pairs),
-        free=float(contacts.distance.min(initial=FAR)) if contacts is not None else float("inf"),
-    )
+    pairs = len(figure.geometry.collisionPairs)
+    distance = scene.contacts(figure.neutral, within=100.0).distance if pairs else np.zeros(0)
+    found: dict[str, Figure] = {
+        "s": 1e-3 * spent,
+        "freedoms": figure.model.nv,
+        "pieces": figure.geometry.ngeoms,
+        "pairs": pairs,
+        "notes": len(figure.notes),
+        "left out": sum(pair.reason == UNPARTED for pair in figure.excluded_pairs),
+        "free mm": 1e3 * float(distance.min(initial=np.inf)),
+    }
     if not reaches or not figure.chains:
         return found
-    statuses: list[str] = []
-    times: list[float] = []
     targets = tip_targets(figure, scene, reaches)
     wb.solve(wb.Problem(scene, goals=[wb.Point(*targets[0])]))  # numba's loops are compiled or read back
-    for tip, target in targets:
-        problem = wb.Problem(scene, goals=[wb.Point(tip, target)])
-        began = time.process_time()
-        statuses.append(wb.solve(problem).status)
-        times.append(time.process_time() - began)
-    return replace(found, solved=statuses.count("solved"), times=tuple(times), statuses=tuple(statuses))
+    problems = [wb.Problem(scene, goals=[wb.Point(tip, target)]) for tip, target in targets]
+    solves = [measured_ms(lambda: wb.solve(problem)) for problem in problems]  # noqa: B023
+    spent_each = [each[0] for each in solves]
+    return found | {
+        "solved": sum(each[2].solved for each in solves),
+        "reaches": reaches,
+        "median ms": float(np.median(spent_each)),
+        "p95 ms": float(np.quantile(spent_each, 0.95)),
+    }
 
 
-def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Array]]:
+def tip_targets(figure: Body, scene: Scene, count: int) -> list[tuple[str, Array]]:
     """Tips, the longest chain's first, and where each is in a random posture that is free of contact."""
     chains = sorted(figure.chains.values(), key=lambda chain: -len(chain.joints))
     tips = [chains[number % len(chains)].tip for number in range(count)]
@@ -124,38 +75,19 @@ def tip_targets(figure: Figure, scene: Scene, count: int) -> list[tuple[str, Arr
     return [(tip, figure.placement(q, tip).translation) for tip, q in zip(tips, postures, strict=True)]
 
 
-def _free_posture(figure: Figure, scene: Scene, count: int, number: int) -> Array:
+def _free_posture(figure: Body, scene: Scene, count: int, number: int) -> Array:
     """The posture (nq,) of a target: on the way to the first random posture that has a free one there."""
     from wholebody.figures.self_pairs import random_postures
 
-    for draw in range(DRAWS):
-        other = random_postures(figure.model, count, SEED + draw)[number]
-        for share in SHARES:
+    for draw in range(100):
+        other = random_postures(figure.model, count, 7 + draw)[number]
+        # How far from the default posture towards a random one a target's posture is: the first that is free of
+        # contact.
+        for share in (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625):
             q = np.asarray(pin.interpolate(figure.model, figure.neutral, other, share))
             if not len(scene.contacts(q, within=0.0).number):
                 return q
     return figure.neutral
-
-
-@dataclass(frozen=True)
-class Robot:
-    """One description.
-
-    Attributes:
-        name: its path below the folder.
-        first: loaded with an empty cache.
-        again: loaded once more, and reached with; None where the first was not loaded.
-    """
-
-    name: str
-    first: Loaded
-    again: Loaded | None
-
-    @property
-    def refusal(self) -> str:
-        """The sentence with the file's path shortened to its name below the folder."""
-        _, found, tail = self.first.refused.partition(self.name)
-        return f"{self.name}{tail}" if found else self.first.refused
 
 
 def descriptions(folder: Path) -> list[Path]:
@@ -180,30 +112,48 @@ def _is_mjcf(path: Path) -> bool:
         return False
 
 
-def measure(folder: Path, reaches: int) -> Iterator[Robot]:
+def measure(folder: Path, reaches: int) -> Iterator[Row]:
     """Load every description of a folder twice, each time in a process of its own, and reach with it the second time.
 
     The folder and its parents are looked up for packages.
     """
     for path in descriptions(folder):
+        name = str(path.relative_to(folder))
         with Scratch() as cache:
             first = _examined(path, 0, str(cache))
-            again = _examined(path, reaches, str(cache)) if not first.refused else None
-        yield Robot(str(path.relative_to(folder)), first, again)
+            if "refused" in first:
+                _, found, tail = str(first["refused"]).partition(name)
+                yield Row(f"`{name}`", "refused", {"refused": f"{name}{tail}" if found else first["refused"]})
+                continue
+            again = _examined(path, reaches, str(cache))
+        kind = "MJCF" if path.suffix == ".xml" else "URDF"
+        yield Row(f"`{name}`", kind, {"first s": first["s"], "again s": again.pop("s", float("nan")), **again})
 
 
-def _examined(path: Path, reaches: int, cache: str) -> Loaded:
+def _examined(path: Path, reaches: int, cache: str) -> dict[str, Figure]:
     child = Child({VARIABLE: cache, "OMP_NUM_THREADS": "1"})
     try:
-        found: Loaded = child.call(examine, str(path), reaches, seconds=LONGEST)
+        found: dict[str, Figure] = child.call(examine, str(path), reaches, seconds=LONGEST)
     except EndedError as error:
-        refused = f"it takes more than {LONGEST:g} s" if error.overtime else str(error)
-        return Loaded(LONGEST if error.overtime else 0.0, refused=refused)
+        return {"refused": f"it takes more than {LONGEST:g} s" if error.overtime else str(error)}
     finally:
         child.close()
     return found
 
 
-def page(robots: list[Robot], facts: Mapping[str, str], reaches: int) -> str:
+def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
     """Return the page on robots as Markdown."""
-    return render("robots.md", robots=robots, facts=facts, reaches=reaches) + "\n"
+    loaded = [row for row in rows if row.tool != "refused"]
+    whole = sum(row.figures.get("solved") == reaches for row in loaded)
+    about = (
+        "# Robots\n\nThis page says which robot descriptions load, how long that takes, and whether the robots reach. "
+        "The descriptions come from other people and are loaded without changes. `wholebody bench robots FOLDER "
+        f"--update-docs` writes this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all "
+        f"of their {reaches} reaches. A reach moves the tip of a chain to where a random posture free of contact has "
+        "it; it begins at the default posture, and the robot may not touch itself. The chains take turns, the longest "
+        "first. First is the CPU time of loading with an empty cache, again that of loading once more; free is the "
+        "least distance of any pair in the default posture; left out are pairs of pieces that could not be parted; "
+        "notes are changes to the geometry that loading reported; the rest is the CPU time of a reach."
+    )  # fmt: skip
+    refused = [f"refused: {row['refused']}" for row in rows if row.tool == "refused"]
+    return report(about, {"": loaded}, facts, refused) + "\n"

@@ -1,127 +1,233 @@
-"""`wholebody bench scaling`: time of a step and of a solve against joints, pieces and things."""
+"""`wholebody bench scaling`: time of a step and of a solve against joints, pieces and things.
+
+A chain 2 m long, of any number of joints, reaches among any number of things: one size grows and the rest stays.
+"""
 
 from __future__ import annotations
 
 import gc
-import math
-import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
-from pathlib import Path
-from typing import Any, TypeVar
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
 import wholebody as wb
-from wholebody.base.errors import WholebodyError
-from wholebody.bench import plot_style
-from wholebody.bench.measure import newton_shapes
-from wholebody.bench.measure.chains import TIP, chain, task
-from wholebody.bench.report import render
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.files import Scratch
+from wholebody.bench.rows import Figure, Panel, Row, measured_ms
+from wholebody.bench.suite.problem_sets.things import Occupied
+from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.simplification.simplify import simplify
 from wholebody.tracking.drag import Drag
 
-SERIES = ("joints", "pieces", "things")
+TIP = "tip"
+LENGTH = 2.0  # m: of the whole chain, however many joints it has
+ROOM = 0.01  # m: left free around the start and the witness
+TRIES = 400  # witnesses, and places of one thing
 SIZES: dict[str, tuple[int, ...]] = {
     "joints": (5, 10, 20, 50, 100, 200),
-    "pieces": (1, 2, 4, 8, 16, 32),
-    "things": (10, 30, 100, 300, 1000, 2000, 5000),
+    "pieces of each segment": (1, 2, 4, 8, 16, 32),
+    "things around": (10, 30, 100, 300, 1000, 2000, 5000),
 }
-QUICK: dict[str, tuple[int, ...]] = {"joints": (5, 10, 20), "pieces": (1, 2, 4), "things": (10, 30, 100)}
-ASSEMBLIES = (5, 10, 20, 50, 100, 200, 500)
-JOINTS, SEGMENTS, THINGS = 12, 10, 10  # of the chain where something else grows; links with pieces; things
+QUICK = {name: sizes[:3] for name, sizes in SIZES.items()}
 METHODS = ("qp", "newton", "ccd", "placo")
 SIMPLIFIED = "qp, simplified"
-ASSEMBLY = "newton, assembly"
-STEPPED = ("qp", "newton")  # methods that have a step of their own in a drag
-FRAMES = 12
-CIRCLE = 0.02  # m: radius of what a drag follows; a frame moves a tenth of the way round
-LONGEST = 1.0  # s: a method that takes longer for one solve is not asked at larger sizes
-CLEARANCE = 0.002  # m
-
-_R = TypeVar("_R")
 
 
-@dataclass(frozen=True)
-class ScalingRow:
-    """One method at one size.
+def chain(joints: int, pieces: int, segments: int | None = None) -> wb.Figure:
+    """A chain that lies along x, its joints about z and y in turn.
 
-    Attributes:
-        series, size: what grows ("joints", "pieces" of each segment, or "things" around), and how many there are.
-        method: its name; "qp, simplified" solves what `wb.simplify` leaves.
-        joints, pieces, pairs: of the scene.
-        build_ms: to build the scene's geometry; nan where nothing is built.
-        problem_ms: to state the problem; where simplified, to simplify it.
-        solve_ms, judge_ms: a solve without its judgement, and the judgement, least of the repeats, by the clock.
-        step_ms: a frame of a drag, median; nan for methods without a step of their own.
+    Args:
+        joints: how many.
+        pieces: boxes of each segment that has any.
+        segments: how many of the links have pieces, evenly spread; all where None.
+
+    Raises:
+        InputError: no joints, or more segments than links.
     """
+    if joints < 1 or not 1 <= (segments or joints) <= joints:
+        raise InputError(f"a chain of {joints} joints cannot have {segments} segments; give 1 to {joints}")
+    solid = {round(k) for k in np.linspace(0, joints - 1, segments or joints)}
+    ends = [*sorted(solid), joints]
+    long = {first: (last - first) * LENGTH / joints for first, last in pairwise(ends)}
+    limit = min(6.0 / joints, 2.5)  # rad
+    parts = ['<link name="base"/>']
+    for k in range(joints):
+        at = f'<origin xyz="{LENGTH / joints if k else 0.0:.9f} 0 0"/>'
+        axis = "0 0 1" if k % 2 == 0 else "0 1 0"
+        parts.append(
+            f'<joint name="joint{k}" type="revolute"><parent link="{f"link{k - 1}" if k else "base"}"/>'
+            f'<child link="link{k}"/>{at}<axis xyz="{axis}"/>'
+            f'<limit lower="{-limit}" upper="{limit}" effort="1" velocity="1"/></joint>'
+        )
+        parts.append(f'<link name="link{k}">{_boxes(long[k], pieces) if k in solid else ""}</link>')
+    parts.append(
+        f'<link name="{TIP}"/><joint name="end" type="fixed"><parent link="link{joints - 1}"/><child link="{TIP}"/>'
+        f'<origin xyz="{LENGTH / joints:.9f} 0 0"/></joint>'
+    )
+    with Scratch() as folder:
+        path = folder / "chain.urdf"
+        path.write_text(f'<robot name="chain">{"".join(parts)}</robot>', encoding="utf-8")
+        return wb.load(path)
 
-    series: str
-    size: int
-    method: str
-    joints: int
-    pieces: int
-    pairs: int
-    build_ms: float
-    problem_ms: float
-    solve_ms: float
-    judge_ms: float
-    step_ms: float
-    iterations: int
-    status: str
+
+def _boxes(length: float, count: int) -> str:
+    """A row of boxes 5 cm broad that ends short of both joints."""
+    free = max(length - 0.1, 0.1 * length)
+    each = free / count
+    start = 0.5 * (length - free)
+    return "".join(
+        f'<collision><origin xyz="{start + (k + 0.5) * each:.9f} 0 0"/>'
+        f'<geometry><box size="{each:.9f} 0.05 0.05"/></geometry></collision>'
+        for k in range(count)
+    )
+
+
+def task(figure: wb.Figure, things: int, seed: int) -> tuple[wb.Scene, Array]:
+    """A scene in which the chain reaches among things, not built yet, and where its tip is asked to go.
+
+    The first ten things stand within 2.4 m of the base; more of them are as dense, and go farther out.
+
+    Raises:
+        InputError: no free posture was found.
+    """
+    rng = np.random.default_rng([seed, figure.model.nq, things])
+    witness = _free_posture(figure, rng)
+    occupied = Occupied(figure, (figure.neutral, witness))
+    scene = wb.Scene(figure)
+    spread = 2.4 * max(1.0, (things / 10.0) ** (1.0 / 3.0))
+    for number in range(things):
+        size = tuple(rng.uniform(0.03, 0.12, 3))
+        shape = wb.Box((float(size[0]), float(size[1]), float(size[2])))
+        for _ in range(TRIES):
+            x, y, z = (float(value) for value in rng.uniform(-spread, spread, 3))
+            if occupied.clear_of(shape, (x, y, z), ROOM):
+                scene.add(shape, name=f"thing {number}", at=(x, y, z))
+                break
+    return scene, figure.placement(witness, TIP).translation
+
+
+def _free_posture(figure: wb.Figure, rng: np.random.Generator) -> Array:
+    """A smoothly bent posture, so that a long chain goes somewhere, in which it does not touch itself."""
+    alone, model = wb.Scene(figure), figure.model
+    place = np.linspace(0.0, np.pi, model.nq)
+    most = model.upperPositionLimit
+    for _ in range(TRIES):
+        waves = rng.uniform(-1.0, 1.0, (2, 3)) @ np.array([np.cos(k * place) for k in (0, 1, 2)])
+        q = most * np.where(np.arange(model.nq) % 2 == 0, waves[0], waves[1]).clip(-1.0, 1.0) * 0.6
+        if alone.contacts(q, within=ROOM).distance.min(initial=1.0) >= ROOM:
+            return np.asarray(q)
+    raise InputError(f"none of {TRIES} postures of the chain is free; give another seed")
+
+
+def assembly_chain(count: int) -> Assembly:
+    """A bent chain of loose bodies, the first joint spherical on the world, whose end is to move by centimetres."""
+    import pinocchio as pin
+
+    made, place = Assembly(), pin.SE3.Identity()
+    for k in range(count):
+        made.body(f"b{k}", place, size=0.1)
+        if k:
+            axis = place.rotation @ np.eye(3)[1 + k % 2]
+            made.revolute(f"b{k - 1}", f"b{k}", at=place.translation, axis=axis)
+        else:
+            made.spherical("world", "b0", at=place.translation)
+        turn = pin.utils.rotate("y" if k % 2 else "z", 0.1)
+        place = place * pin.SE3(turn, np.array((0.2, 0.0, 0.0)))
+    last, tip = f"b{count - 1}", np.array((0.2, 0.0, 0.0))
+    made.point_goal(last, made.placement(last).act(tip) + np.array((0.03, -0.03, 0.02)), place=tip)
+    return made
 
 
 def rows(
     sizes: dict[str, tuple[int, ...]], methods: Sequence[str], repeats: int, say: Callable[[str], None]
-) -> Iterator[ScalingRow]:
-    """Measure all methods at all sizes. `say` takes a line about each."""
+) -> Iterator[Row]:
+    """Measure all methods at all sizes; `say` takes a line about each. What is slower than a second grows no more."""
     for series, grown in sizes.items():
         slow: set[str] = set()
         for size in grown:
-            joints = size if series == "joints" else JOINTS
-            pieces = size if series == "pieces" else 1
-            things = size if series == "things" else THINGS
-            figure = chain(joints, pieces, min(joints, SEGMENTS))
-            scene, target = task(figure, things, seed=0)
-            build_ms, _ = cpu_ms(lambda scene=scene: scene.geometry)  # type: ignore[misc]
+            joints = size if series == "joints" else 12
+            pieces = size if series.startswith("pieces") else 1
+            figure = chain(joints, pieces, min(joints, 10))
+            scene, target = task(figure, size if series.startswith("things") else 10, seed=0)
+            build, _, _ = measured_ms(lambda scene=scene: scene.geometry)  # type: ignore[misc]
             for method in (*methods, SIMPLIFIED):
                 if method in slow:
                     continue
                 try:
-                    row = _row(series, size, method, scene, target, build_ms, repeats)
+                    row = _row(f"{size} {series}", method, scene, target, build, repeats)
                 except WholebodyError as error:
-                    say(f"{series} {size}, {method}: left out, {error}")
+                    say(f"{size} {series}, {method}: left out, {error}")
                     slow.add(method)
                     continue
-                if row.solve_ms > 1e3 * LONGEST:
+                if row["a solve ms"] > 1e3:
                     slow.add(method)
-                    say(f"{method}: more {series} than {size} left out, for a solve took {1e-3 * row.solve_ms:.1f} s")
-                say(f"{series} {size}, {method}: {row.solve_ms:.1f} ms, a step {row.step_ms:.2f} ms, {row.status}")
+                    say(f"{method}: more {series} than {size} left out, for a solve took more than a second")
+                say(f"{row.case}, {method}: {row['a solve ms']:.1f} ms, {row['status']}")
                 yield row
             del scene, figure
             gc.collect()
 
 
-def assembly_rows(sizes: Sequence[int], repeats: int) -> Iterator[ScalingRow]:
+def assembly_rows(sizes: Sequence[int], repeats: int) -> Iterator[Row]:
     """Sparse Newton on chains of loose bodies: no model of joints, seven variables a body."""
     for size in sizes:
-        build_ms, made = cpu_ms(partial(newton_shapes.pulled_chain, size))
-        solves = [cpu_ms(made.solve) for _ in range(repeats)]
-        answer = solves[-1][1]
-        yield ScalingRow(
-            "joints", size, ASSEMBLY, size, 0, 0, build_ms, np.nan, min(ms for ms, _ in solves), np.nan, np.nan,
-            answer.iterations, answer.status,
-        )  # fmt: skip
+        build, _, made = measured_ms(partial(assembly_chain, size))
+        solves = [measured_ms(made.solve) for _ in range(repeats)]
+        answer = solves[-1][2]
+        figures: dict[str, Figure] = {
+            "status": answer.status,
+            "iterations": answer.iterations,
+            "a solve ms": min(each[0] for each in solves),
+            "building ms": build,
+        }
+        yield Row(f"{size} joints", "newton, assembly", figures)
 
 
-def exponent(sizes: Sequence[float], times: Sequence[float]) -> tuple[float, float]:
+def _row(case: str, method: str, scene: wb.Scene, target: Any, build: float, repeats: int) -> Row:
+    stating, _, problem = measured_ms(lambda: wb.Problem(scene, goals=[wb.Point(TIP, target)], clearance=0.002))
+    asked, name = problem, method
+    if method == SIMPLIFIED:
+        stating, _, part = measured_ms(lambda: simplify(problem))
+        asked, name = part.problem, "qp"
+    wb.solve(asked, name)
+    solves = [wb.solve(asked, name) for _ in range(repeats)]
+    figures: dict[str, Figure] = {
+        "pairs": len(asked.scene.geometry.collisionPairs),
+        "status": solves[-1].status,
+        "iterations": solves[-1].iterations,
+        "a solve ms": 1e3 * min(found.seconds - found.assessment.seconds for found in solves),
+        "the judgement ms": 1e3 * min(found.assessment.seconds for found in solves),
+        "stating ms": stating,
+        "building ms": build,
+    }
+    if name in ("qp", "newton"):  # which have a step of their own in a drag
+        figures["a step ms"] = _step_ms(asked, name)
+    return Row(case, method, figures)
+
+
+def _step_ms(problem: wb.Problem, method: str) -> float:
+    """Median time of a frame of a drag in a circle of 2 cm about where the tip starts."""
+    scene = problem.scene
+    center = scene.state(problem.start).frame(scene.frame_id(TIP)).translation.copy()
+    drag, spent = Drag(problem, method), []
+    for frame in range(13):
+        angle = 0.2 * np.pi * frame
+        place = center + 0.02 * np.array((0.0, np.sin(angle), 1.0 - np.cos(angle)))
+        spent.append(measured_ms(partial(drag.to, place))[0])
+    return float(np.median(spent[1:]))
+
+
+def exponent(sizes: Sequence[float], spent: Sequence[float]) -> tuple[float, float]:
     """Exponent of time ~ size**e over the upper range, and the size that range begins at.
 
     The line is fitted to the logarithms of the sizes from a tenth of the largest on, where what grows outweighs what
     does not; of three sizes at least.
     """
-    size, duration = np.asarray(sizes, dtype=float), np.asarray(times, dtype=float)
+    size, duration = np.asarray(sizes, dtype=float), np.asarray(spent, dtype=float)
     order = np.argsort(size)
     size, duration = size[order], duration[order]
     first = min(int(np.searchsorted(size, 0.0999 * size[-1])), max(0, len(size) - 3))
@@ -130,144 +236,41 @@ def exponent(sizes: Sequence[float], times: Sequence[float]) -> tuple[float, flo
     return float(np.polyfit(np.log(size[first:]), np.log(duration[first:]), 1)[0]), float(size[first])
 
 
-def cpu_ms(work: Callable[[], _R]) -> tuple[float, _R]:
-    """The processor's time for a piece of work [ms], and what came of it."""
-    began = time.process_time()
-    result = work()
-    return 1e3 * (time.process_time() - began), result
+def _series(rows: Sequence[Row]) -> dict[tuple[str, str], list[tuple[int, Row]]]:
+    """Sizes and rows by what grows and by the method."""
+    found: dict[tuple[str, str], list[tuple[int, Row]]] = {}
+    for row in rows:
+        size, _, series = row.case.partition(" ")
+        found.setdefault((series, row.tool), []).append((int(size), row))
+    return found
 
 
-def _row(
-    series: str, size: int, method: str, scene: wb.Scene, target: Any, build_ms: float, repeats: int
-) -> ScalingRow:
-    problem_ms, problem = cpu_ms(lambda: wb.Problem(scene, goals=[wb.Point(TIP, target)], clearance=CLEARANCE))
-    asked, way = problem, method
-    if method == SIMPLIFIED:
-        problem_ms, part = cpu_ms(lambda: simplify(problem))
-        asked, way = part.problem, "qp"
-    wb.solve(asked, way)
-    solves = [wb.solve(asked, way) for _ in range(repeats)]
-    answer = solves[-1]
-    return ScalingRow(
-        series=series,
-        size=size,
-        method=method,
-        joints=asked.scene.model.nv,
-        pieces=asked.scene.geometry.ngeoms,
-        pairs=len(asked.scene.geometry.collisionPairs),
-        build_ms=build_ms,
-        problem_ms=problem_ms,
-        solve_ms=1e3 * min(found.seconds - found.assessment.seconds for found in solves),
-        judge_ms=1e3 * min(found.assessment.seconds for found in solves),
-        step_ms=_step_ms(asked, way) if way in STEPPED else float("nan"),
-        iterations=answer.iterations,
-        status=answer.status,
-    )
+TIMES = ("a solve ms", "a step ms", "the judgement ms", "stating ms", "building ms")
 
 
-def _step_ms(problem: wb.Problem, method: str) -> float:
-    """Median time of a frame of a drag in a small circle about where the tip starts."""
-    scene = problem.scene
-    center = scene.state(problem.start).frame(scene.frame_id(TIP)).translation.copy()
-    drag, times = Drag(problem, method), []
-    for frame in range(FRAMES + 1):
-        angle = 0.2 * np.pi * frame
-        place = center + CIRCLE * np.array((0.0, np.sin(angle), 1.0 - np.cos(angle)))
-        times.append(cpu_ms(partial(drag.to, place))[0])
-    return float(np.median(times[1:]))
-
-
-NAMES = {"joints": "joints", "pieces": "pieces of each segment", "things": "things around"}
-STYLES = {
-    "qp": ("#0072b2", "o", "-"),
-    SIMPLIFIED: ("#0072b2", "o", "--"),
-    "newton": ("#e69f00", "^", "-"),
-    ASSEMBLY: ("#e69f00", "^", "--"),
-    "ccd": ("#000000", "X", "-"),
-    "placo": ("#d55e00", "P", "-"),
-}
-"""Colour, marker and line of each method: the colours of the other charts."""
-
-
-def chart(rows: Sequence[ScalingRow], path: Path) -> tuple[Path, Path]:
-    """Above a solve, below a step, a judgement and the building of the geometry; a column for what grows."""
-    series = [name for name in SERIES if any(row.series == name for row in rows)]
-    drawn, axes = plot_style.figure(2, len(series), (4.3 * len(series), 7.4))
-    for column, name in enumerate(series):
-        mine = [row for row in rows if row.series == name]
-        above, below = axes[0][column], axes[1][column]
-        for method, (color, marker, line) in STYLES.items():
-            shown = [row for row in mine if row.method == method]
-            stepped = [row for row in shown if not math.isnan(row.step_ms)]
-            style = {"color": color, "marker": marker, "markersize": 5, "linewidth": 1.5}
-            style["fillstyle"] = "none" if line == "--" else "full"
-            if shown:
-                above.plot([row.size for row in shown], [row.solve_ms for row in shown], line, label=method, **style)
-            if stepped:
-                sizes, times = [row.size for row in stepped], [row.step_ms for row in stepped]
-                below.plot(sizes, times, line, label=f"a step, {method}", **style)
-        whole = [row for row in mine if row.method == "qp"]
-        for label, color, values in (
-            ("the judgement", "#009e73", [row.judge_ms for row in whole]),
-            ("building the geometry", "#888888", [row.build_ms for row in whole]),
-        ):
-            below.plot([row.size for row in whole], values, ":", color=color, marker=".", linewidth=1.5, label=label)
-        for axis in (above, below):
-            axis.set(xscale="log", yscale="log")
-            plot_style.plain_log(axis)
-        above.set_title(f"more {NAMES[name]}", loc="left")
-        below.set_xlabel(NAMES[name])
-        if column == 0:
-            above.set_ylabel("a solve, without its judgement [ms]")
-            below.set_ylabel("time [ms]")
-    for row in (0, 1):
-        handles: dict[str, object] = {}
-        for axis in axes[row]:
-            handles.update(dict(zip(*reversed(axis.get_legend_handles_labels()), strict=True)))
-        axes[row][0].legend(handles.values(), handles.keys(), frameon=False, fontsize=8, loc="upper left")
-        low = min(axis.get_ylim()[0] for axis in axes[row])
-        high = max(axis.get_ylim()[1] for axis in axes[row])
-        for axis in axes[row]:
-            axis.set_ylim(low, high * (6.0 if axis is axes[row][0] and len(axes[row]) == 1 else 3.0))
-    return plot_style.save(drawn, path)
-
-
-def report(rows: Sequence[ScalingRow], left_out: Sequence[str], facts: Mapping[str, str]) -> str:
-    """Exponents, then the times at every size; `left_out` are sentences on methods that were not asked at some size."""
-    methods = [name for name in STYLES if any(row.method == name for row in rows)]
-    keys = dict.fromkeys((row.series, row.size) for row in rows)
-    sizes = [{"series": series, "size": size, "rows": _by_method(rows, methods, series, size)} for series, size in keys]
-    return render(
-        "scaling.md", exponents=_exponents(rows), sizes=sizes, methods=methods, simplified=SIMPLIFIED, names=NAMES,
-        joints=JOINTS, things=THINGS, left_out=left_out, facts=facts,
-    )  # fmt: skip
-
-
-def _by_method(rows: Sequence[ScalingRow], methods: Sequence[str], series: str, size: int) -> dict[str, Any]:
-    """The rows of one size; None for a method that was not asked."""
-    found = {row.method: row for row in rows if (row.series, row.size) == (series, size)}
-    return {name: found.get(name) for name in (*methods, "qp", SIMPLIFIED)}
-
-
-def _exponents(rows: Sequence[ScalingRow]) -> list[dict[str, Any]]:
-    """For each series and method: the sizes that were fitted, and the exponents; NaN where a time is not known."""
+def exponents(rows: Sequence[Row]) -> list[Row]:
+    """A row for what grows and each method: the sizes that were fitted, and the exponent of each time."""
     table = []
-    for series, method in dict.fromkeys((row.series, row.method) for row in rows):
-        mine = [row for row in rows if (row.series, row.method) == (series, method)]
-        sizes = [row.size for row in mine]
-        times = [
-            [row.solve_ms for row in mine],
-            [row.solve_ms / max(row.iterations, 1) for row in mine],
-            [row.step_ms for row in mine],
-            [row.judge_ms for row in mine],
-            [row.problem_ms for row in mine],
-            [row.build_ms if method == "qp" else math.nan for row in mine],
-        ]
-        slopes, begins = [], sizes[0]
-        for values in times:
-            known = len(values) > 1 and not any(math.isnan(value) for value in values)
-            slope, first = exponent(sizes, values) if known else (math.nan, begins)
-            begins = int(first)
-            slopes.append(slope)
-        table.append({"series": series, "method": method, "begins": begins, "ends": sizes[-1], "slopes": slopes})
+    for (series, method), mine in _series(rows).items():
+        figures: dict[str, Figure] = {}
+        for name in TIMES:
+            if len(mine) > 1 and all(name in row.figures for _, row in mine):
+                slope, first = exponent([size for size, _ in mine], [row[name] for _, row in mine])
+                figures |= {"sizes fitted": f"{first:g} to {mine[-1][0]}", name.removesuffix(" ms"): slope}
+        table.append(Row(series, method, figures))
     return table
+
+
+def panels(rows: Sequence[Row]) -> list[Panel]:
+    """A solve and a step against each size, by method."""
+    drawn = []
+    for name in TIMES[:2]:
+        for series in dict.fromkeys(series for series, _ in _series(rows)):
+            lines = {
+                method: ([size for size, _ in known], [row[name] for _, row in known])
+                for (grown, method), mine in _series(rows).items()
+                if grown == series and (known := [each for each in mine if name in each[1].figures])
+            }
+            if lines:
+                drawn.append(Panel(f"more {series}", series, name.replace(" ms", " [ms]"), lines, "xy", "."))
+    return drawn

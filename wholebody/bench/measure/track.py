@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +23,7 @@ from wholebody.assessment.motion import limit_violation, pairs_along, velocities
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
+from wholebody.figures.self_pairs import random_postures
 
 VARIANTS = ("free", "contact", "alone")
 DT = 0.01  # s
@@ -35,9 +37,7 @@ BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box 
 INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
 INTO, ALONG = 0.35, 0.25  # shares of the time for the ways into the box and within it
 FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by way of these places
-CHEST = 0.16  # m: before the origin of the thorax' frame, level with it
 ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
-TOUCHING = 1e-3  # m: a pair nearer than the clearance and this is in contact
 SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
 
 
@@ -98,7 +98,7 @@ def track(name: str, steps: int = 200) -> Track:
         add_objects(scene, start, free, np.random.default_rng(SEED))
     if name != "contact":
         return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
-    chest = thorax + (CHEST, 0.0, 0.0)
+    chest = thorax + (0.16, 0.0, 0.0)  # m: before the origin of the thorax' frame, level with it
     first, second = round(INTO * steps), round((INTO + ALONG) * steps)
     ways = [
         smooth_way(np.array([start_place, end_place]), count)
@@ -213,7 +213,8 @@ def judge(track: Track, postures: Array) -> Verdict:
     for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
         least.append(pairs.least)
         near.append(int((pairs.distance < WITHIN).sum()))
-        touching.append(int((pairs.distance < track.clearance + TOUCHING).sum()))
+        # A pair nearer than the clearance and 1 mm is in contact.
+        touching.append(int((pairs.distance < track.clearance + 1e-3).sum()))
         error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
         for foot, there in zip(feet, stood, strict=True):
             moved = there.actInv(pairs.state.frame(foot))
@@ -229,3 +230,104 @@ def judge(track: Track, postures: Array) -> Verdict:
         max(float(root[:3].max(initial=0.0)) / ROOT_SPEED, float(root[3:].max(initial=0.0)) / ROOT_TURN),
         float(np.abs(np.diff(angles, 2, axis=0)).mean()) / DT**2,
     )  # fmt: skip
+
+
+SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
+"""How far towards random postures the way goes, and how large the block is: the largest that leaves room."""
+CANDIDATES = 40  # ways that are tried for each of these
+OWN_ROOM = 2e-4  # m: what a way leaves between pieces of the figure
+ROOM_SPACE = 0.2  # m: by which the space of the objects exceeds that of the pieces along the way, for a person's size
+
+
+def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
+    """Build the reaches of a figure, named as those of the human.
+
+    Pairs are kept apart by the clearance of the human's reaches, or by half of the least distance along the way if
+    that is less, as it is for links of robots whose hulls nearly touch.
+
+    Args:
+        spec: name or path of a figure, as for `wholebody.load`.
+        steps: of each way.
+
+    Raises:
+        WholebodyError: the figure cannot be loaded.
+        InputError: it has no chain that moves, no way without contact was found, or no place for an object.
+    """
+    figure = wb.load(spec)
+    chains = [chain for chain in figure.chains.values() if chain.joints]
+    if not chains:
+        raise InputError(f"{spec}: it has no chain of joints with a tip that could reach; give a figure that moves")
+    chain = max(chains, key=lambda chain: len(chain.joints))
+    dofs = sorted({dof for name in chain.joints for dof in figure.dofs([name]).tolist()})
+    ways, distance = _ways(figure, spec, dofs, steps)
+    clearance = min(CLEARANCE, 0.5 * distance)
+    held = (str(figure.segments[0]),) if figure.root == "free" else ()
+    places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in ways)
+    tracks = []
+    for name in VARIANTS:
+        scene = wb.Scene(figure)
+        contact = name == "contact"
+        if name != "alone":
+            _furnish(scene, ways, places, block=contact)
+        label = f"{Path(spec).stem}, {name}"
+        tracks.append(Track(label, scene, figure.neutral, places[contact], chain.tip, held, clearance))
+    return tracks
+
+
+def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tuple[tuple[Array, Array], float]:
+    """Postures (steps, nq) through two random ones, and those to the first and back; the figure's least distance."""
+    scene, start, still = wb.Scene(figure), figure.neutral, np.zeros(figure.model.nv)
+    random = random_postures(figure.model, 2 * CANDIDATES, SEED).reshape(CANDIDATES, 2, -1)
+    for share in SHARES:
+        for pair in random:
+            moves = np.zeros((2, figure.model.nv))
+            for move, q in zip(moves, pair, strict=True):
+                move[dofs] = pin.difference(figure.model, start, q)[dofs]
+                # A joint moves by 1 rad or m at most to each posture: a way of two seconds keeps the speed bound.
+                move *= share * min(1.0, 1.0 / max(float(np.abs(move).max()), 1e-12))
+            there, back = (
+                np.array([pin.integrate(figure.model, start, move) for move in smooth_way(np.vstack(places), steps)])
+                for places in ((still, *moves), (still, moves[0], still))
+            )
+            tested = max(1, steps // 50)  # postures along a way that are tested for being free
+            least = _least(scene, np.vstack([start, there[::tested], there[-1:], back[::tested]]))
+            if least > OWN_ROOM:
+                return (there, back), least
+    raise InputError(f"{spec}: no way was found along which it stays free of itself; give another figure")
+
+
+def _least(scene: wb.Scene, q: Array) -> float:
+    """Least distance of any pair at postures (n, nq) up to the first that is not free, at most twice the clearance."""
+    least = 2.0 * CLEARANCE
+    for posture in q:
+        if least > OWN_ROOM and len(scene.geometry.collisionPairs):
+            least = float(scene.contacts(posture, within=least).distance.min(initial=least))
+    return least
+
+
+def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array], block: bool) -> None:
+    """Put the objects clear of both ways, and a block about where the second one takes the tip farthest."""
+    # Objects are put clear of twelve postures along each way.
+    taken = Occupied(scene.figure, np.vstack([way[:: max(1, len(way) // 12)] for way in ways]))
+    tips = np.vstack(places)
+    occupied = np.vstack([taken.centres, tips])
+    low, high = occupied.min(axis=0), occupied.max(axis=0)
+    # The objects of the standing human surround 2 m; those of a figure are scaled with its own size.
+    size = float((high - low).max()) / 2.0
+    if block:
+        _add_block(scene, places[1], size)
+    space = (low - size * ROOM_SPACE).tolist(), (high + size * ROOM_SPACE).tolist()
+    put_objects(scene, taken, tips, np.random.default_rng(SEED), space, size, BOXES - block)
+
+
+def _add_block(scene: wb.Scene, places: Array, size: float) -> None:
+    """Put a box about the place of the tip that is farthest from the first, as large as leaves the start free."""
+    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(BLOCK[0])
+    at = places[np.argmax(np.linalg.norm(places - places[0], axis=1))]
+    for share in SHARES:
+        x, y, z = (share * edges).tolist()
+        box = wb.Box((x, y, z))
+        if standing.clear_of(box, (*at.tolist(),), size * ROOM_START):
+            scene.add(box, name="block", at=tuple(at.tolist()))
+            return
+    raise InputError(f"{scene.figure.name}: a block at the end of its way would touch it where it starts")

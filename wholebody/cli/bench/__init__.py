@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from wholebody.cli.bench.bodies import robots
 from wholebody.cli.bench.comparing import compare
 from wholebody.cli.bench.counts import ablation
 from wholebody.cli.bench.hard_cases import attack, stability
-from wholebody.cli.bench.methods import scaling, solve, step
-from wholebody.cli.bench.moving import motion, world
+from wholebody.cli.bench.measuring import motion, robots, scaling, solve, step, world
 from wholebody.cli.bench.published import export, judge
 from wholebody.cli.command import Group
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from wholebody.bench.tables import replace_section, write_rows, write_text
-from wholebody.cli.arguments import folders
 from wholebody.cli.command import Command, Measure, Option, command, flag, option
 
 
@@ -23,6 +22,17 @@ def measuring(name: str, help: str, description: str, *options: Option) -> Calla
 def quick(help: str) -> Option:
     """The option `--quick`."""
     return flag("--quick", help)
+
+
+def folders(out: str) -> tuple[Option, Option]:
+    """`--out`, with a folder where it is left out, and `--update-docs`."""
+    return (
+        option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
+        option(
+            "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+            help="write tables and charts into the documentation too (default folder: docs)",
+        ),
+    )  # fmt: skip
 
 
 def listed(name: str, help: str, metavar: str | None = "NAME", **settings: Any) -> Option:
@@ -55,18 +65,20 @@ def publish(
     facts: Mapping[str, str] | None = None,
     tables: Mapping[str, Sequence[Any]] | None = None,
     charts: Mapping[str, Chart] | None = None,
+    page: str = "results.md",
 ) -> None:
     """Write tables and report, draw charts, and write both into the documentation where that is asked for.
 
     What was measured is written before anything is drawn, so that a chart that fails loses no measurement.
 
     Args:
-        name: of the report's file, and of its section of results.md.
+        name: of the report's file, and of its section of the page.
         report: Markdown.
         arguments: of the command.
         facts: of the machine, for the tables.
         tables: rows by the name of their CSV file.
         charts: by the names of their files.
+        page: of the documentation.
     """
     for table, rows in (tables or {}).items():
         write_rows(arguments.out / f"{table}.csv", facts or {}, rows)
@@ -77,12 +89,12 @@ def publish(
     if arguments.update_docs is None:
         return
     pictures = [f"![{caption}](assets/bench/{svg.name})" for (svg, _), caption in drawn]
-    replace_section(arguments.update_docs / "results.md", name, "\n\n".join([*pictures, report]))
+    replace_section(arguments.update_docs / page, name, "\n\n".join([*pictures, report]))
     folder = arguments.update_docs / "assets" / "bench"
     folder.mkdir(parents=True, exist_ok=True)
     for (svg, _), _ in drawn:
         shutil.copyfile(svg, folder / svg.name)
-    print(f"wrote {arguments.update_docs / 'results.md'}")
+    print(f"wrote {arguments.update_docs / page}")
 
 
 def publish_page(name: str, text: str, arguments: argparse.Namespace) -> None:

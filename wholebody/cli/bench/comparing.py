@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.base.errors import InputError
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import write_rows, write_text
-from wholebody.cli.arguments import folders
-from wholebody.cli.bench.command import listed, publish, quick, seed
+from wholebody.bench.tables import machine, write_rows, write_text
+from wholebody.cli.bench.command import folders, listed, publish, quick, seed
 from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
@@ -139,11 +137,11 @@ OF_SETS = ("quick", "sets", "cases", "minutes", "jobs", "cluster", "update_docs"
 def _compare_on_task(arguments: argparse.Namespace) -> int:
     """Compare methods on one's own task."""
     from rich.console import Console
-    from rich.markup import escape
 
+    from wholebody.bench.rows import chart
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.bench.suite.compare import own_task
-    from wholebody.cli.tables import table
+    from wholebody.cli.tables import print_rows
     from wholebody.taskfile import read_task
 
     _alone(arguments, "task", OF_SETS)
@@ -154,15 +152,8 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     facts, out = machine(), arguments.out
     write_rows(out / "task.csv", facts, rows)
     write_text(out / "task.md", own_task.report(rows, title, facts) + "\n")
-    _, png = own_task.chart(rows, title, out / "task")
-    made = table("method", "outcome", "warm ms", "cold ms", "goals mm", "overlap mm", "effort", title=title)
-    for row in rows:
-        figures = (row.warm_ms, row.cold_ms, row.goal_mm, row.overlap_mm, row.effort)
-        made.add_row(row.method, row.outcome, *("" if value != value else f"{value:.3g}" for value in figures))
-    console.print(made)
-    for row in rows:
-        if row.outcome in ("refused", "failed", "overtime"):
-            console.print(f"{row.method}: {escape(row.said)}", highlight=False)
+    _, png = chart(own_task.panels(rows, title), out / "task")
+    print_rows(rows)
     for path in (out / "task.md", out / "task.csv", png):
         console.print(f"wrote {path}", highlight=False, soft_wrap=True)
     return 0
@@ -193,8 +184,8 @@ def _held_out(arguments: argparse.Namespace) -> int:
     from wholebody.bench.suite.adapters.registry import adapters, installed
     from wholebody.bench.suite.compare import held_out
 
-    cases = arguments.cases or (4 if arguments.quick else held_out.CASES)
-    minutes = held_out.MINUTES if arguments.minutes is None else arguments.minutes
+    cases = arguments.cases or (4 if arguments.quick else 40)
+    minutes = 20.0 if arguments.minutes is None else arguments.minutes
     names = arguments.methods or [name for name in held_out.METHODS if installed(name)]
     asked, left_out = held_out.settings(adapters(names), cases, arguments.seed, minutes)
     if left_out:

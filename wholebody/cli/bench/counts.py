@@ -5,8 +5,9 @@ from __future__ import annotations
 import argparse
 
 from wholebody.base.errors import InputError
-from wholebody.bench.machine import machine
+from wholebody.bench.tables import machine
 from wholebody.cli.bench.command import measuring, publish
+from wholebody.cli.bench.measuring import chosen
 from wholebody.cli.command import count, option
 
 PROBLEMS = 6  # of every set, where --count is left out
@@ -52,11 +53,15 @@ def ablation(arguments: argparse.Namespace) -> None:
 
 
 def _of_motion(arguments: argparse.Namespace) -> None:
-    from wholebody.bench.measure.motion import ablated
-    from wholebody.bench.measure.motion.cases import chosen
+    from wholebody.bench.measure import motion_ablation as ablated
+    from wholebody.bench.rows import report
     from wholebody.figures import load
 
-    only = chosen(arguments.only, tuple(ablated.USED), "--only")
+    only = chosen(arguments.only, ablated.USED, "--only")
     cases = ablated.CASES[-2:] if arguments.quick else ablated.CASES
-    rows = ablated.ablation(load("human"), print, cases, only)[1]
-    publish("ablation-motion", ablated.report(rows), arguments, facts=machine(), tables={"ablation-motion": rows})
+    facts, rows = machine(), ablated.ablation(load("human"), print, cases, only)
+    shown = [row for row in rows if ablated.matters(row)]
+    unnoticed = sorted({row.case for row in rows} - {row.case for row in shown})
+    about = "Constants of `wb.avoid`, halved and doubled on clips: changes, summed over the cases."
+    text = report(about, {"": shown}, facts, [f"changes nothing: {name}" for name in unnoticed])
+    publish("ablation-motion", text, arguments, facts=facts, tables={"ablation-motion": rows})

@@ -3,98 +3,57 @@
 from __future__ import annotations
 
 import argparse
-import shutil
+from functools import partial
 from itertools import count as numbers
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.machine import machine
-from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
-from wholebody.cli.arguments import folders
-from wholebody.cli.bench.command import listed, measuring, seed
+from wholebody.bench.tables import machine, read_rows
+from wholebody.cli.bench.command import Chart, folders, listed, measuring, publish, seed
 from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Iterator, Sequence
+    from collections.abc import Iterator, Sequence
 
     from wholebody.bench.attack.case import Case
-    from wholebody.bench.attack.report import Row
     from wholebody.bench.suite.adapters.base import Adapter
     from wholebody.bench.suite.stability.asking import Cell
     from wholebody.bench.suite.stability.case import HardCase
-    from wholebody.bench.suite.stability.pictures import Drawn
     from wholebody.bench.suite.stability.verdict import Result
-
-PAGE = "where-methods-fail.md"
-ASSETS = "assets/stability"
-ATTACKED = "reliability.md"
 
 
 @measuring(
     "stability",
     "hard cases by methods: where each fails, and how",
     "Ask every method every hard case, each in a process of its own, and judge the answers: solved, an "
-    "honest best effort, a clear refusal, or WRONG. With --from an earlier run is told again: its table, its "
-    "chart, and with --update-docs the page, for whose pictures a few answers are asked for anew.",
-    listed(
-        "--methods",
-        "methods, such as qp, newton or qp/daqp; all for every one (default: those of the page; with --from those of "
-        "the file)",
-    ),
-    listed("--cases", "cases (default: all, with --from those of the file; with --quick a few)"),
-    option(
-        "--from", dest="earlier", type=Path, metavar="CSV", help="stability.csv of an earlier run, instead of asking"
-    ),
+    "honest best effort, a clear refusal, or WRONG.",
+    listed("--methods", "methods, such as qp, newton or qp/daqp; all for every one (default: one of each algorithm)"),
+    listed("--cases", "cases (default: all; with --quick a few)"),
     count("--jobs", 1, "processes at a time"),
 )
 def stability(arguments: argparse.Namespace) -> None:
     """Ask, judge, and write it down; 0 whatever the verdicts are."""
     from wholebody.bench.suite.adapters.registry import adapters, installed
-    from wholebody.bench.suite.stability import catalogue, page
-    from wholebody.bench.suite.stability.verdict import read_result, result
+    from wholebody.bench.suite.stability import catalogue
+    from wholebody.bench.suite.stability.verdict import METHODS, matrix, report, result
 
-    _check_page(arguments)
-    whole = arguments.update_docs is not None
-    cases = arguments.cases or (catalogue.QUICK if arguments.quick else None)
-    asked: Sequence[Adapter] = ()
-    if arguments.earlier is not None:
-        every = (catalogue.names(), page.METHODS) if whole else (None, None)
-        found, facts = read_result(arguments.earlier, cases or every[0], arguments.methods or every[1])
-        if whole:
-            asked = adapters(found.methods)
-    else:
-        asked = adapters(arguments.methods or [name for name in page.METHODS if whole or installed(name)])
-        chosen = catalogue.cases(cases)
-        facts = machine()
-        found = result(
-            chosen,
-            [adapter.name for adapter in asked],
-            _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs),
-        )
-        write_rows(arguments.out / "stability.csv", facts, list(found.rows.values()))
-    report = page.report(found, facts)
-    write_text(arguments.out / "stability.md", report + "\n")
-    svg, _ = page.matrix(found, arguments.out / "stability.svg")
+    asked = adapters(arguments.methods or [name for name in METHODS if installed(name)])
+    chosen = catalogue.cases(arguments.cases or (catalogue.QUICK if arguments.quick else None))
+    facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
+    found = result(chosen, [adapter.name for adapter in asked], cells)
     _print(found)
-    print(f"wrote {arguments.out}")
-    if arguments.update_docs is not None:
-        pictures = _drawn(found, asked, arguments.update_docs, arguments.jobs)
-        shutil.copyfile(svg, arguments.update_docs / ASSETS / page.CHART)
-        text = page.page(found, asked, facts, pictures, ASSETS)
-        replace_section(arguments.update_docs / PAGE, "stability", text)
-        print(f"wrote {arguments.update_docs / PAGE}")
-
-
-def _check_page(arguments: argparse.Namespace) -> None:
-    """Raise InputError, before anything is asked, where the page could not be written or would lose cases."""
-    docs = arguments.update_docs
-    if docs is None:
-        return
-    if arguments.cases or arguments.quick:
-        raise InputError("the page has all cases; leave --cases and --quick out, or leave --update-docs out")
-    if not (docs / PAGE).is_file():
-        raise InputError(f"{docs / PAGE}: there is no such page; give the folder of the documentation")
+    rows, text = found.rows, report(found, asked, facts)
+    charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
+    publish(
+        "stability",
+        text,
+        arguments,
+        facts=facts,
+        tables={"stability": rows},
+        charts=charts,
+        page="where-methods-fail.md",
+    )
 
 
 def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
@@ -108,23 +67,6 @@ def _asked(pairs: Sequence[tuple[HardCase, Adapter]], jobs: int) -> list[Cell]:
             cells.append(cell)
             bar.update(work, advance=1, description=f"{cell.case.name}, {cell.method}", refresh=True)
     return cells
-
-
-def _drawn(found: Result, asked: Sequence[Adapter], docs: Path, jobs: int) -> Drawn:
-    """Draw answers; those of an earlier run are asked for again, and drawn where the verdict is of the same kind."""
-    from wholebody.bench.suite.stability.pictures import draw, shown
-    from wholebody.bench.suite.stability.verdict import judged_verdict
-    from wholebody.cli.tables import progress_bar
-
-    cells, known = dict(found.cells), {adapter.name: adapter for adapter in asked}
-    if not cells:
-        for cell in _asked([(case, known[method]) for case, method in shown(found)], jobs):
-            key = cell.case.name, cell.method
-            if judged_verdict(cell, None).kind == found.rows[key].verdict:
-                cells[key] = cell
-    with progress_bar(thread=False) as bar:
-        work = bar.add_task("drawing", total=len(found.cases))
-        return draw(found, cells, docs / ASSETS, lambda: bar.update(work, advance=1, refresh=True))
 
 
 def _print(result: Result) -> None:
@@ -172,17 +114,21 @@ or no end within a minute. What ended before Ctrl-C is written.""",
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report, running
-    from wholebody.bench.attack.report import Row, is_slow
+    from wholebody.bench.attack.report import Row
 
     _check(arguments)
     earlier = [one for path in arguments.also for one in read_rows(path, Row)[1]]
     rows: list[Row] = []
-    tell, interrupted = _teller(rows), False
+    interrupted = False
     try:
-        for ended in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
-            line = tell(ended)
-            if line.outcome == "wrong" or is_slow(line):
-                report.keep(ended, arguments.out)
+        for case, verdict in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
+            rows.append(report.row(case, verdict))
+            if rows[-1].outcome == "wrong":
+                print(f"WRONG: {case.kind} {case.number}: {rows[-1].words}", flush=True)
+            elif len(rows) % 200 == 0:
+                print(f"{len(rows)} cases, {sum(one.outcome == 'wrong' for one in rows)} wrong", flush=True)
+            if rows[-1].outcome == "wrong" or rows[-1].slow:
+                report.keep(case, verdict, arguments.out)
     except KeyboardInterrupt:
         interrupted = True
     rows += earlier
@@ -190,15 +136,10 @@ def attack(arguments: argparse.Namespace) -> int:
         raise InputError("no case ended; give more --seconds")
     rows.sort(key=lambda one: (one.seed, one.number))
     facts = machine()
-    write_rows(arguments.out / "attack.csv", facts, rows)
     report.index(rows, arguments.out)
-    text = report.report(rows, facts)
-    write_text(arguments.out / "attack.md", text + "\n")
-    print(text)
-    print(f"wrote {arguments.out}")
-    if arguments.update_docs is not None:
-        replace_section(arguments.update_docs / ATTACKED, "attack", text)
-        print(f"wrote {arguments.update_docs / ATTACKED}")
+    publish(
+        "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
+    )
     return 130 if interrupted else int(any(one.outcome == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
@@ -222,19 +163,3 @@ def _cases(arguments: argparse.Namespace) -> Iterator[Case]:
         if done == arguments.cases:
             return
         yield Case(arguments.seed, number, kind_of(number))
-
-
-def _teller(rows: list[Row]) -> Callable[..., Row]:
-    """Return what adds a case to the rows, and prints a line where it was wrong, and now and then how far it is."""
-    from wholebody.bench.attack.report import row
-
-    def tell(ended: object) -> Row:
-        line = row(ended)  # type: ignore[arg-type]
-        rows.append(line)
-        if line.outcome == "wrong":
-            print(f"WRONG: {line.kind} {line.number}: {line.words}", flush=True)
-        elif len(rows) % 200 == 0:
-            print(f"{len(rows)} cases, {sum(one.outcome == 'wrong' for one in rows)} wrong", flush=True)
-        return line
-
-    return tell

@@ -11,7 +11,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.one_call import OneCall
+from wholebody.bench.suite.adapters.base import OneCall
 
 
 class Still(OneCall[Any]):

@@ -16,7 +16,7 @@ from wholebody.bench.suite.problem_sets import robot_arm
 pytest.importorskip("optik")
 
 
-@pytest.mark.parametrize("kind", robot_arm.KINDS)
+@pytest.mark.parametrize("kind", robot_arm.given.kinds)
 def test_it_places_the_tool_of_an_arm(kind: str) -> None:
     rng = np.random.default_rng(4)
     figure, ready = robot_arm.arm(kind, rng)

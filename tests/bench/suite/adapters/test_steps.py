@@ -14,10 +14,9 @@ import wholebody as wb
 from tests.bench.following import followed
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.measure.track import CLEARANCE, Track, judge, track
-from wholebody.bench.suite.adapters.mjcf import mjcf
 from wholebody.bench.suite.adapters.own import MovingPoint
-from wholebody.bench.suite.adapters.registry import chosen_tools, installed_tools, make_tool, tool_class
-from wholebody.bench.suite.adapters.urdf import Frames, own_frame
+from wholebody.bench.suite.adapters.registry import chosen_tools, installed_tools, make_tool, tool_differences
+from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 
 LIMIT = {"pink": 1e-4}
 """Radians by which a tool may exceed a limit here: pink leaves DAQP at its own tolerance."""
@@ -86,7 +85,7 @@ def test_our_steps_jolt_joints_no_more_than_the_best_peers(name: str, most: floa
 def test_unknown_and_missing_tools_are_named() -> None:
     with pytest.raises(UnknownNameError, match="placo"):
         chosen_tools(["plako"])
-    assert all(tool_class(name).differences is not None for name in installed_tools())
+    assert all(tool_differences(name) for name in ("placo", "placo/pruned", "pink", "mink"))
     for name, extra in (("mink", "compare"), ("placo", "placo")):
         if find_spec(name) is None:
             with pytest.raises(MissingPackageError, match=extra):

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.compare.record import DEFAULT
+from wholebody.bench.suite.compare.results import DEFAULT
 from wholebody.bench.suite.compare.solving import Ready, solve
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.methods.differential import Stopwatch

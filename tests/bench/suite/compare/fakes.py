@@ -99,4 +99,5 @@ def _fake(does: str, tolerance: float, iterations: int | None) -> Fake:
 def adapter(does: str) -> Adapter:
     """Return a fake as it takes part."""
     ladder = ((1e-2, None), (1e-4, None), (1e-6, None))
-    return Adapter(does, partial(_fake, does), ladder, f"a fake that {does}", (f"it {does}", "wb.Fake() is code"))
+    differences = (f"it {does}", "wb.Fake() is code")
+    return Adapter(does, partial(_fake, does), ladder, setup=f"a fake that {does}", differences=differences)

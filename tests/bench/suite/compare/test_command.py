@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.suite.compare.record import Record
+from wholebody.bench.suite.compare.results import Record
 from wholebody.bench.tables import read_rows
-from wholebody.cli.bench import add_to
+from wholebody.cli.bench import run as group
 
 
 def bench(*words: str) -> int:
     parser = argparse.ArgumentParser()
-    add_to(parser.add_subparsers())
+    group.add_to(parser.add_subparsers())
     arguments = parser.parse_args(["bench", "compare", *words])
     return int(arguments.run(arguments))
 

@@ -9,7 +9,7 @@ import pytest
 
 from wholebody.base.batches import close_own_child
 from wholebody.bench.suite.compare.jobs import Task, work
-from wholebody.bench.suite.compare.store import Chunk
+from wholebody.bench.suite.compare.results import Chunk
 
 FROM_SCRATCH = True
 WAITS = 1.2  # s: of each solve of the method that sleeps

@@ -13,14 +13,10 @@ from wholebody.bench.statistics import Interval
 from wholebody.bench.suite.compare import lock, report
 from wholebody.bench.suite.compare import run as running
 from wholebody.bench.suite.compare.lock import Locked, differences, in_words, locked, read_lock, shares, write_lock
-from wholebody.bench.suite.compare.pages import Material
-from wholebody.bench.suite.compare.record import Record
-from wholebody.bench.suite.compare.report import material
-from wholebody.bench.suite.compare.results import Results
+from wholebody.bench.suite.compare.results import Chunk, Record, Results
 from wholebody.bench.suite.compare.run import run
 from wholebody.bench.suite.compare.solving import JUDGED
-from wholebody.bench.suite.compare.store import Chunk
-from wholebody.bench.suite.compare.summary import summaries
+from wholebody.bench.suite.compare.summary import Material, material, summaries
 from wholebody.cli import main
 
 AMOUNTS = {"cases": 2, "sweep": 0, "levels": 1, "seed": 5, "cap": 5.0, "minutes": 1.0}

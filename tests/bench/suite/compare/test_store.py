@@ -8,8 +8,7 @@ from pathlib import Path
 import pytest
 
 from wholebody.base.errors import FileFormatError, InputError
-from wholebody.bench.suite.compare.record import ANSWERED, FAILED, Record
-from wholebody.bench.suite.compare.store import NAME, Chunk, Store
+from wholebody.bench.suite.compare.results import ANSWERED, FAILED, NAME, Chunk, Record, Store
 
 SETTINGS = {"seed": 0, "sets": ["a"], "levels": {"x": [[0.1, None], [0.01, 3]]}}
 

@@ -9,11 +9,12 @@ import wholebody as wb
 from wholebody.bench.suite.problem_sets import drag
 from wholebody.bench.suite.problem_sets.bodies import human
 from wholebody.bench.suite.problem_sets.case import generator
+from wholebody.bench.suite.problem_sets.registry import problem_set
 
 
 def test_a_known_posture_meets_each_frame() -> None:
-    case = drag.SET.make(0, 0)
-    problem, postures = case.problem, drag.way(human(), generator(drag.SET.name, 0, 0))
+    case = problem_set("drag").make(0, 0)
+    problem, postures = case.problem, drag.way(human(), generator("drag", 0, 0))
     assert 100 <= len(case.frames) == len(postures) - 1 <= 200
     for q, goals in zip(postures[1:], case.frames, strict=True):
         problem.retarget(goals)
@@ -24,7 +25,7 @@ def test_a_known_posture_meets_each_frame() -> None:
 
 @pytest.mark.parametrize("number", range(3))
 def test_the_goals_move_far_smoothly_and_at_a_speed_of_people(number: int) -> None:
-    case = drag.SET.make(number, 0)
+    case = problem_set("drag").make(number, 0)
     goals = [goals[0] for goals in (case.problem.goals, *case.frames)]
     places = np.array([goal.target for goal in goals if isinstance(goal, wb.Point)])
     assert np.linalg.norm(places - places[0], axis=1).max() > 0.2
@@ -40,5 +41,5 @@ def test_the_spline_has_no_corners() -> None:
     """Value, first and second differences go on from one span to the next."""
     control = np.random.default_rng(0).normal(size=(6, 2))
     whole = np.vstack([drag._span(control[k : k + 4]) for k in range(3)])
-    third = np.abs(np.diff(whole, 3, axis=0)).max() * drag.SPAN**3
+    third = np.abs(np.diff(whole, 3, axis=0)).max() * drag.given.frames_a_span**3
     assert third < 3.0 * np.abs(np.diff(control, 3, axis=0)).max()

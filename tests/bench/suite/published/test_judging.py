@@ -13,9 +13,8 @@ from published_helpers import answers
 
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
 from wholebody.bench.suite.published.answers import read_answers
-from wholebody.bench.suite.published.judging import TIMEOUT, as_json, judge
+from wholebody.bench.suite.published.judging import TIMEOUT, as_json, judge, left_out
 from wholebody.bench.suite.published.rebuilt import Score, worst_of
-from wholebody.bench.suite.published.words import left_out
 from wholebody.cli import main
 
 

@@ -27,7 +27,7 @@ def test_nobody_wins_within_the_noise() -> None:
         (name, set_score("s", "near", [judged(k, k < solved, 0.1) for k in range(20)]))
         for name, solved in (("a", 20), ("b", 19), ("c", 5))
     ]
-    board = Board("s", "near", tuple(rows), ("a", "b"), None)
+    board = Board("s", "near", tuple(rows), ("a", "b"))
     assert rows[0][1].share == share([True] * 20)
     assert rows[2][1].effort_above.value == 0.0
     assert rows[0][1].seconds != NOTHING

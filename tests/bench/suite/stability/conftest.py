@@ -32,6 +32,6 @@ def fake() -> Callable[..., Adapter]:
     """Return a function: an answer to a problem, and a status -> an adapter."""
 
     def made(answer: Callable[[Problem], Array], status: Status = "stalled") -> Adapter:
-        return Adapter("fake", lambda tolerance, iterations: Fake(answer, status), (), "made up")
+        return Adapter("fake", lambda tolerance, iterations: Fake(answer, status), ())
 
     return made

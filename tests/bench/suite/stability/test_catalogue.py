@@ -8,10 +8,9 @@ import pytest
 from wholebody.assessment.posture import assess
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.stability.asking import ask
+from wholebody.bench.suite.stability.asking import ask, judge
 from wholebody.bench.suite.stability.case import HardCase, Nonsense, Posed, Stream
 from wholebody.bench.suite.stability.catalogue import QUICK, cases, names
-from wholebody.bench.suite.stability.judging import judge
 from wholebody.bench.suite.stability.verdict import decide
 
 FAST = (
@@ -28,15 +27,12 @@ def test_every_case_is_told_and_can_be_asked(case: HardCase) -> None:
     assert case.accepts(case.expected, 0.0)
     assert not case.accepts("wrong", 0.0)
     question = case.question()
-    if isinstance(question, Stream):
-        assert -len(question.frames) <= question.shown < len(question.frames)
     if isinstance(question, (Posed, Stream)):
-        scene, start = question.problem.scene, question.problem.scene.figure.clamp(question.problem.start)
+        start = question.problem.scene.figure.clamp(question.problem.start)
         inside = assess(question.problem, start).penetration
         depth = {"start-1-mm-inside": 1e-3, "start-5-cm-inside": 0.05, "start-30-cm-inside": 0.3}
         depth |= {"cancelling-normals": 0.015, "coincident-centres": 0.1}
         assert inside == pytest.approx(depth.get(case.name, 0.0), abs=2e-6)
-        assert set(case.see_through) <= set(scene.objects)
 
 
 def test_names_are_unique_and_unknown_ones_are_refused() -> None:

@@ -14,22 +14,15 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.base import Adapter, few
+from wholebody.bench.suite.adapters.base import Adapter, OneCall, few
 from wholebody.bench.suite.adapters.loop import kept_apart, placements, posture_costs
-from wholebody.bench.suite.adapters.one_call import OneCall
 from wholebody.bench.suite.adapters.urdf import axis_of
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-SHARE = 0.25  # of the tolerance, to which goals and holds are asked: a box of this half width, and an angle
-ROOM = 2e-5  # m: kept beyond clearances; drake's distances of hulls and ellipsoids are exact to about this
-INFLUENCE = 0.01  # m: pairs nearer than this beyond the clearance take part: drake's default
-RESTING = 4e-5  # m: by which pairs that rest may be nearer: the smooth maximum of two of them is above each
-NEAR_TURN = 0.5  # rad: within which axes at right angles tell an orientation apart from its opposites
 SLAB = 50.0  # m: edges of the box that stands for a half-space
-ITERATIONS = 500  # most of SNOPT's major ones
 
 
 def drake_adapter() -> Adapter:
@@ -39,20 +32,6 @@ def drake_adapter() -> Adapter:
         make=Drake,
         prepare=Drake.prepare,
         loose=(*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5))),
-        setup="pydrake's InverseKinematics on a MultibodyPlant made from ours, by SNOPT, at most "
-        f"{ITERATIONS} major iterations: goals and holds are AddPositionConstraint and "
-        "AddAngleBetweenVectorsConstraint of a "
-        f"{SHARE:g} of the tolerance, pairs AddMinimumDistanceLowerBoundConstraint with an influence of "
-        f"{100 * INFLUENCE:g} cm, measures a quadratic cost; one start, the problem's own. Building its plant is "
-        "set-up.",
-        differences=(
-            "drake's constraint has one least distance for all pairs: those that begin nearer are left out, but for "
-            "those with a half-space, which is lowered",
-            "a half-space is a box of 50 m, since drake has no distance of a half-space from a hull",
-            "InverseKinematics has no Balance, Plane, ReachCones, CenterOfMass or Axis here, and takes goals as hard",
-            "drake minimises Effort and Displacement only",
-            "its plant is made for free roots, turning and sliding joints",
-        ),
     )
 
 
@@ -76,8 +55,9 @@ class Drake(OneCall["_Plant"]):
 
     def found(self, built: _Plant, problem: Problem) -> tuple[Array | None, bool]:
         """The answer of the program."""
-        program = _Program(built, problem, SHARE * self.tolerance)
-        iterations = ITERATIONS if self.iterations is None else self.iterations
+        # Goals and holds are asked to a quarter of the tolerance: a box of this half width, and an angle.
+        program = _Program(built, problem, 0.25 * self.tolerance)
+        iterations = 500 if self.iterations is None else self.iterations  # most of SNOPT's major ones
         return program.solved(problem.scene.figure.clamp(problem.start), iterations)
 
 
@@ -101,7 +81,8 @@ class _Plant:
         self._addresses: list[tuple[str, Any]] = []
         for index in range(1, self._model.njoints):
             self._add_joint(index)
-        self.least = problem.clearance + ROOM
+        # drake's distances of hulls and ellipsoids are exact to about 2e-5 m.
+        self.least = problem.clearance + 2e-5
         self._pieces: dict[tuple[int, float], Any] = {}
         pairs = self._paired(problem)
         self.plant.Finalize()
@@ -173,7 +154,8 @@ class _Plant:
                 pairs.append(
                     (
                         self._piece(pieces, pair.first, 0.0),
-                        self._piece(pieces, pair.second, lower + RESTING if surface and lower > 0.0 else 0.0),
+                        # Pairs that rest may be 4e-5 m nearer: the smooth maximum of two of them is above each.
+                        self._piece(pieces, pair.second, lower + 4e-5 if surface and lower > 0.0 else 0.0),
                     )
                 )
         return pairs
@@ -209,7 +191,8 @@ class _Program:
         with TOOL:
             self._ik = InverseKinematics(plant.plant, plant.context)
             if plant.paired:
-                self._ik.AddMinimumDistanceLowerBoundConstraint(plant.least, INFLUENCE)
+                # Pairs nearer than 1 cm beyond the clearance take part: drake's default.
+                self._ik.AddMinimumDistanceLowerBoundConstraint(plant.least, 0.01)
         for goal in problem.goals:
             if isinstance(goal, wb.Point):
                 place = problem.scene.model.frames[goal.place.frame].placement * pin.SE3(
@@ -276,7 +259,8 @@ class _Program:
         from pydrake.math import RotationMatrix
 
         there, here = (self._plant.bodies[at.joint].body_frame() for at in (residual.base, residual.place))
-        self._ik.AddOrientationConstraint(there, RotationMatrix(wanted), here, RotationMatrix(own), NEAR_TURN)
+        # Within 0.5 rad, axes at right angles tell an orientation apart from its opposites.
+        self._ik.AddOrientationConstraint(there, RotationMatrix(wanted), here, RotationMatrix(own), 0.5)
         for axis in range(3):  # its cosine is flat where it is met: right angles between axes are exact
             right = 0.5 * np.pi
             self._ik.AddAngleBetweenVectorsConstraint(

@@ -18,14 +18,9 @@ from wholebody.methods.base import named_terms
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 
-STEP = 0.01  # s: its examples' time step
 DAMPING = 0.1  # its examples'
 GAIN = 10.0  # 1/s: its examples', for positions and orientations
-POSTURE = 1e-2  # its examples' weight of the posture task, which ranks below the goals
 LARGER, AT = 10.0, 0.02  # its examples' largest factor on the time step, and m of error from which it grows
-ROWS = 5  # collision rows: the most that its documentation recommends
-ITERATIONS = 1000  # most steps: near a goal, one makes up for a tenth of what is left
-PATIENCE = 5  # calls without motion before it counts as at rest: its joint limits give way after three
 
 
 def embodik_adapter() -> Adapter:
@@ -35,24 +30,6 @@ def embodik_adapter() -> Adapter:
         make=EmbodikLoop,
         prepare=EmbodikLoop.prepare,
         loose=(*few(10, 20, 50), *LADDER),
-        setup="embodik's KinematicsSolver.solve_position_step on a URDF made from our model, set up as in its "
-        f"examples: steps of {STEP:g} s, which grow up to {LARGER:g} times from {100 * AT:g} cm of error on, damping "
-        f"and tolerance {DAMPING:g}, gains of {GAIN:g} / s, goals of priority 0 and mode SCALE_ELASTIC with the "
-        "fallback to MIN_ERROR that its collision guide advises, the measure as a PostureTask of priority 1, weight "
-        f"{POSTURE:g} and mode MIN_ERROR, every step as a new command, the model's own limits of speed, {ROWS} "
-        "collision rows, its collision preset BALANCED and its recovery as they come; pairs keep "
-        f"{1e3 * EmbodikLoop.margin:g} mm for each metre of the figure more than the clearance, less where the start "
-        f"has less room; one start, at most {ITERATIONS} steps, the loop of our adapter to placo. Building its model "
-        "is set-up.",
-        differences=(
-            "its collision rows are those of the nearest pairs, and of what is inside",
-            "goals have one weight, and its posture task takes the last measure alone",
-            "a half-space is the top of a box, eight times as wide as the figure is long",
-            "its model is written for fixed roots, turning and sliding joints, and for all shapes but ellipsoids and "
-            "cones: its URDF reader hangs things on the root, which is right only where the root stands still",
-            "it takes Point, Frame and Orientation, Freeze, Effort and Displacement, and refuses every other term by "
-            "name",
-        ),
     )
 
 
@@ -67,7 +44,8 @@ class EmbodikLoop(Loop):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
-        super().__init__(tolerance, ITERATIONS if iterations is None else iterations)
+        # Near a goal, a step makes up for a tenth of what is left.
+        super().__init__(tolerance, 1000 if iterations is None else iterations)
 
     def build(self, problem: Problem) -> Stepper:
         """Write and read the model."""
@@ -96,7 +74,7 @@ class _EmbodikStepper:
             self._read()
         problem = self._problem
         self._solver = solver = embodik.KinematicsSolver(self._robot)
-        solver.dt = STEP
+        solver.dt = 0.01  # s: its examples' time step
         solver.set_damping(DAMPING)
         solver.set_tolerance(DAMPING)
         self._options, self._targets = embodik.PositionStepOptions(), list[Any]()
@@ -104,7 +82,8 @@ class _EmbodikStepper:
             self._goal(goal)
         for cost in posture_costs(problem)[-1:]:
             task = solver.add_posture_task("posture")
-            task.priority, task.weight, task.solve_mode = 1, POSTURE, embodik.TaskSolveMode.MIN_ERROR
+            # The weight is that of its examples; the posture task ranks below the goals.
+            task.priority, task.weight, task.solve_mode = 1, 1e-2, embodik.TaskSolveMode.MIN_ERROR
             task.set_target_configuration(self._theirs(cost.reference))
             task.set_joint_weights(self._spread(cost.weights))
         options = self._options
@@ -123,7 +102,7 @@ class _EmbodikStepper:
 
         del weight, damping  # its posture task ranks below the goals, and its damping is its own
         theirs = self._theirs(q)
-        for _ in range(PATIENCE):
+        for _ in range(5):  # calls without motion before it counts as at rest: its joint limits give way after three
             self._options.continuity_command_revision += 1  # a new command: it holds still 0.3 mm from an old one
             with TOOL:
                 answer = self._solver.solve_position_step(theirs, self._targets, self._options)
@@ -162,7 +141,8 @@ class _EmbodikStepper:
         usual = Counter(asked.values()).most_common(1)[0][0]
         self._solver.configure_collision_constraint(
             min_distance=usual, include_pairs=[(f"{first}_0", f"{second}_0") for first, second in asked],
-            nearest_points_all_pairs=False, max_constraints=ROWS,
+            # The most collision rows that its documentation recommends.
+            nearest_points_all_pairs=False, max_constraints=5,
         )  # fmt: skip
         for (first, second), distance in asked.items():
             if distance != usual:

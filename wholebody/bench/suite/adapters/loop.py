@@ -11,7 +11,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.bench.suite.adapters.one_call import Outside
+from wholebody.bench.suite.adapters.base import Outside
 from wholebody.figures.figure import Figure
 from wholebody.methods import differential
 from wholebody.methods.base import named_terms
@@ -24,12 +24,7 @@ from wholebody.solution import Solution
 NEAR = 0.1  # of the size of a figure: pairs nearer than this have a row, where a tool has such a setting
 SHARE = 0.5  # of the room that a pair has at the start: most of its margin
 QUARTERS = 4  # margins that differ by less than this part of the largest are one: tools have a class for each value
-ITERATIONS = 200  # most, where nothing else is said
-STEPS = 10  # fewest of a frame where things move: rows keep what is beyond a clearance, and ask for the goal beside
-ROOM = 0.02  # m: pairs keep at least this beyond their clearances where things move: pink's default
-AHEAD = 1.5  # times as far as a thing moved in a frame, pairs keep beyond their clearances
 OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
-DECAY = 0.6  # of the measures' weight from one iteration to the next
 
 
 class PostureCost(NamedTuple):
@@ -95,10 +90,12 @@ class Loop(Outside[Stepper], ABC):
         began = time.perf_counter()
         stepper, room = self.ready(problem), self._room(problem)
         longest = self.longest * max(1.0, size(problem.scene.figure))  # the tool bounds turns and lengths apart
-        most = ITERATIONS if self.iterations is None else self.iterations
-        settings = Settings(self.tolerance, most, longest, DECAY, best=True)
+        most = 200 if self.iterations is None else self.iterations  # most, where nothing else is said
+        # The weight of the measures fades to 0.6 from one iteration to the next.
+        settings = Settings(self.tolerance, most, longest, 0.6, best=True)
         if room:
-            settings = with_values(settings, best=False, least=min(STEPS, most))
+            # Where things move, rows keep what is beyond a clearance, and ask for the goal beside it.
+            settings = with_values(settings, best=False, least=min(10, most))
         with problem.borrow() as workspace, Control(None, progress) as control:
             stepper.begin(room)
             run = Iteration(problem, workspace, stepper, settings, control)
@@ -114,7 +111,9 @@ class Loop(Outside[Stepper], ABC):
         if before is None or before.shape != places.shape:
             return self._kept
         moved = float(np.linalg.norm(places - before, axis=1).max(initial=0.0))
-        self._kept = max(self._kept, ROOM, AHEAD * moved) if moved else self._kept
+        # Where things move, pairs keep 2 cm beyond their clearances, pink's default, and 1.5 times as
+        # far as a thing moved in a frame.
+        self._kept = max(self._kept, 0.02, 1.5 * moved) if moved else self._kept
         return self._kept
 
     def unsupported(self, problem: Problem) -> list[str]:

@@ -24,46 +24,17 @@ from wholebody.bench.suite.adapters.loop import (
     posture_costs,
     size,
 )
-from wholebody.bench.suite.adapters.mjcf import ROOT, mjcf
-from wholebody.bench.suite.adapters.urdf import Frames, own_frame
+from wholebody.bench.suite.adapters.urdf import ROOT, Frames, mjcf, own_frame
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-HOLDING = 10.0  # cost of what is held, where goals cost 1
-COLLISION_GAIN = 0.5 * DT  # half of what is free of a gap may be used up in one step of a reach; see `MinkTool`
 
-
-_DIFFERENCES = (
-    "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
-    "mink has no Balance, Plane or ReachCones, and holds whole frames only",
-    "mink minimises Effort and Displacement only",
-    "its model is written for free roots, turning and sliding joints, and for all shapes but ellipsoids",
-)
-
-
-def mink_adapter(variant: str = "") -> Adapter:
-    """The kinematics of mink in our loop: holds as heavy soft tasks, or as equalities where the variant is "hard"."""
-    hard = variant == "hard"
-    loop = HardMinkLoop if hard else MinkLoop
-    holds = "whole holds as equality constraints" if hard else f"whole holds as soft ones of cost {HOLDING:g}"
-    more = "pairs that equality constraints keep in place are left out, since their rows leave mink no solution"
-    return Adapter(
-        name=loop.name,
-        make=loop,
-        prepare=loop.prepare,
-        loose=(*few(5, 10, 20), *LADDER),
-        setup="mink.solve_ik on a MuJoCo model made from ours, with DAQP: FrameTask, RelativeFrameTask, AxisAlignTask, "
-        f"LookAtTask, ComTask and PostureTask (posture and measures, with a weight that fades) as soft tasks, {holds}, "
-        f"DofFreezingTask, ConfigurationLimit, VelocityLimit and FreeJointVelocityLimit of {loop.longest} rad or, for "
-        "each metre of the figure, m a step, a CollisionAvoidanceLimit for every clearance that occurs, gain "
-        f"{loop.gain}; for each metre of the figure it looks {100 * NEAR:g} cm far and keeps {1e3 * loop.margin:g} mm "
-        "more than the clearance, less where the start has less room; one start, at most 200 steps, the loop of our "
-        "adapter to placo. Building its model is set-up.",
-        differences=(*_DIFFERENCES, more) if hard else _DIFFERENCES,
-    )
+def mink_adapter() -> Adapter:
+    """The kinematics of mink in our loop, with holds as heavy soft tasks."""
+    return Adapter("mink", MinkLoop, (*few(5, 10, 20), *LADDER), MinkLoop.prepare)
 
 
 class MinkLoop(Loop):
@@ -71,7 +42,6 @@ class MinkLoop(Loop):
 
     name = "mink"
     kinds = (*Loop.kinds, wb.Axis)
-    hard: ClassVar[bool] = False
     gain: ClassVar[float] = 0.85  # share of what is free of a gap that may be used up in one step: mink's default
 
     def build(self, problem: Problem) -> Stepper:
@@ -79,19 +49,9 @@ class MinkLoop(Loop):
         return _MinkStepper(problem, type(self))
 
 
-class HardMinkLoop(MinkLoop):
-    """The same with holds as equality constraints, mink's `constraints`."""
-
-    name = "mink/hard"
-    hard = True
-    longest = 0.025
-    margin = 0.0  # rows that ask for room beside a foot that cannot move leave a program no solution
-    gain = 1.0  # with less, what is held cannot come back
-
-
 class _MinkStepper:
     def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
-        self._problem, self._loop, self._longest, self._holds_hard = problem, loop, loop.longest, loop.hard
+        self._problem, self._loop, self._longest = problem, loop, loop.longest
         self._sites = Frames()
         self._room = 0.0
         for term in (*problem.goals, *problem.constraints):
@@ -115,10 +75,9 @@ class _MinkStepper:
         model = self._mujoco
         self._points: list[tuple[Any, str, Array]] = []
         self._tasks = [self._goal(goal) for goal in problem.goals]
-        cost = 1.0 if self._holds_hard else HOLDING
-        holds = [self._placement(term.residual, cost) for term in problem.constraints if isinstance(term, wb.Hold)]
-        self._hard = holds if self._holds_hard else []
-        self._tasks += [] if self._holds_hard else holds
+        held = [term.residual for term in problem.constraints if isinstance(term, wb.Hold)]
+        self._tasks += [self._placement(residual, 10.0) for residual in held]  # where goals cost 1
+        self._hard: list[Any] = []
         frozen = [bound for bound in problem.bounds if isinstance(bound, wb.Freeze)]
         if frozen:
             dofs = {self._dof[dof] for bound in frozen for dof in scene.figure.dofs(bound.joints).tolist()}
@@ -177,7 +136,7 @@ class _MinkStepper:
         names = [piece.name for piece in problem.scene.geometry.geometryObjects]
         pieces = problem.scene.geometry.geometryObjects
         groups: dict[tuple[float, float], list[Any]] = {}
-        for pair in kept_apart(problem, self._loop.margin * reach, self._holds_hard):
+        for pair in kept_apart(problem, self._loop.margin * reach, held=False):
             room = 0.0 if pieces[pair.first].parentJoint and pieces[pair.second].parentJoint else self._room
             asked = pair.clearance + max(pair.margin, room), room
             groups.setdefault(asked, []).append(([names[pair.first]], [names[pair.second]]))
@@ -284,11 +243,6 @@ class MinkTool(Tool):
     """One `solve_ik` and `integrate_inplace` a step."""
 
     name = "mink"
-    differences: ClassVar[tuple[str, ...]] = (
-        "mink bounds a displacement by gain × gap ÷ dt, which is a velocity; its gain is given here times dt, so that "
-        "half of a gap may be used up in a step, as its documentation means it (as written, it stops only inside)",
-        "mink drops pairs of a body and its parent body, and the root against all that is fixed to the world",
-    )
 
     def __init__(self, track: Track) -> None:
         """Set the model and the tasks up."""
@@ -313,7 +267,7 @@ class MinkTool(Tool):
         apart = mink.CollisionAvoidanceLimit(
             model,
             [([names[pair.first]], [names[pair.second]]) for pair in geometry.collisionPairs],
-            gain=COLLISION_GAIN,
+            gain=0.5 * DT,  # half of what is free of a gap may be used up in one step of a reach
             minimum_distance_from_collisions=track.clearance,
             collision_detection_distance=WITHIN,
         )

@@ -13,7 +13,7 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
-from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Budget, Tool, few, made
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Tool, few, made
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
 from wholebody.methods.qp.active_set import guess_active_set
@@ -25,25 +25,12 @@ from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
-_QP_BUDGETS: tuple[Budget, ...] = (
-    *((tolerance, FEASIBILITY_ONLY) for tolerance in (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)),
-    *LADDER[1:],
-)
-
-ONE_START = {"restarts": 0}
-
 NEWTONS: dict[str, dict[str, Any]] = {
     "slack": {"inequalities": "slack"},
     "barrier": {"inequalities": "barrier"},
     "kkt": {"inequalities": "slack", "algebra": "kkt"},
 }
 """The ways of newton, as arguments of `Newton`."""
-
-_NEWTON_SETUPS = {
-    "slack": "squared slacks, and the factorisation that it chooses itself",
-    "barrier": "a logarithmic barrier, and the factorisation that it chooses itself",
-    "kkt": "squared slacks, and LDL^T of the symmetric saddle-point system in place of the normal equations",
-}
 
 
 def qp_settings(solver: str) -> dict[str, Any]:
@@ -56,97 +43,55 @@ def qp_settings(solver: str) -> dict[str, Any]:
 def qp_adapter(solver: str) -> Adapter:
     """The QP method as it comes for "", else with the settings of `qp_settings`."""
     settings = qp_settings(solver)
-    said = ", ".join(f"{name}={value!r}" for name, value in settings.items())
-    if not solver:
-        closes = "the first program of a solve is OSQP's, later ones begin with the last active set, corrected"
-    elif solver == "active_set":
-        closes = "active sets are corrected throughout; OSQP is asked where they do not settle"
-    else:
-        closes = f"every program is {solver}'s"
+    exact = (3e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8)
     return Adapter(
         name=f"qp/{solver}" if solver else "qp",
         make=partial(_qp, settings),
         hindered=partial(UnfinishedQP, **settings),
-        loose=_QP_BUDGETS,
-        setup=f"wb.QP({said}), all else as it comes: {closes}; feasibility first, relaxed probes and further starts "
-        "follow where the first descent does not reach the goals. Budgets of feasibility only are "
-        "wb.QP(measures=False), those of few iterations have one descent only.",
+        loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in exact), *LADDER[1:]),
     )
 
 
 def one_start(family: str) -> Adapter:
     """The method of "qp", "newton" or "ccd" that has one start, as methods have that know no other."""
-    known: dict[str, tuple[Adapter, Callable[..., Method], str]] = {
-        "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0), "wb.QP(budget=0, restarts=0)"),
-        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0), "wb.Newton(restarts=0)"),
-        "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0), "wb.methods.CCD(restarts=0)"),
+    known: dict[str, tuple[Adapter, Callable[..., Method]]] = {
+        "qp": (qp_adapter(""), partial(QP, budget=0, restarts=0)),
+        "newton": (newton_adapter("slack"), partial(wb.Newton, restarts=0)),
+        "ccd": (ccd_adapter(), partial(wb.methods.CCD, restarts=0)),
     }
-    adapter, kind, said = known[family]
+    adapter, kind = known[family]
     return replace(
         adapter,
         name=f"{family}/one_start",
         make=partial(made, kind, {}),
         hindered=partial(kind, iterations=1),
         loose=tuple(level for level in adapter.loose if level[1] != FEASIBILITY_ONLY),
-        setup=f"{said}, all else as it comes; one start, and nothing after the descent from it.",
     )
 
 
 def ccd_adapter() -> Adapter:
     """Cyclic coordinate descent."""
-    return Adapter(
-        name="ccd",
-        make=partial(made, wb.methods.CCD, ONE_START),
-        hindered=partial(wb.methods.CCD, iterations=1),
-        loose=(*few(2, 5, 20), *LADDER[:8]),
-        setup="wb.methods.CCD(), all else as it comes: 400 sweeps from one start, at most 12 further starts. A budget "
-        "of few iterations has no further starts.",
-        differences=(
-            "ccd minimises nothing: it stops at the first posture that serves",
-            "ccd takes Point, Frame and Orientation goals, holds that the reaching joints do not move, Freeze and "
-            "ReachCones; the root of the figure stays",
-        ),
-    )
+    kind = wb.methods.CCD
+    make, hindered = partial(made, kind, {"restarts": 0}), partial(kind, iterations=1)
+    return Adapter("ccd", make, (*few(2, 5, 20), *LADDER[:8]), hindered=hindered)
 
 
 def dls_adapter() -> Adapter:
     """Damped least squares, the textbook baseline."""
-    return Adapter(
-        name="dls",
-        make=partial(made, wb.methods.DampedLeastSquares, {}),
-        loose=(*few(2, 3, 4, 6), *LADDER),
-        setup="wb.methods.DampedLeastSquares(), all else as it comes: one start, 300 steps, damping by Sugihara 2011.",
-        differences=(
-            "dls knows no contacts: it passes through things and may end inside of them",
-            "dls minimises no measure: each step is the least motion",
-            "dls takes equalities only: Balance, ReachCones and Plane with side 'above' are refused",
-        ),
-    )
+    return Adapter("dls", partial(made, wb.methods.DampedLeastSquares, {}), (*few(2, 3, 4, 6), *LADDER))
 
 
 def newton_adapter(way: str) -> Adapter:
     """Sparse Newton in full coordinates, in one of the ways of `NEWTONS`."""
-    newton = partial(wb.Newton, **NEWTONS[way])
-    return Adapter(
-        name=f"newton/{way}",
-        make=partial(made, newton, ONE_START),
-        hindered=partial(newton, iterations=1),
-        loose=(*few(3, 6, 12, 25), *LADDER[1:]),
-        setup=f"wb.Newton() with {_NEWTON_SETUPS[way]}; all else as it comes. A budget of few iterations has one "
-        "start.",
-        differences=(
-            "newton minimises measures up to what the stopping of its iteration leaves, and PotentialEnergy not at all",
-        ),
-    )
+    kind = partial(wb.Newton, **NEWTONS[way])
+    make, hindered = partial(made, kind, {"restarts": 0}), partial(kind, iterations=1)
+    return Adapter(f"newton/{way}", make, (*few(3, 6, 12, 25), *LADDER[1:]), hindered=hindered)
 
 
 def _qp(settings: dict[str, Any], tolerance: float, iterations: int | None) -> Method:
     if iterations is None or iterations == FEASIBILITY_ONLY:
         return QP(**settings, tolerance=tolerance, measures=iterations is None)
     return QP(**settings, tolerance=tolerance, iterations=iterations, budget=0, restarts=0)
-
-
-LIMIT = 5  # iterations: OSQP takes 25 to some hundreds for programs of a reach
 
 
 class Unfinished(OSQPSolver):
@@ -161,7 +106,7 @@ class Unfinished(OSQPSolver):
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """What some iterations lead to, inside the box of the program."""
         workspace = self.workspace(program)
-        used = workspace.run(LIMIT)
+        used = workspace.run(5)  # OSQP takes 25 to some hundreds for programs of a reach
         x = workspace.x().clip(program.lower, program.upper)
         return QPSolution(x, guess_active_set(program, x, GUESS_TOLERANCE), False, used, self.name)
 
@@ -172,9 +117,6 @@ class UnfinishedQP(QP):
     def _qp_solver(self) -> QPSolver:
         """One that never finishes."""
         return Unfinished()
-
-
-FORCES = np.eye(3, 6)  # along the world's axes, without their moments
 
 
 class MovingPoint(Goal):
@@ -197,7 +139,7 @@ class MovingPoint(Goal):
     def jacobian(self, state: State) -> Wrench:
         """Three forces along the world's axes, through the frame's origin."""
         x, y, z = state.frame(self._id).translation.tolist()
-        rows = FORCES.copy()
+        rows = np.eye(3, 6)
         rows[0, 4], rows[0, 5], rows[1, 3], rows[1, 5], rows[2, 3], rows[2, 4] = z, -y, -z, x, y, -x
         return Wrench(rows, self._joint)
 

@@ -20,7 +20,6 @@ from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
 
-GAIN = 1.0  # share of what is free of a gap that may be used up in one iteration; with less, held feet cannot come back
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step of a reach
 
@@ -32,22 +31,6 @@ def pink_adapter() -> Adapter:
         make=_pink,
         prepare=PinkLoop.prepare,
         loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
-        setup="pink.solve_ik on our own Pinocchio model, with DAQP: FrameTask, RelativeFrameTask, ComTask and "
-        "LinearHolonomicTask (posture and measures, with a weight that fades) as soft tasks, whole holds and frozen "
-        f"joints as hard ones, ConfigurationLimit, VelocityLimit and FloatingBaseVelocityLimit of {PinkLoop.longest} "
-        f"rad or, for each metre of the figure, m a step, SelfCollisionBarrier with the {NEAREST} nearest pairs, gain "
-        f"{GAIN} a step ({OUT} beside things that move), safe_displacement_gain 0 (1, its default, in budgets of "
-        f"feasibility only), d_min {1e3 * PinkLoop.margin:g} mm for each metre of the figure more "
-        "than the clearance; one start, at most 200 steps, the loop of our adapter to placo.",
-        differences=(
-            f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance",
-            "pink's barrier has one least distance for all pairs: those that begin nearer are left out, but for those "
-            "with a half-space, which is lowered",
-            "pairs that hard tasks keep in place are left out, since their rows leave pink no solution",
-            "inside of something pink's barrier pulls deeper, so a margin is kept",
-            "pink has no task for Axis, no Balance, Plane or ReachCones, and holds whole frames only",
-            "pink minimises Effort and Displacement only",
-        ),
     )
 
 
@@ -115,7 +98,9 @@ class _PinkStepper:
             [
                 SelfCollisionBarrier(
                     min(NEAREST, pairs),
-                    gain=OUT if room else GAIN,
+                    # All that is free of a gap may be used up in one iteration: with less, held feet cannot
+                    # come back
+                    gain=OUT if room else 1.0,
                     safe_displacement_gain=self._safe,
                     d_min=self._least + room,
                 )
@@ -224,9 +209,6 @@ class PinkTool(Tool):
     """One `solve_ik` and `integrate_inplace` a step."""
 
     name = "pink"
-    differences: ClassVar[tuple[str, ...]] = (
-        f"pink's barrier takes the {NEAREST} nearest pairs, whatever their distance, not all within a distance",
-    )
 
     def __init__(self, track: Track) -> None:
         """Set the tasks up."""

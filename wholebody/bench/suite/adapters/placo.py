@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -23,41 +22,14 @@ from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry
 
-SAMPLES = 2000
-OWN_SAMPLES = 10_000  # of a figure alone, as many as MoveIt's setup assistant takes by default
-OWN_WITHIN = 0.01  # m: more than clearances are; the assistant leaves out what never collides
-ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
-
 
 def placo_adapter(variant: str = "") -> Adapter:
-    """The adapter to placo's kinematics solver; with "soft" holds, or with the pairs of a figure "pruned"."""
-    holds: Literal["hard", "soft"] = "soft" if variant == "soft" else "hard"
-    said = "holds and" if holds == "hard" else "holds soft with weight 100,"
-    pruned = (
-        f" Pairs of the figure with itself that come no nearer than {100 * OWN_WITHIN:g} cm in any of {OWN_SAMPLES:,} "
-        "random postures are left out; the sampling, once for a figure, is set-up."
-    )
-    left_out = (
-        f"placo/pruned does not keep apart pairs of the figure that {OWN_SAMPLES:,} random postures never bring near"
-    )
-    kind = PrunedPlaco if variant == "pruned" else wb.methods.Placo
+    """The adapter to placo's kinematics solver; with the pairs of a figure "pruned"."""
     return Adapter(
         name=f"placo/{variant}".removesuffix("/"),
-        make=partial(made, partial(kind, holds=holds), {}),
+        make=partial(made, PrunedPlaco if variant else wb.methods.Placo, {}),
         prepare=wb.methods.Placo.prepare,
         loose=(*few(5, 10, 20), *LADDER),
-        setup=f"wb.methods.Placo(holds={holds!r}), all else as it comes: goals as soft tasks, {said} the "
-        "self-collision constraint hard, joint limits, at most 0.1 rad or m a program, joints tasks for the measures "
-        "with a weight that fades; one start, at most 200 programs. The objects are added to its collision model, with "
-        "the clearance of each pair. Building its robot is set-up." + (pruned if variant == "pruned" else ""),
-        differences=(
-            *((left_out,) if variant == "pruned" else ()),
-            "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
-            "placo minimises Effort and Displacement only",
-            "placo has no reach cones, no half-spaces for frames and no axis toward a place",
-            "placo has one row a pair, between the two nearest points",
-            "placo finds no solution where hard tasks repeat each other, as in a redundant closed loop",
-        ),
     )
 
 
@@ -74,10 +46,6 @@ class PlacoTool(Tool):
     """One `solve(True)` and `update_kinematics()` a step."""
 
     name = "placo"
-    differences: ClassVar[tuple[str, ...]] = (
-        "placo has no bound on the speed of a floating base",
-        "placo has no class for objects in the world: they are added to its collision model as parts of the robot",
-    )
 
     def __init__(self, track: Track) -> None:
         """Set the solver up."""
@@ -143,11 +111,6 @@ class PrunedPlacoTool(PlacoTool):
     """The same with the pairs that a careful user would leave: those that sampled postures bring near."""
 
     name = "placo/pruned"
-    differences: ClassVar[tuple[str, ...]] = (
-        f"placo/pruned has only the pairs that come nearer than {1e3 * WITHIN:g} mm in one of {SAMPLES} sampled "
-        "postures, joints anywhere within their limits and the root near where it stands; the sampling is not timed, "
-        "and pairs that it left out are not kept apart",
-    )
 
     def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
         """The pairs that come near."""
@@ -160,13 +123,13 @@ class PrunedPlacoTool(PlacoTool):
 
 @lru_cache(maxsize=4)
 def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
-    """Pairs of pieces that come nearer than `WITHIN` in sampled postures.
+    """Pairs of pieces that come nearer than `WITHIN` in 2000 sampled postures.
 
     Args:
         scene: whose pairs.
         start: (nq,) posture about which the root is sampled, as bytes.
     """
-    found = _sampled(scene, np.frombuffer(start), SAMPLES, WITHIN)
+    found = _sampled(scene, np.frombuffer(start), 2000, WITHIN)
     pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
     return [pair for pair, near in zip(pairs, found, strict=True) if near]
 
@@ -179,7 +142,7 @@ def _sampled(scene: wb.Scene, q: Array, samples: int, within: float) -> Mask:
     for _ in range(samples):
         move = np.zeros(model.nv)
         if scene.figure.root == "free":
-            move[:6] = rng.normal(size=6) * ROOT_SPREAD
+            move[:6] = rng.normal(size=6) * (0.15, 0.15, 0.1, 0.2, 0.2, 0.2)  # m, rad
         posture = np.asarray(pin.integrate(model, q, move))
         posture[limits.idx_q] = rng.uniform(limits.lower, limits.upper)
         found[workspace.near(posture, within).number] = True
@@ -190,7 +153,9 @@ def _sampled(scene: wb.Scene, q: Array, samples: int, within: float) -> Mask:
 def _apart(figure: wb.Figure) -> frozenset[tuple[str, str]]:
     """Names of the pieces of a figure that do not come near each other in random postures, in pairs."""
     alone = wb.Scene(figure)
-    near = _sampled(alone, figure.neutral, OWN_SAMPLES, OWN_WITHIN)
+    # As many samples as MoveIt's setup assistant takes by default; 1 cm is more than clearances are, and the assistant
+    # leaves out what never collides.
+    near = _sampled(alone, figure.neutral, 10_000, 0.01)
     return frozenset(name for name, found in zip(_named(alone.built), near, strict=True) if not found)
 
 

@@ -3,24 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import partial
+from dataclasses import replace
+from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from wholebody.base.errors import MissingPackageError, UnknownNameError
+from wholebody.base.files import parsed_toml
 from wholebody.base.records import with_values
 from wholebody.bench.measure.track import Track
 from wholebody.bench.suite.adapters.base import Adapter, Tool
 from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
-
-SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
-"""Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
-
-
-VARIANTS = (f"/{ONE}", f"/{STARTS}")
+from wholebody.methods.qp.solvers.registry import solver_names
 
 ALL = "all"
 """In place of a name: every method that is installed."""
@@ -35,6 +33,20 @@ USUAL_FURTHER = (
 )
 """With those, placo takes part with the pairs that a careful user leaves it, and every method but optik, which draws
 its own, from one start and from several: qp, newton and ccd have several by default."""
+
+OUTSIDE = {
+    "placo": (("placo",), "placo"),
+    "placo/pruned": (("placo",), "placo"),
+    "pink": (("pink", "daqp"), "compare"),
+    "mink": (("mink", "mujoco", "daqp"), "compare"),
+    "drake": (("pydrake",), "drake"),
+    "optik": (("optik",), "optik"),
+    "embodik": (("embodik",), "embodik"),
+}
+"""Methods of other packages: the modules that each needs, and the extra that installs them."""
+
+SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
+"""Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
 
 
 class _Row(NamedTuple):
@@ -71,15 +83,15 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
         usual = (*USUAL, *(USUAL_FURTHER if starts else ()))
         return tuple(rows[name].build() for name in usual if rows[name].installed())
     families = {name.partition("/")[0] for name in rows}
+    plain = [name for name in rows if starts or not name.endswith((f"/{ONE}", f"/{STARTS}"))]
     chosen: dict[str, None] = {}
     for name in names:
         if name == ALL:
-            several = (key for key in rows if rows[key].installed() and (starts or not key.endswith(VARIANTS)))
-            chosen.update(dict.fromkeys(several))
+            chosen.update(dict.fromkeys(key for key in plain if rows[key].installed()))
         elif name in rows:
             chosen[name] = None
         elif name in families:
-            family = (key for key in rows if key.startswith(f"{name}/") and (starts or not key.endswith(VARIANTS)))
+            family = (key for key in plain if key.startswith(f"{name}/"))
             chosen.update(dict.fromkeys(key for key in family if rows[key].installed()))
         else:
             raise UnknownNameError("method", name, {*rows, *families, ALL})
@@ -104,42 +116,42 @@ def missing() -> Mapping[str, str]:
     return MappingProxyType({name: row.command() for name, row in _rows().items() if not row.installed()})
 
 
-def _outside(name: str, variant: str = "") -> Adapter:
-    build = getattr(import_module(f"wholebody.bench.suite.adapters.{name}"), f"{name}_adapter")
+def _rows() -> dict[str, _Row]:
+    """All methods, in the order of reports."""
+    rows = {"qp": _Row(partial(qp_adapter, ""))}
+    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("active_set", "osqp", "daqp")}
+    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver), (need,), "solvers") for solver, need in SOLVERS.items()}
+    for solver in solver_names():  # any other that qpsolvers finds on this machine
+        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver)))
+    rows |= {f"newton/{way}": _Row(partial(newton_adapter, way)) for way in NEWTONS}
+    rows |= {"ccd": _Row(ccd_adapter), "dls": _Row(dls_adapter)}
+    rows |= {name: _Row(partial(_outside, name), *needs) for name, needs in OUTSIDE.items()}
+    rows |= {f"{family}/{ONE}": _Row(partial(one_start, family)) for family in ("qp", "newton", "ccd")}
+    rows = {name: with_values(row, build=partial(_described, name, row)) for name, row in rows.items()}
+    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
+        row = rows[f"{family}/{ONE}"] if f"{family}/{ONE}" in rows else rows[family]
+        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row))
+    return rows
+
+
+def _outside(name: str) -> Adapter:
+    module, _, variant = name.partition("/")
+    build = getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{module}_adapter")
     made: Adapter = build(variant) if variant else build()
     return made
 
 
-def _rows() -> dict[str, _Row]:
-    from wholebody.methods.qp.solvers.registry import solver_names
+def _described(name: str, row: _Row) -> Adapter:
+    """The adapter of a row with its texts; those of a QP solver have its name in place of SOLVER."""
+    said = _texts()[name if name in _texts() else "qp/SOLVER"]
+    setup = said["setup"].replace("SOLVER", name.rpartition("/")[2])
+    return replace(row.build(), setup=setup, differences=tuple(said.get("differences", ())))
 
-    rows = {"qp": _Row(partial(qp_adapter, ""))}
-    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("active_set", "osqp", "daqp")}
-    for solver, module in SOLVERS.items():
-        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (module,), "solvers")
-    for solver in solver_names():  # any other that qpsolvers finds on this machine
-        rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver)))
-    for way in NEWTONS:
-        rows[f"newton/{way}"] = _Row(partial(newton_adapter, way))
-    rows["ccd"] = _Row(ccd_adapter)
-    rows["dls"] = _Row(dls_adapter)
-    rows["placo"] = _Row(partial(_outside, "placo"), ("placo",), "placo")
-    for variant in ("pruned", "soft"):
-        rows[f"placo/{variant}"] = _Row(partial(_outside, "placo", variant), ("placo",), "placo")
-    rows["pink"] = _Row(partial(_outside, "pink"), ("pink", "daqp"), "compare")
-    mink = ("mink", "mujoco", "daqp"), "compare"
-    rows["mink"] = _Row(partial(_outside, "mink"), *mink)
-    rows["mink/hard"] = _Row(partial(_outside, "mink", "hard"), *mink)
-    rows["drake"] = _Row(partial(_outside, "drake"), ("pydrake",), "drake")
-    rows["optik"] = _Row(partial(_outside, "optik"), ("optik",), "optik")
-    rows["embodik"] = _Row(partial(_outside, "embodik"), ("embodik",), "embodik")
-    for family in ("qp", "newton", "ccd"):
-        rows[f"{family}/{ONE}"] = _Row(partial(one_start, family))
-    for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
-        row = rows.get(f"{family}/{ONE}", rows.get(family))
-        assert row is not None
-        rows[f"{family}/{STARTS}"] = with_values(row, build=partial(_restarted, row))
-    return rows
+
+@cache
+def _texts() -> dict[str, Any]:
+    file = Path(__file__).with_name("adapters.toml")
+    return parsed_toml(file.read_text("utf-8"), file.name)
 
 
 def _restarted(row: _Row) -> Adapter:
@@ -186,20 +198,15 @@ def make_tool(name: str, track: Track) -> Tool:
         UnknownNameError: there is no such tool.
         MissingPackageError: its packages are not installed.
     """
-    kind = tool_class(name)
-    tool: Tool = kind(track, name.partition("/")[2]) if name.startswith("wholebody/") else kind(track)
+    (name,) = chosen_tools([name])
+    family, _, variant = name.partition("/")
+    module = "own" if family == "wholebody" else family
+    kind = "PrunedPlaco" if name == "placo/pruned" else family.capitalize()
+    made = getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{kind}Tool")
+    tool: Tool = made(track, variant) if family == "wholebody" else made(track)
     return tool
 
 
-def tool_class(name: str) -> Any:
-    """The class of a tool, which says what it cannot express; the others' packages are not imported for it.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
-    (name,) = chosen_tools([name])
-    family = name.partition("/")[0]
-    module = "own" if family == "wholebody" else family
-    kind = "PrunedPlaco" if name == "placo/pruned" else family.capitalize()
-    return getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{kind}Tool")
+def tool_differences(name: str) -> tuple[str, ...]:
+    """What a tool cannot express of a reach, or does otherwise; one sentence each."""
+    return tuple(_texts()["steps"].get(name, ()))

@@ -32,11 +32,7 @@ from wholebody.solution import Solution
 SECONDS = 1.5
 """Processor time of all starts of a solve; the last one that began within it is finished."""
 
-DRAWS = 40
-"""Random postures that are looked at for one start that is free of overlap; the next one is drawn if none is."""
 
-DEEPER = 1e-4  # m: by which a start may overlap more than the problem's own
-SEED = 0
 STARTS, ONE = "starts", "one_start"
 """Ends of the names of methods."""
 
@@ -122,10 +118,10 @@ def _make(adapter: Adapter, tolerance: float, iterations: int | None) -> Restart
 
 def starts(problem: Problem) -> Iterator[Array]:
     """Postures (nq,) to start at, without end where random ones are free of overlap; see the module."""
-    figure, rng = problem.scene.figure, np.random.default_rng(SEED)
+    figure, rng = problem.scene.figure, np.random.default_rng(0)
     moving = movable(problem)
     with problem.borrow() as workspace:
-        deepest = _depth(workspace, problem.start) + DEEPER
+        deepest = _depth(workspace, problem.start) + 1e-4  # m: by which a start may overlap more than the problem's own
         failures = 0
         for number in count():
             spread = (SPREADS[number % len(SPREADS)],)
@@ -135,7 +131,9 @@ def starts(problem: Problem) -> Iterator[Array]:
             failures = 0 if _depth(workspace, start) <= deepest else failures + 1
             if not failures:
                 yield start
-            elif failures == DRAWS:
+            # Random postures that are looked at for one start that is free of overlap; the next one is drawn if none
+            # is.
+            elif failures == 40:
                 return
 
 

@@ -1,19 +1,84 @@
-"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one."""
+"""Which method to choose when, from the figures alone, and no winner where the figures do not tell one.
+
+Methods are compared on the problems that both were given, by the ratio of two figures with its interval: medians over
+different problems say nothing of two methods, and a ratio whose interval holds 1 names no winner.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from math import inf, isfinite, nan
 from typing import NamedTuple
 
-from wholebody.bench.report import spanned, upfirst, words
-from wholebody.bench.statistics import LEVEL, NOTHING, Interval, against, paired_difference, ratio
-from wholebody.bench.suite.compare import paired
-from wholebody.bench.suite.compare.front import OURS, Rival
-from wholebody.bench.suite.compare.paired import named
-from wholebody.bench.suite.compare.record import COARSE, FLOOR
-from wholebody.bench.suite.compare.results import EFFORT_FLOOR, Results, middle
+from wholebody.bench.report import spanned, words
+from wholebody.bench.statistics import LEAST, LEVEL, NOTHING, Interval, paired_difference, ratio
+from wholebody.bench.suite.compare.results import COARSE, FLOOR, WORST, Results, effort_excess, middle
 from wholebody.bench.suite.compare.summary import GOOD, Summary
+
+OURS = "qp"
+"""Our default method; "qp/..." is the same method with other settings for its programs."""
+
+Figures = Mapping[tuple[str, int], float]
+"""One positive figure a problem, by the name of its set and its number."""
+
+
+def best(found: Mapping[str, Figures]) -> tuple[str, ...]:
+    """Return the methods with the least figure, as many as cannot be told apart; the least of all first.
+
+    A method that has too few problems in common with the least is left out. Where the least itself has too few problems
+    to compare with anybody, nobody is told apart.
+    """
+    order = sorted((name for name in found if found[name]), key=lambda name: middle(list(found[name].values())))
+    if order and len(found[order[0]]) < LEAST:
+        return tuple(order)
+    for first in order:
+        others = {name: ratio(found[name], found[first]) for name in order if name != first}
+        if not any(each.high < 1.0 for each in others.values()):
+            return first, *(name for name, each in others.items() if each.cases >= LEAST and each.low <= 1.0)
+    return tuple(order[:1])
+
+
+def times(results: Results, families: Sequence[str], adapter: str) -> Figures:
+    """Return the seconds of a method for every problem of some sets that it solves at the default budget."""
+    return {
+        (family, record.number): max(record.seconds, 1e-9)
+        for family in families
+        for record in results.taken(family, adapter)
+        if record.success(COARSE)
+    }
+
+
+def efforts_of(results: Results, family: str, adapter: str) -> Figures:
+    """Return the effort above the best known, as a share, for every problem that a method solves."""
+    found = {
+        (family, record.number): effort_excess(record, results.best(record))
+        for record in results.default(family, adapter)
+        if record.answered
+    }
+    return {key: value for key, value in found.items() if isfinite(value)}
+
+
+def errors_of(results: Results, family: str, adapter: str) -> Figures:
+    """Return the worst errors of a method at the budget where their median is least, on what it solved at all."""
+    cases = results.swept(family, adapter)
+    chosen: dict[tuple[str, int], float] = {}
+    least = inf
+    for level in results.levels(family, adapter):
+        _, values = results.values(family, adapter, level, WORST, cases)
+        if len(values) and middle(values) < least:
+            least = middle(values)
+            chosen = {(family, number): float(value) for number, value in zip(sorted(cases), values, strict=True)}
+    return {key: max(value, FLOOR) if isfinite(value) else 1.0 for key, value in chosen.items()}
+
+
+def named(adapters: Sequence[str]) -> str:
+    """Return methods in words; several settings of our default method are listed behind its name."""
+    ours = [name for name in adapters if f"{name}/".startswith(f"{OURS}/")]
+    if len(ours) < 2:
+        return ", ".join(f"`{name}`" for name in adapters)
+    listed = f"`{OURS}` (any of {', '.join(f'`{name}`' for name in ours)})"
+    names = dict.fromkeys(listed if name in ours else f"`{name}`" for name in adapters)
+    return ", ".join(names)
 
 
 class Choice(NamedTuple):
@@ -75,11 +140,11 @@ def _choice(results: Results, family: str, rows: Sequence[Summary]) -> Choice:
     }
     order = sorted(solved, key=lambda name: -sum(solved[name].values()))
     leading = tuple(name for name in order if paired_difference(solved[order[0]], solved[name]) > 1.0 - LEVEL)
-    fast = paired.best({name: paired.times(results, [family], name) for name in good})
-    errors = {name: paired.errors(results, family, name) for name in good}
-    exact = paired.best(errors)
-    efforts = {name: paired.efforts(results, family, name) for name in good} if not results.moving(family) else {}
-    cheap = paired.best(efforts)
+    fast = best({name: times(results, [family], name) for name in good})
+    errors = {name: errors_of(results, family, name) for name in good}
+    exact = best(errors)
+    efforts = {name: efforts_of(results, family, name) for name in good} if not results.moving(family) else {}
+    cheap = best(efforts)
     return Choice(
         family,
         fast, next((row.median_ms.value for row in rows if fast and row.method == fast[0]), nan),
@@ -96,7 +161,7 @@ def reference(results: Results) -> str:
 
 def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
     """All methods, the most dependable first, and of equal ones the fastest."""
-    base = paired.times(results, results.sets, reference(results))
+    base = times(results, results.sets, reference(results))
     found = []
     for adapter in results.adapters:
         mine = [row for row in rows if row.method == adapter]
@@ -111,7 +176,7 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
                 sum(row.dependable for row in mine),
                 worst.set if worst else "",
                 worst.success if worst else NOTHING,
-                ratio(paired.times(results, results.sets, adapter), base) if base else NOTHING,
+                ratio(times(results, results.sets, adapter), base) if base else NOTHING,
                 sum(row.false_claims for row in mine),
                 max((row.deepest_mm for row in judged if isfinite(row.deepest_mm)), default=nan),
             )
@@ -120,58 +185,33 @@ def standings(results: Results, rows: Sequence[Summary]) -> list[Standing]:
 
 
 def advice(results: Results, rows: Sequence[Summary]) -> list[str]:
-    """What a reader who reads nothing else should know."""
-    ranked, picked = standings(results, rows), choices(results, rows)
-    said = [_in_doubt(results, ranked, rows)]
-    fast = _by_method((one.fastest, f"{words(one.set)} ({one.fastest_ms:.3g} ms)") for one in picked if one.fastest)
-    if fast:
-        said.append(f"**Fastest of the dependable, on the problems that both solve:** {fast}.")
-    exact = _by_method((one.exact, f"{words(one.set)} ({error(one.exact_error)})") for one in picked if one.exact)
-    if exact:
-        said.append(f"**Most accurate of the dependable:** {exact}. Errors below {FLOOR:g} are not told apart.")
-    for choice in picked:
-        if not choice.fastest:
-            solve = "solves" if len(paired.algorithms(choice.leading)) == 1 else "solve"
+    """What a reader who reads nothing else should know: whom to take, who is not enough, and what nobody solves."""
+    ranked, said = standings(results, rows), list[str]()
+    most = max((one.dependable for one in ranked), default=0)
+    if most:
+        names = [one.method for one in ranked if one.dependable == most]
+        alike = best({name: times(results, results.sets, name) for name in names})
+        lowest = min(row.success.low for row in rows if row.method in alike and row.dependable)
+        said.append(
+            f"**If in doubt, take {named(alike)}:** at least {100 * GOOD:.0f} % of the problems given are solved in "
+            f"{most} of {len(results.sets)} sets; the lowest interval of these shares begins at {100 * lowest:.0f} %."
+            + (" The times of these cannot be told apart." if len(alike) > 1 else "")
+        )
+    else:
+        said.append(f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing.")
+    for choice in choices(results, rows):
+        if choice.fastest:
+            said.append(f"**{words(choice.set).capitalize()}:** {named(choice.fastest)}, {choice.fastest_ms:.3g} ms.")
+        else:
+            apart = ", not told apart by more than chance" if len(choice.leading) > 1 else ""
             said.append(
-                f"**{words(choice.set).capitalize()} is solved dependably by none;** "
-                f"{named(choice.leading)} {solve} most, {100 * choice.leading_share:.3g} %{_alike(choice.leading)}."
+                f"**{words(choice.set).capitalize()} is solved dependably by none;** most by "
+                f"{named(choice.leading)}: {100 * choice.leading_share:.3g} %{apart}."
             )
     for standing in ranked:
         if standing.dependable == 0 and isfinite(standing.worst.value):
             said += _warning(standing, rows)
     return said
-
-
-def _alike(leading: Sequence[str]) -> str:
-    """What to add to the share of the first of several methods that cannot be told apart."""
-    return " by the first, and not apart from it by more than chance" if len(leading) > 1 else ""
-
-
-def _by_method(found: Iterable[tuple[Sequence[str], str]]) -> str:
-    """Methods, each with what is said of it in some sets."""
-    sets: dict[str, list[str]] = {}
-    for methods, said in found:
-        sets.setdefault(named(methods), []).append(said)
-    return "; ".join(f"{names} in {', '.join(each)}" for names, each in sets.items())
-
-
-def _in_doubt(results: Results, ranked: Sequence[Standing], rows: Sequence[Summary]) -> str:
-    """Which method to take where nothing else is known: the most dependable, and of those the ones that are fastest."""
-    most = max((one.dependable for one in ranked), default=0)
-    if not most:
-        return f"**No method solves {100 * GOOD:.0f} % of any set.** Look at each set before choosing."
-    names = [one.method for one in ranked if one.dependable == most]
-    alike = paired.best({name: paired.times(results, results.sets, name) for name in names})
-    apart = "" if len(alike) == 1 else " Their times cannot be told apart." if len(paired.algorithms(alike)) > 1 else ""
-    if not apart and len(alike) > 1:
-        apart = " The times of its settings cannot be told apart."
-    solves = "It solves" if len(paired.algorithms(alike)) == 1 else "Each solves"
-    lowest = min(row.success.low for row in rows if row.method in alike and row.dependable)
-    return (
-        f"**If in doubt, take {named(alike)}.** {solves} at least {100 * GOOD:.0f} % of the problems given in "
-        f"{most} of {len(results.sets)} sets; "
-        f"the lowest interval of these shares begins at {100 * lowest:.0f} %.{apart}"
-    )
 
 
 def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
@@ -181,72 +221,7 @@ def _warning(standing: Standing, rows: Sequence[Summary]) -> list[str]:
         return []
     best = max(mine, key=lambda row: row.success.value)
     deep = f", and ends up to {standing.deepest_mm:.0f} mm inside of things" if standing.deepest_mm > 1.0 else ""
-    worst = "" if standing.worst_set == best.set else f" and in {words(standing.worst_set)} {percent(standing.worst)}"
     return [
-        f"**`{standing.method}` alone is not enough:** of what it takes it solves at most {percent(best.success)} "
-        f"({words(best.set)}){worst}{deep}."
+        f"**`{standing.method}` alone is not enough:** of what it takes it solves at most "
+        f"{spanned(best.success, '.0f', 100.0, ' %')} ({words(best.set)}){deep}."
     ]
-
-
-def targets(rows: Sequence[Summary], wall: Sequence[Rival], dependable: Sequence[Rival]) -> list[str]:
-    """What is asked of our default method, and what was found, with its interval; empty where it did not take part.
-
-    Args:
-        rows: the figures of all methods.
-        wall: who is on the front by the median.
-        dependable: the same by the time of nine problems in ten.
-    """
-    mine = [row for row in rows if row.method == OURS and row.refused < row.cases]
-    if not mine:
-        return []
-    verdicts: dict[str, list[Summary]] = {
-        "reached": [],
-        "reached, with an interval that goes lower": [],
-        "missed, with an interval that goes higher": [],
-        "missed": [],
-    }
-    for row in mine:
-        verdicts[against(row.success, GOOD, at_least=True)].append(row)
-    found = "; ".join(
-        f"{verdict}: "
-        + ", ".join(f"{words(row.set)} {spanned(row.success, '.1f', 100.0, ' %')} of {row.cases}" for row in listed)
-        for verdict, listed in verdicts.items()
-        if listed
-    )
-    said = [f"`{OURS}` solves at least {100 * GOOD:.0f} % of every set. {upfirst(found)}."]
-    if wall:
-        ahead = sorted({rival.method for rival in wall if not rival.on_front and rival.method})
-        verdict = "Missed" if ahead else "Reached"
-        said.append(
-            f"In no chart is another method both faster than `{OURS}` and as accurate. {verdict}: `{OURS}` is on the "
-            f"front of {sum(rival.on_front for rival in wall)} of {len(wall)} charts, and of "
-            f"{sum(rival.on_front for rival in dependable)} of {len(dependable)} by the time in which nine problems in "
-            f"ten are solved"
-            + (
-                f"; ahead of it in a chart: {', '.join(f'`{name}`' for name in ahead)}, in "
-                f"{sum(rival.verdict == 'no' for rival in wall)} charts by more than the interval of the ratio."
-                if ahead
-                else "."
-            )
-        )
-    return said
-
-
-def error(value: float) -> str:
-    """An error as it was measured: those at the least that is told apart are at most that."""
-    return f"at most {FLOOR:g}" if value <= FLOOR else f"{value:.0e}"
-
-
-def effort(value: float) -> str:
-    """An effort above the best known, in the same way."""
-    return f"at most +{100 * EFFORT_FLOOR:.2g} %" if value <= EFFORT_FLOOR else f"+{100 * value:.2g} %"
-
-
-def percent(found: Interval) -> str:
-    """A share with its interval; empty where there is none."""
-    return spanned(found, ".0f", 100.0, " %")
-
-
-def slowness(found: Interval) -> str:
-    """A ratio of times with its interval; empty where there are too few problems."""
-    return f"× {spanned(found, '.2g')}" if isfinite(found.value) else ""

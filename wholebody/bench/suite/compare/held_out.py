@@ -8,19 +8,15 @@ from typing import NamedTuple
 
 from wholebody.base.errors import InputError
 from wholebody.bench.report import render
-from wholebody.bench.statistics import against
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.compare.results import Results
 from wholebody.bench.suite.compare.run import Progress, run
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.summary import GOOD, Summary, summaries
+from wholebody.bench.suite.compare.summary import Summary, summaries
 from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.problem_sets.registry import TUNED_ON, problem_set
 
 METHODS = ("qp", "placo", "placo/starts", "dls/starts")
-CASES = 40
-CAP = 20.0  # s
-MINUTES = 20.0
 
 
 class Beside(NamedTuple):
@@ -38,10 +34,10 @@ def settings(adapters: tuple[Adapter, ...], cases: int, seed: int, minutes: floa
         robots.folder()
     except InputError as error:
         left_out = str(error)
-        names.remove(robots.SET.name)
+        names.remove("robots")
     chosen = [*names, *dict.fromkeys(TUNED_ON[name] for name in names)]
     families = tuple(problem_set(name) for name in chosen)
-    return Settings(families, adapters, cases, sweep=0, levels=1, seed=seed, cap=CAP, minutes=minutes), left_out
+    return Settings(families, adapters, cases, sweep=0, levels=1, seed=seed, cap=20.0, minutes=minutes), left_out
 
 
 def measured(asked: Settings, folder: Path, jobs: int, tell: Callable[[Progress], None]) -> list[Summary]:
@@ -72,6 +68,5 @@ def report(rows: Sequence[Summary], asked: Settings, left_out: str, facts: Mappi
     sets = {family.name: family for family in asked.sets}
     return render(
         "held_out.md",
-        listed=beside(rows), sets=sets, tuned_on=TUNED_ON, asked=asked, left_out=left_out, facts=facts, good=GOOD,
-        against=against,
+        listed=beside(rows), sets=sets, tuned_on=TUNED_ON, asked=asked, left_out=left_out, facts=facts,
     )  # fmt: skip

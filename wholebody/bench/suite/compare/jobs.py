@@ -1,4 +1,4 @@
-"""One chunk of work of a comparison."""
+"""One chunk of work of a comparison, and the reference kernel, whose time says how fast the machine was just then."""
 
 from __future__ import annotations
 
@@ -6,15 +6,57 @@ import threading
 import time
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
 
 from wholebody.base.batches import own_child
-from wholebody.base.runner import Child, EndedError
+from wholebody.base.runner import Child, EndedError, processor_time
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
-from wholebody.bench.suite.compare.record import DEFAULT, FAILED, OVERTIME, REFUSED, Difficulty, Record
-from wholebody.bench.suite.compare.reference_kernel import kernel_seconds
-from wholebody.bench.suite.compare.solving import BUILDING, Which, built, difficulty, solved, warmed
-from wholebody.bench.suite.compare.store import Chunk
+from wholebody.bench.suite.compare.results import DEFAULT, FAILED, OVERTIME, REFUSED, Chunk, Record
+from wholebody.bench.suite.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.suite.problem_sets.case import ProblemSet
+
+SIZE = 64  # of the matrices: about the degrees of freedom of a person
+
+
+def kernel_seconds() -> float:
+    """Seconds of the processor that the kernel takes now; about 4 ms on a processor of 2020."""
+    work = _made()
+    return min(_timed(*work) for _ in range(3))  # of which the fastest counts: others were interrupted
+
+
+def _timed(matrix: Any, pairs: Any) -> float:
+    import coal
+
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    began = processor_time()
+    product = matrix
+    for _ in range(60):
+        product = product @ matrix
+    for first, placed_first, second, placed_second in pairs:
+        result.clear()
+        coal.distance(first, placed_first, second, placed_second, request, result)
+    return processor_time() - began
+
+
+@lru_cache(maxsize=1)
+def _made() -> tuple[Any, Any]:
+    """An orthogonal matrix, whose powers neither grow nor vanish, and boxes and capsules beside each other."""
+    import coal
+
+    rng = np.random.default_rng(0)
+    matrix = np.linalg.qr(rng.normal(size=(SIZE, SIZE)))[0]
+    shapes = (coal.Box(0.3, 0.2, 0.1), coal.Capsule(0.05, 0.3))
+    pairs = []
+    for number in range(1000):  # distances: about the pairs of a person among twenty things
+        turns = np.linalg.qr(rng.normal(size=(2, 3, 3)))[0]
+        turns *= np.sign(np.linalg.det(turns))[:, None, None]
+        places = [coal.Transform3s(turn, rng.uniform(-0.5, 0.5, 3)) for turn in turns]
+        pairs.append((shapes[number % 2], places[0], shapes[number // 2 % 2], places[1]))
+    return matrix, pairs
+
 
 _local = threading.local()
 
@@ -50,7 +92,6 @@ def work(task: Task) -> Chunk:
     building = time.perf_counter() - began
     if fault:
         return Chunk(task.family.name, task.number, (), building=building, fault=fault)
-    hard = _difficulty(child, which)
     records: list[Record] = []
     spent, swept, cold = {}, {}, {}
     kernel = child.call(kernel_seconds, seconds=BUILDING)
@@ -66,16 +107,7 @@ def work(task: Task) -> Chunk:
         if ladder and spent[adapter.name] * len(ladder) <= task.most:
             records += _sweep(child, adapter, ladder, task, first, ended)
             swept[adapter.name] = time.perf_counter() - between
-    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel, hard)
-
-
-def _difficulty(child: Child, which: Which) -> Difficulty | None:
-    """How hard the case is; None where that ended the process, which no method has to answer for."""
-    try:
-        found: Difficulty = child.call(difficulty, which, seconds=BUILDING)
-    except EndedError:
-        return None
-    return found
+    return Chunk(task.family.name, task.number, tuple(records), spent, swept, building, cold, kernel)
 
 
 def _sweep(

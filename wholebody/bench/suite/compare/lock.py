@@ -18,9 +18,8 @@ from wholebody.base.files import read_text
 from wholebody.bench.report import spanned, words
 from wholebody.bench.statistics import LEAST, Interval, median
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.compare.pages import Material
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.summary import kernel_of
+from wholebody.bench.suite.compare.summary import Material, kernel_of
 from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.bench.tables import write_text
 

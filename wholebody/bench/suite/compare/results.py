@@ -1,65 +1,156 @@
-"""Records in the order in which they are asked for: by set, method, budget and case."""
+"""What came of one method on one problem at one budget, and such records by set, method, budget and case."""
 
 from __future__ import annotations
 
-import copy
+import json
+import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, field
 from math import inf
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, InputError
 from wholebody.bench.suite.adapters.base import Budget
-from wholebody.bench.suite.compare.record import COARSE, DEFAULT, FLOOR, REFUSED, Record
+
+DEFAULT: Budget = (1e-4, None)
+"""The budget at which all cases are solved: a tenth of a millimetre and of a milliradian, iterations as they come."""
+
+COARSE, FINE = 1e-3, 1e-4  # m, rad: to which an answer is called a success
+FLOOR = 1e-9  # m, rad: errors below this are not told apart
+
+ANSWERED, REFUSED, FAILED, OVERTIME = "answered", "refused", "failed", "overtime"
+"""Outcomes: a posture; the method said that it cannot take the problem; an exception or a posture that is none; the
+process was ended because it took too long."""
+
+
+@dataclass(frozen=True)
+class Record:
+    """One solve. Errors are infinite where there is no answer.
+
+    Attributes:
+        tolerance, budget: of this solve; a budget of 0 iterations is the method's own, one of -1 is `FEASIBILITY_ONLY`.
+        status: what the method claims; empty without an answer.
+        said: its message, its refusal or the exception.
+        seconds, cpu_seconds: of the call without the judgement in it; of a frame, median, where goals move.
+        tool_seconds: of `seconds`, within calls of the tool behind an adapter; 0 for methods of our own, and where
+            goals move.
+        setup_seconds: to build a model of its own from the problem; 0 for one that needs none.
+        iterations: as the method counts them; of a frame, mean, where goals move.
+        programs: what closed its quadratic programs, and how many; empty for methods without, and where goals move.
+        goal_error, goal_angle: left, as judged [m], [rad]; 95 % of the frames where goals move.
+        penetration, clearance_violation, limit_violation, constraint_violation: as judged [m, rad]; the worst frame.
+        measure, optimality: as judged; of the last frame.
+        best: measure of the witness, which is as good as any method need be.
+        frames: answered with moving goals; 0 for a case that is solved once.
+        frame_p95: seconds of a frame, 95 %.
+        jerk: root mean square of the joints' third differences [rad/s^3].
+        turns: sign changes of the velocity of the least gap, a second.
+    """
+
+    set: str
+    number: int
+    method: str
+    tolerance: float
+    budget: int
+    outcome: str
+    status: str = ""
+    said: str = ""
+    seconds: float = inf
+    cpu_seconds: float = inf
+    setup_seconds: float = 0.0
+    tool_seconds: float = 0.0
+    iterations: float = 0.0
+    programs: str = ""
+    goal_error: float = inf
+    goal_angle: float = inf
+    penetration: float = inf
+    clearance_violation: float = inf
+    limit_violation: float = inf
+    constraint_violation: float = inf
+    measure: float = inf
+    optimality: float = inf
+    best: float = inf
+    frames: int = 0
+    frame_p95: float = 0.0
+    jerk: float = 0.0
+    turns: float = 0.0
+
+    @property
+    def level(self) -> Budget:
+        """Tolerance, and iterations or None, as adapters take them."""
+        return self.tolerance, self.budget or None
+
+    @property
+    def answered(self) -> bool:
+        """Whether there is a posture."""
+        return self.outcome == ANSWERED
+
+    @property
+    def missed(self) -> float:
+        """Largest goal error [m or rad]."""
+        return max(self.goal_error, self.goal_angle)
+
+    @property
+    def broken(self) -> float:
+        """Worst of all that must hold [m or rad]: contacts, clearances, limits, constraints."""
+        return max(self.penetration, self.clearance_violation, self.limit_violation, self.constraint_violation)
+
+    @property
+    def worst(self) -> float:
+        """The one figure of accuracy: the worst of goals and of all that must hold [m or rad]; infinite without one."""
+        return max(self.missed, self.broken, FLOOR)
+
+    def success(self, tolerance: float) -> bool:
+        """Whether goals are met and everything held to a tolerance."""
+        return self.answered and self.worst <= tolerance
+
+    @property
+    def false_claim(self) -> bool:
+        """Whether the method calls solved what is judged to be off by more than it was asked for, and than 1 mm."""
+        return self.status == "solved" and self.worst > max(COARSE, 1.05 * self.tolerance)
+
+
+def frame_cap(cap: float, frames: float) -> float:
+    """Seconds that a frame may take on the average, where a solve may take `cap` seconds and there are so many.
+
+    At least 0.1: nobody drags with slower frames.
+    """
+    return max(cap / frames, 0.1)
+
 
 EFFORT_FLOOR = 1e-5  # share of the best effort below which efforts are not told apart
-EXACT = 1e-6  # m, rad: answers less exact than this are cheaper by what they lack, and are no measure for others
-LEAST_EFFORT = 1e-9  # efforts below this are none, and nothing is a share of them
 
 
 @dataclass(frozen=True)
 class Quantity:
-    """What is charted against time. It is infinite for answers that fail in anything else.
+    """What is charted against time.
 
     Attributes:
-        name: for files.
         title: over a chart.
         label: of its axis.
         floor: below which values are not told apart.
-        of: its value from a record and the best known measure of the case.
+        of: its value from a record and the best known measure of the case; infinite for a failure.
     """
 
-    name: str
     title: str
     label: str
     floor: float
     of: Callable[[Record, float], float]
 
 
-def _goal(record: Record, best: float) -> float:
-    return max(record.missed, FLOOR) if record.broken <= COARSE else inf
-
-
-def _penetration(record: Record, best: float) -> float:
-    others = max(record.missed, record.limit_violation, record.constraint_violation)
-    return max(record.penetration, record.clearance_violation, FLOOR) if others <= COARSE else inf
-
-
 def effort_excess(record: Record, best: float) -> float:
-    """Effort above the best known, as a share of it; infinite for an answer that is none."""
-    if not record.success(COARSE) or best < LEAST_EFFORT or best == inf:
+    """Effort above the best known, as a share of it; infinite for an answer that does not solve the problem."""
+    if not record.success(COARSE) or best < 1e-9 or best == inf:  # nothing is a share of no effort
         return inf
     return max(record.measure / best - 1.0, EFFORT_FLOOR)
 
 
-QUANTITIES = (
-    Quantity("worst", "worst of all", "worst error [m, rad]", FLOOR, lambda record, best: record.worst),
-    Quantity("goal", "goals", "goal error [m, rad]", FLOOR, _goal),
-    Quantity("penetration", "penetration", "overlap, or lack of clearance [m]", FLOOR, _penetration),
-    Quantity("effort", "effort", "effort above the best known [share]", EFFORT_FLOOR, effort_excess),
-)
-"""The charts of every set. "worst" is the accuracy of an answer: the worst of goals and of all that must hold."""
+WORST = Quantity("worst of all", "worst error [m, rad]", FLOOR, lambda record, best: record.worst)
+EFFORT = Quantity("effort", "effort above the best known [share]", EFFORT_FLOOR, effort_excess)
 
 
 class Results:
@@ -67,32 +158,21 @@ class Results:
 
     Attributes:
         sets, adapters: names, in the order of reports.
-        clock: "seconds" for wall time, "cpu_seconds" for the processor's.
     """
 
     def __init__(self, records: Iterable[Record], sets: Sequence[str], adapters: Sequence[str]) -> None:
         self.sets, self.adapters = tuple(sets), tuple(adapters)
-        self.clock = "seconds"
         self._cells: dict[tuple[str, str], dict[Budget, dict[int, Record]]] = {}
         self._best: dict[tuple[str, int], float] = {}
         for record in records:
             cell = self._cells.setdefault((record.set, record.method), {})
             cell.setdefault(record.level, {})[record.number] = record
-            self._note(record)
-
-    def by_processor(self) -> Results:
-        """The same, with the processor's time in place of wall time: what other work on a machine disturbs least."""
-        other = copy.copy(self)
-        other.clock = "cpu_seconds"
-        return other
-
-    def _note(self, record: Record) -> None:
-        case = (record.set, record.number)
-        exact = record.measure if record.success(EXACT) else inf
-        self._best[case] = min(self._best.get(case, inf), record.best, exact)
+            case = (record.set, record.number)
+            exact = record.measure if record.success(1e-6) else inf  # a less exact answer is cheaper by what it lacks
+            self._best[case] = min(self._best.get(case, inf), record.best, exact)
 
     def best(self, record: Record) -> float:
-        """Least measure known for the case of a record: of the witness, and of all answers exact to `EXACT`."""
+        """Least measure known for the case of a record: of the witness, and of all answers exact to 1e-6."""
         return self._best[record.set, record.number]
 
     def default(self, family: str, adapter: str) -> list[Record]:
@@ -108,7 +188,7 @@ class Results:
         cell = self._cell(family, adapter)
         cases = self.swept(family, adapter)
         listed = [level for level, row in cell.items() if cases and cases <= row.keys()]
-        return sorted(listed, key=lambda level: middle([getattr(cell[level][number], self.clock) for number in cases]))
+        return sorted(listed, key=lambda level: middle([cell[level][number].seconds for number in cases]))
 
     def swept(self, family: str, adapter: str) -> frozenset[int]:
         """Cases that a method solved at all its budgets; at the default one where it was not swept at all."""
@@ -123,12 +203,12 @@ class Results:
         """Seconds (n,) and values (n,) of some cases at one budget."""
         row = self._cell(family, adapter)[level]
         records = [row[number] for number in sorted(cases)]
-        seconds = np.array([getattr(record, self.clock) for record in records])
+        seconds = np.array([record.seconds for record in records])
         return seconds, np.array([quantity.of(record, self.best(record)) for record in records])
 
     def moving(self, family: str) -> bool:
         """Whether the goals of a set move."""
-        return any(record.frames for adapter in self.adapters for record in self.default(family, adapter))
+        return self.frames(family) > 0.0
 
     def frames(self, family: str) -> float:
         """Median count of the frames of a set's cases, as they were answered; 0 where goals do not move."""
@@ -138,7 +218,7 @@ class Results:
 
     def quantities(self, family: str) -> tuple[Quantity, ...]:
         """What is charted of a set; efforts are not compared while goals move."""
-        return QUANTITIES[:3] if self.moving(family) else QUANTITIES
+        return (WORST,) if self.moving(family) else (WORST, EFFORT)
 
     def _cell(self, family: str, adapter: str) -> Mapping[Budget, Mapping[int, Record]]:
         return self._cells.get((family, adapter), {})
@@ -147,3 +227,102 @@ class Results:
 def middle(values: Sequence[float] | Array, share: float = 0.5) -> float:
     """A quantile that is one of the values: infinite ones are not averaged with others. NaN without values."""
     return float(np.quantile(values, share, method="inverted_cdf")) if len(values) else float("nan")
+
+
+NAME = "chunks.jsonl"
+
+
+@dataclass(frozen=True)
+class Chunk:
+    """One case by some methods.
+
+    Attributes:
+        set, number: which case.
+        records: what came of it.
+        spent: seconds that each method took at the default budget, all that it brought about included.
+        swept: the same at all its other budgets.
+        building: seconds to build the case.
+        cold: seconds of the first solve of each method in its process, what it imports and compiles included; of the
+            methods for which the process was new.
+        kernel: seconds of the reference kernel in the process, before the case was solved.
+        fault: why the case could not be built; empty where it was.
+    """
+
+    set: str
+    number: int
+    records: tuple[Record, ...]
+    spent: Mapping[str, float] = field(default_factory=dict)
+    swept: Mapping[str, float] = field(default_factory=dict)
+    building: float = 0.0
+    cold: Mapping[str, float] = field(default_factory=dict)
+    kernel: float = 0.0
+    fault: str = ""
+
+
+class Store:
+    """The file of a run."""
+
+    def __init__(self, folder: Path, settings: Mapping[str, Any]) -> None:
+        """Open or begin the file of a folder.
+
+        Raises:
+            InputError: the folder holds a run with other settings.
+            FileFormatError: the file is none of ours.
+        """
+        self.path = folder / NAME
+        folder.mkdir(parents=True, exist_ok=True)
+        self.chunks: list[Chunk] = []
+        wanted = json.loads(json.dumps(settings))
+        if self.path.exists() and self.path.stat().st_size:
+            self._resume(wanted)
+        else:
+            self._append(wanted)
+
+    def add(self, chunk: Chunk) -> None:
+        """Keep a chunk, on the disk before this returns."""
+        self.chunks.append(chunk)
+        self._append(asdict(chunk))
+
+    @property
+    def records(self) -> list[Record]:
+        """All records, in the order of cases, methods and budgets as they were run."""
+        chunks = sorted(self.chunks, key=lambda chunk: (chunk.set, chunk.number))
+        return [record for chunk in chunks for record in chunk.records]
+
+    def _append(self, value: Any) -> None:
+        with self.path.open("a", encoding="utf-8") as file:
+            file.write(json.dumps(value) + "\n")
+            file.flush()
+            os.fsync(file.fileno())
+
+    def _resume(self, wanted: Any) -> None:
+        data = self.path.read_bytes()
+        whole = data[: data.rfind(b"\n") + 1]
+        lines = whole.decode("utf-8").splitlines()
+        if not lines:
+            raise FileFormatError(f"{self.path}: it was cut off before its first line; remove it and run again")
+        try:
+            found, *chunks = [json.loads(line) for line in lines]
+            self.chunks = [_chunk(value) for value in chunks]
+        except (ValueError, TypeError, KeyError) as error:
+            raise FileFormatError(f"{self.path}: not a file of this command ({error}); give another --out") from None
+        if found != wanted:
+            name = next(key for key in {**wanted, **found} if found.get(key) != wanted.get(key))
+            raise InputError(
+                f"{self.path.parent} holds a run with {name} = {_short(found.get(name))}, "
+                f"and {_short(wanted.get(name))} is asked for; give another --out, or the settings "
+                "of that run to go on with it"
+            )
+        if len(whole) < len(data):
+            with self.path.open("r+b") as file:
+                file.truncate(len(whole))
+
+
+def _chunk(value: dict[str, Any]) -> Chunk:
+    records = tuple(Record(**inner) for inner in value.pop("records"))
+    return Chunk(records=records, **value)
+
+
+def _short(value: Any) -> str:
+    text = str(value)
+    return text if len(text) <= 80 else text[:77] + "..."

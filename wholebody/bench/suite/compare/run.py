@@ -1,4 +1,9 @@
-"""The whole comparison: which case next, by whom, what is kept, and how long it will take."""
+"""The whole comparison: which case next, by whom, what is kept, and how long it will take.
+
+Every method has the same share of the time in every set. What a fast one leaves over goes to the others, until all is
+given out: min(cost, share) summed over all is the time there is. Of its share a method spends half at the default
+budget and half on the sweep of its budgets, and what the one does not need on the other.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +12,127 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
+
+from wholebody.base.arrays import Array
 from wholebody.base.batches import spread
 from wholebody.base.errors import WholebodyError
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.compare.jobs import Task, work
-from wholebody.bench.suite.compare.plan import Plan
+from wholebody.bench.suite.compare.results import Chunk, Store
 from wholebody.bench.suite.compare.settings import Settings, seed_of
-from wholebody.bench.suite.compare.store import Chunk, Store
 
-SPARE = 3.0  # times its equal share that a method's sweep of one case may take: others leave something over
-TURN = 5  # methods by which the order is turned from case to case: far apart, so that a family does not stay together
+FIRST = 4  # cases after which it is known what building one takes
+
+
+class Allowed(NamedTuple):
+    """Cases of one method in one set: at the default budget, and at all of them."""
+
+    cases: int
+    sweep: int
+
+
+class Plan:
+    """Keeps count of what things cost, and says who may go on."""
+
+    def __init__(self, settings: Settings, jobs: int) -> None:
+        self._settings = settings
+        self._total = 60.0 * settings.minutes * jobs
+        self._keys = [(family.name, adapter.name) for family in settings.sets for adapter in settings.adapters]
+        self._place = {key: place for place, key in enumerate(self._keys)}
+        count = len(self._keys)
+        self._spent, self._cases = np.zeros(count), np.zeros(count)
+        self._swept, self._sweeps = np.zeros(count), np.zeros(count)
+        self._levels = np.array(
+            [len(settings.ladder(adapter, family.moving)) for family in settings.sets for adapter in settings.adapters]
+        )
+        self._asked = {family.name: settings.asked(family) for family in settings.sets}
+        self._building: dict[str, list[float]] = {family.name: [] for family in settings.sets}
+
+    def note(self, chunk: Chunk) -> None:
+        """Take a finished chunk into account."""
+        self._building[chunk.set].append(chunk.building)
+        for adapter, seconds in chunk.spent.items():
+            place = self._place[chunk.set, adapter]
+            self._spent[place] += seconds
+            self._cases[place] += 1
+        for adapter, seconds in chunk.swept.items():
+            place = self._place[chunk.set, adapter]
+            self._swept[place] += seconds
+            self._sweeps[place] += 1
+
+    def cases(self, family: str) -> int:
+        """How many cases of a set there is time to build."""
+        if len(self._building[family]) < FIRST:
+            return self._asked[family][0]
+        share = 0.3 * self._total / len(self._building)  # of a set's time, that building its cases may take
+        possible = max(FIRST, int(share / max(self._built(family), 1e-6)))
+        return min(possible, self._asked[family][0])
+
+    def _built(self, family: str) -> float:
+        """Seconds to build a case; the slow ones are those for which a process was started, and a body loaded."""
+        known = self._building[family]
+        if len(known) < FIRST:  # it may be the one for which everything was compiled: all sets tell more
+            known = [seconds for times in self._building.values() for seconds in times]
+        return float(np.quantile(known, 0.25)) if len(known) >= FIRST else 0.0
+
+    def allowed(self) -> dict[tuple[str, str], Allowed]:
+        """Cases of every method in every set, by what is known of the costs now."""
+        one, sweep = self._costs()
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        most = np.array([self.cases(family) for family, _ in self._keys], dtype=float)
+        swept = np.array([self._asked[family][1] for family, _ in self._keys], dtype=float)
+        cases, sweeps = share_out(one, sweep, most, np.minimum(most, swept), self._total - built)
+        return {key: Allowed(int(cases[place]), int(sweeps[place])) for key, place in self._place.items()}
+
+    @property
+    def share(self) -> float:
+        """Seconds of a method in a set, if all had the same."""
+        return self._total / len(self._keys)
+
+    def seconds(self, allowed: dict[tuple[str, str], Allowed]) -> float:
+        """What all cases that are allowed will have taken."""
+        one, sweep = self._costs()
+        counts = np.array([allowed[key] for key in self._keys], dtype=float)
+        built = sum(self.cases(name) * self._built(name) for name in self._building)
+        return float(one @ counts[:, 0] + sweep @ counts[:, 1]) + built
+
+    def _costs(self) -> tuple[Array, Array]:
+        one = self._spent / np.maximum(self._cases, 1.0)
+        known = self._swept / np.maximum(self._sweeps, 1.0)
+        return one, np.where(self._sweeps > 0, known, one * self._levels)  # as long at every budget, until it is known
+
+
+def share_out(one: Array, sweep: Array, most: Array, most_swept: Array, total: float) -> tuple[Array, Array]:
+    """Cases (n,) and sweeps (n,) of every method, at least one case, and a sweep where its share allows one.
+
+    Args:
+        one: (n,) seconds of a case at the default budget.
+        sweep: (n,) seconds of a case at all others.
+        most: (n,) cases asked for.
+        most_swept: (n,) sweeps asked for.
+        total: seconds there are.
+    """
+
+    def parts(share: float) -> tuple[Array, Array]:
+        once = np.where((share - one >= sweep) & (most_swept > 0), sweep, 0.0)
+        second = np.clip(0.5 * share, once, np.maximum(most_swept * sweep, once))
+        first = np.clip(share - second, one, most * one)
+        return first, np.clip(share - first, second, np.maximum(most_swept * sweep, second))
+
+    low, high = 0.0, float((one * most + sweep * most_swept).max(initial=0.0))
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        first, second = parts(middle)
+        low, high = (middle, high) if (first + second).sum() <= total else (low, middle)
+    first, second = parts(high if (np.add(*parts(high))).sum() <= total else low)
+    return _count(first, one, most, 1.0), _count(second, sweep, most_swept, 0.0)
+
+
+def _count(seconds: Array, each: Array, most: Array, least: float) -> Array:
+    free = each <= 0.0
+    counts = np.floor(seconds / np.where(free, 1.0, each) + 1e-9)
+    return np.where(free, most, np.clip(counts, np.minimum(least, most), most))
 
 
 class Progress(NamedTuple):
@@ -81,13 +197,15 @@ def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: floa
                 if number < (given := allowed[family.name, adapter.name]).cases
             )
             if solves:
-                most = SPARE * plan.share
+                # A sweep of one case may take three times its share: others leave something over.
+                most = 3.0 * plan.share
                 yield Task(family, number, seed_of(settings.seed, number), solves, settings.cap, most)
 
 
 def turned(adapters: tuple[Adapter, ...], number: int) -> tuple[Adapter, ...]:
     """The methods in another order for every case: nobody is always the first to wake a cold cache."""
-    first = TURN * number % len(adapters)
+    # The order is turned by five methods from case to case, so that a family does not stay together.
+    first = 5 * number % len(adapters)
     return adapters[first:] + adapters[:first]
 
 

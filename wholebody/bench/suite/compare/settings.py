@@ -8,13 +8,11 @@ from typing import Any
 
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter, Budget
-from wholebody.bench.suite.compare.record import DEFAULT
+from wholebody.bench.suite.compare.results import DEFAULT
 from wholebody.bench.suite.problem_sets.case import ProblemSet
 from wholebody.version import __version__
 
-MOVING_LEVELS = 3  # budgets of a set whose goals move: a case is hundreds of solves
 SEEDS = 3  # from which the cases of a set are made in turn
-MOVING = 4  # swept cases of other sets for one whose goals move, which is hundreds of solves at every budget
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,8 @@ class Settings:
 
         A set whose goals move has as many cases as the others; the plan gives a method as many as its share allows.
         """
-        return self.cases, self.sweep // MOVING if family.moving else self.sweep
+        # A case whose goals move is hundreds of solves at every budget.
+        return self.cases, self.sweep // 4 if family.moving else self.sweep
 
     def ladder(self, adapter: Adapter, moving: bool = False) -> list[Budget]:
         """Budgets beside the default one, from cheap to exact, evenly chosen where there are more than `levels`.
@@ -84,7 +83,8 @@ class Settings:
         """
         unused = FEASIBILITY_ONLY if moving else 0
         listed = [level for level in adapter.loose if level != DEFAULT and level[1] != unused]
-        most = min(self.levels, MOVING_LEVELS) if moving else self.levels
+        # A case whose goals move is hundreds of solves.
+        most = min(self.levels, 3) if moving else self.levels
         if len(listed) <= most:
             return listed
         first = [level for level in listed if level[1] == FEASIBILITY_ONLY]

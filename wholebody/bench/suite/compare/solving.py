@@ -21,18 +21,15 @@ from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
 from wholebody.base.runner import allow, allow_processor, processor_time
 from wholebody.bench.suite.adapters.base import Adapter, Budget
-from wholebody.bench.suite.compare.record import (
+from wholebody.bench.suite.compare.results import (
     ANSWERED,
-    COARSE,
     DEFAULT,
     FAILED,
     REFUSED,
-    Difficulty,
     Record,
     frame_cap,
 )
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet
-from wholebody.bench.suite.problem_sets.difficulty import away, descended
 from wholebody.bench.tables import programs_text
 from wholebody.methods.base import SolvedStep, Tracker
 from wholebody.methods.differential import TOOL
@@ -47,8 +44,6 @@ JUDGED = (
 """Figures of a judgement that records have too: of the goals, of what must hold, and of the measures."""
 
 USUAL = 0.95  # share of the frames whose tracking error counts: in the first ones the goal is far away
-STILL = 1e-6  # m: a gap that changes less in a frame does not turn
-GLIMPSE = 3  # frames of a moving case that a method sees before it is timed
 
 
 class Which(NamedTuple):
@@ -85,21 +80,6 @@ def built(which: Which) -> str | None:
     return None
 
 
-def difficulty(which: Which) -> Difficulty:
-    """How hard a case is; one whose goals move by its first frame, and by how far it goes from there."""
-    case = case_of(which).case
-    problem = copy.copy(case.problem)
-    if case.frames:
-        problem.retarget(case.frames[0])
-    found = descended(case, case.problem.start)
-    solved = found is not None and _worst(assess(problem, found)) <= COARSE
-    return Difficulty(not solved, float(np.linalg.norm(away(case))))
-
-
-def _worst(judgement: Assessment) -> float:
-    return max(float(getattr(judgement, name)) for name in JUDGED[:6])
-
-
 def warmed(which: Which, adapter: Adapter, cap: float) -> float:
     """Let a method import and compile what it needs, before it is timed for the first time in this process.
 
@@ -113,7 +93,8 @@ def warmed(which: Which, adapter: Adapter, cap: float) -> float:
     _warm.add(key)
     allow_processor(cap)
     began = time.perf_counter()
-    solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:GLIMPSE])))
+    # Of a moving case a method sees three frames before it is timed.
+    solve(adapter, DEFAULT, replace(made, case=replace(made.case, frames=made.case.frames[:3])))
     return time.perf_counter() - began
 
 
@@ -276,5 +257,5 @@ def jerk(model: Any, postures: list[Array], dt: float) -> float:
 def turns(gaps: Array) -> int:
     """How often the velocity of a gap (frames,) changes its sign: what a trembling contact does."""
     change = np.diff(gaps[np.isfinite(gaps)])
-    signs = np.sign(change[np.abs(change) > STILL])
+    signs = np.sign(change[np.abs(change) > 1e-6])  # m: a gap that changes less in a frame does not turn
     return int(np.count_nonzero(signs[1:] != signs[:-1]))

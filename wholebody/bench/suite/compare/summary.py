@@ -2,21 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import NamedTuple
 
 from wholebody.bench.report import words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
-from wholebody.bench.suite.compare.record import COARSE, FAILED, FINE, OVERTIME, REFUSED, frame_cap
-from wholebody.bench.suite.compare.results import Results, effort_excess, middle
+from wholebody.bench.suite.compare.results import (
+    COARSE,
+    FAILED,
+    FINE,
+    OVERTIME,
+    REFUSED,
+    Chunk,
+    Results,
+    effort_excess,
+    frame_cap,
+    middle,
+)
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.store import Chunk
 from wholebody.bench.tables import filled, of, summed_programs
 
-CAP = 20.0  # s: as a comparison ends a solve
-SHOWN = 110  # characters of a message
 GOOD = 0.98  # share of the cases that a method has to solve to be called dependable
 
 
@@ -112,7 +118,7 @@ class Summary:
         return not self.refused and self.success.value >= GOOD
 
 
-def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = CAP) -> list[Summary]:
+def summaries(results: Results, chunks: Sequence[Chunk] = (), cap: float = 20.0) -> list[Summary]:
     """All rows, of methods that were given a case.
 
     Args:
@@ -129,63 +135,52 @@ def kernel_of(chunks: Sequence[Chunk]) -> Interval:
     return median([chunk.kernel for chunk in chunks if chunk.kernel > 0.0])
 
 
-class Excluded(NamedTuple):
-    """One reason to leave methods out, as a table."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-
-
-class Exclusions(NamedTuple):
-    """Everything that was left out.
-
-    Attributes:
-        tables: refusals, failures, and what there was no time for; none that is empty.
-        faults: problems that could not be built, a sentence each.
-    """
-
-    tables: list[Excluded]
-    faults: list[str]
-
-
-def exclusions(settings: Settings, chunks: Sequence[Chunk], rows: Sequence[Summary]) -> Exclusions:
-    """Collect refusals, failures and what there was no time for."""
-    asked = {family.name: settings.asked(family) for family in settings.sets}
-    tables = [
-        Excluded(
-            "Refused: what a method cannot express",
-            ("method", "problems", "refused", "in its own words"),
-            sorted(
-                (row.method, words(row.set), "all" if row.refused == row.cases else f"{row.refused} of {row.cases}",
-                 _cut(row.said))
-                for row in rows
-                if row.refused
-            ),
-        ),
-        Excluded(
-            "No answer: exceptions, answers that are not finite, and solves that took too long",
-            ("method", "problems", "failed", "took too long", "the first"),
-            sorted(
-                (row.method, words(row.set), str(row.failed), str(row.overtime), _cut(row.said))
-                for row in rows
-                if row.failed or row.overtime
-            ),
-        ),
-        Excluded(
-            "Fewer problems, for there was no time for more",
-            ("method", "problems", "at the default budget", "at all budgets"),
-            sorted(
-                (row.method, words(row.set), f"{row.cases} of {cases}", f"{row.swept} of {sweep}")
-                for row in rows
-                for cases, sweep in [asked[row.set]]
-                if row.cases < cases or (row.swept < sweep and row.refused < row.cases)
-            ),
-        ),
-    ]  # fmt: skip
-    faults = [f"{words(chunk.set)} {chunk.number}: {chunk.fault}" for chunk in chunks if chunk.fault]
-    return Exclusions([table for table in tables if table.rows], faults)
+def left_out(settings: Settings, chunks: Sequence[Chunk], rows: Sequence[Summary]) -> list[str]:
+    """Sentences on refusals, failures, what there was no time for, and problems that could not be built."""
+    asked, said = {family.name: settings.asked(family) for family in settings.sets}, list[str]()
+    for row in rows:
+        where, (cases, sweep) = f"`{row.method}`, {words(row.set)}", asked[row.set]
+        if row.refused:
+            said.append(f"{where}: refuses {row.refused} of {row.cases}: {_cut(row.said)}")
+        elif row.failed or row.overtime:
+            said.append(f"{where}: {row.failed} without an answer, {row.overtime} ended for time: {_cut(row.said)}")
+        if row.cases < cases or (row.swept < sweep and row.refused < row.cases):
+            said.append(f"{where}: {row.cases} of {cases} problems, {row.swept} of {sweep} at all budgets, for time")
+    faults = [f"{words(chunk.set)} {chunk.number} could not be built: {chunk.fault}" for chunk in chunks if chunk.fault]
+    return said + faults
 
 
 def _cut(text: str) -> str:
-    return text if len(text) <= SHOWN else text[: SHOWN - 3] + "..."
+    return text if len(text) <= 110 else text[:107] + "..."
+
+
+@dataclass(frozen=True)
+class Material:
+    """All that a report is written from.
+
+    Attributes:
+        settings: what was asked for.
+        chunks: what was done.
+        results: the records of them.
+        rows: the figures at the default budget.
+        facts: of the machine and the run.
+        missing: methods that are not installed, and the command that installs them.
+    """
+
+    settings: Settings
+    chunks: Sequence[Chunk]
+    results: Results
+    rows: Sequence[Summary]
+    facts: Mapping[str, str]
+    missing: Mapping[str, str]
+
+
+def material(
+    settings: Settings, chunks: Sequence[Chunk], facts: Mapping[str, str], missing: Mapping[str, str]
+) -> Material:
+    """Put the records of a run in order."""
+    records = [record for chunk in chunks for record in chunk.records]
+    results = Results(
+        records, [family.name for family in settings.sets], [adapter.name for adapter in settings.adapters]
+    )
+    return Material(settings, chunks, results, summaries(results, chunks, settings.cap), facts, missing)

@@ -11,7 +11,10 @@ from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import (
     FEET,
     TIPS,
+    MassAbove,
     alone,
+    bent,
+    fitted,
     floor_scene,
     human,
     is_free,
@@ -21,41 +24,33 @@ from wholebody.bench.suite.problem_sets.bodies import (
     standing_problem,
     until_found,
 )
-from wholebody.bench.suite.problem_sets.case import ProblemSet
-from wholebody.bench.suite.problem_sets.fitting import MassAbove, fitted
+from wholebody.bench.suite.problem_sets.case import numbers
 
-MARGIN = 0.02  # m: asked of the centre of mass from the edges of the support polygon
-SPARE = 0.005  # m: what the witness has beyond that
-LOW = ((0.10, -0.45, 0.03), (0.65, 0.45, 0.35))  # m: where a fingertip is asked to be, near the floor
-FAR = ((0.60, -0.50, 0.50), (0.95, 0.50, 1.40))  # m: and out in front
-TWO = ((0.15, 0.00, 0.05), (0.60, 0.35, 0.60))  # m: and the left of two; the right one is on the other side
-OVER = ((-0.04, -0.08), (0.16, 0.08))  # m: where the witness has its centre of mass, seen from above
-STANCE = {"hip_flexion": (0.0, 110.0), "knee_flexion": (5.0, 130.0), "ankle_dorsiflexion": (0.0, 33.0)}
-"""Degrees that the legs begin with before the feet are put on their places."""
-ARMS = 0.35  # share of the range of every joint of the upper body, around how it stands, to begin with
+given = numbers("balance")
 
 
-def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a fingertip low down, one far out, both low down; sides change too."""
     figure, tip = human(), TIPS[number // 3 % 2]
 
     def attempt() -> tuple[list[wb.Point], Array] | None:
         goals = _goals(number % 3, tip, rng)
-        equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*OVER))]
+        equalities = [*_resolved(figure, goals), MassAbove(rng.uniform(*given.over_m))]
         found = fitted(figure, _beginning(figure, rng), equalities, movable(figure))
-        good = found is not None and is_free(alone(figure), found) and _least_room(found) > MARGIN + SPARE
-        return (goals, found) if found is not None and good else None
+        if found is None or not is_free(alone(figure), found):
+            return None
+        return (goals, found) if _least_room(found) > given.margin_m + given.spare_m else None
 
     goals, witness = until_found(attempt)
     reached = [point(figure, witness, goal.frame) for goal in goals]
     start = figure.posture("standing")
-    return standing_problem(floor_scene(figure), start, reached, wb.Balance(margin=MARGIN)), witness
+    return standing_problem(floor_scene(figure), start, reached, wb.Balance(margin=given.margin_m)), witness
 
 
 def _goals(kind: int, tip: str, rng: np.random.Generator) -> list[wb.Point]:
     if kind < 2:
-        return [wb.Point(tip, rng.uniform(*(LOW if kind == 0 else FAR)))]
-    left, right = rng.uniform(*TWO), rng.uniform(*TWO) * (1.0, -1.0, 1.0)
+        return [wb.Point(tip, rng.uniform(*(given.low_m if kind == 0 else given.far_m)))]
+    left, right = rng.uniform(*given.two_m), rng.uniform(*given.two_m) * (1.0, -1.0, 1.0)
     return [wb.Point("left_index_tip", left), wb.Point("right_index_tip", right)]
 
 
@@ -69,11 +64,9 @@ def _beginning(figure: wb.Figure, rng: np.random.Generator) -> Array:
     """A posture (nq,) with bent legs and the upper body anyhow; the feet are not yet where they belong."""
     q = figure.posture("standing")
     bend = float(rng.uniform())
-    values: dict[str, float] = {}
-    for name, (least, most) in STANCE.items():
-        angle = np.radians(least + bend * (most - least))
-        values |= {f"{side}_{name}": angle for side in ("left", "right")}
-    q = shaken(figure, figure.clamp(figure.with_joints(q, values)), ARMS, rng)
+    ends = vars(given.stance_degrees).items()
+    q = bent(figure, q, {name: least + bend * (most - least) for name, (least, most) in ends})
+    q = shaken(figure, figure.clamp(q), given.arms, rng)
     q[2] -= 0.45 * bend
     q[:2] += rng.uniform(-0.1, 0.1, 2)
     pitch = rng.uniform(0.0, 0.6) + 0.3 * bend
@@ -89,12 +82,3 @@ def _support() -> wb.Balance:
 def _least_room(q: Array) -> float:
     """Distance of the centre of mass from the nearest edge of the support polygon, metres."""
     return float(_support().value(alone(human()).state(q)).min())
-
-
-SET = ProblemSet(
-    "balance",
-    "balance",
-    "A standing person reaches low down or far out with one hand or both, feet held, the centre of mass kept above "
-    "the feet: the legs have to bend and the pelvis to give way.",
-    _posed,
-)

@@ -1,25 +1,29 @@
-"""The person of the sets, and random postures in which nothing touches."""
+"""The person of the sets, random postures in which nothing touches, and postures moved onto equalities.
+
+`fitted` is Newton's method on the equalities alone, with the shortest step in every turn (Ben-Israel 1966, "A
+Newton-Raphson method for the solution of systems of equations"). It knows neither contacts nor measures, so it favours
+no method that is compared; whoever calls it asks afterwards whether the posture is free.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import lru_cache
 from typing import TypeVar
 
 import numpy as np
+import pinocchio as pin
 from numpy.typing import NDArray
 
 import wholebody as wb
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
+from wholebody.figures.state import State, Wrench
 
 ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at the start
 CLEARANCE = 0.002  # m: what is asked of an answer
 TIPS = ("right_index_tip", "left_index_tip")
 FEET = ("left_foot", "right_foot")
-SOLES = ("left_foot", "right_foot", "left_toes", "right_toes")
-ATTEMPTS = 5000
-"""Postures that are tried for one witness; about one in five of a person's upper body is free."""
 
 
 _Found = TypeVar("_Found")
@@ -45,7 +49,7 @@ def floor_scene(figure: wb.Figure) -> wb.Scene:
 def is_free(scene: wb.Scene, q: Array, room: float = ROOM) -> bool:
     """Whether nothing but the soles on the floor is nearer than `room`, metres, in the posture q, shape (nq,)."""
     owners = scene.piece_owner
-    soles = {frozenset(("floor", name)) for name in SOLES}
+    soles = {frozenset(("floor", name)) for name in (*FEET, "left_toes", "right_toes")}
     return all(frozenset((owners[a], owners[b])) in soles for a, b in scene.contacts(q, within=room).pair)
 
 
@@ -73,11 +77,11 @@ def until_found(attempt: Callable[[], _Found | None]) -> _Found:
     Raises:
         InputError: it never did.
     """
-    for _ in range(ATTEMPTS):
+    for _ in range(5000):  # about one in five of the postures of a person's upper body is free
         found = attempt()
         if found is not None:
             return found
-    raise InputError(f"none of {ATTEMPTS} postures is free; give another seed")
+    raise InputError("none of 5000 postures is free; give another seed")
 
 
 def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) -> Array:
@@ -90,6 +94,12 @@ def shaken(figure: wb.Figure, q: Array, share: float, rng: np.random.Generator) 
         reach = share * (high - low)
         values[name] = float(np.clip(q[place] + float(rng.uniform(-reach, reach)), low, high))
     return figure.clamp(figure.with_joints(q, values))
+
+
+def bent(figure: wb.Figure, q: Array, degrees: Mapping[str, float], sides: Sequence[str] = ("left", "right")) -> Array:
+    """The posture q, (nq,), with joints of one side or both at angles by the joints' names without the side."""
+    angles = {f"{side}_{name}": np.radians(angle) for side in sides for name, angle in degrees.items()}
+    return figure.with_joints(q, angles)
 
 
 def movable(figure: wb.Figure) -> NDArray[np.intp]:
@@ -115,3 +125,90 @@ def standing_problem(
 def point(figure: wb.Figure, q: Array, frame: str) -> wb.Point:
     """The goal that a frame is where the posture q, (nq,), has it."""
     return wb.Point(frame, figure.placement(q, frame).translation)
+
+
+class MassAbove(wb.Goal):
+    """The centre of mass above a place on the floor."""
+
+    def __init__(self, place: Array) -> None:
+        """Keep the place (2,) in metres."""
+        self.place = np.array(place)
+
+    def error(self, state: State) -> Array:
+        """(2,) from the place [m]."""
+        return np.asarray(state.center_of_mass()[:2] - self.place)
+
+    def jacobian(self, state: State) -> Array:
+        """(2, nv)."""
+        return state.center_of_mass_jacobian()[:2]
+
+
+class Held(wb.Goal):
+    """A constraint without slack as an equality."""
+
+    def __init__(self, hold: wb.Hold) -> None:
+        """Keep a hold that is resolved."""
+        self.hold = hold
+
+    def error(self, state: State) -> Array:
+        """(m,) difference from where it is held [m, rad]."""
+        return self.hold.value(state)
+
+    def jacobian(self, state: State) -> Wrench:
+        """Rows of the hold."""
+        return self.hold.jacobian(state)
+
+
+def held(problem: wb.Problem) -> list[wb.Goal]:
+    """The holds of a problem as equalities."""
+    return [Held(term) for term in problem.constraints if isinstance(term, wb.Hold)]
+
+
+def fitted(figure: wb.Figure, q: Array, goals: Sequence[wb.Goal], dofs: Indices) -> Array | None:
+    """Return the posture (nq,) that Newton's method finds from q, or None where it finds none within the limits.
+
+    Args:
+        figure: whose posture.
+        q: (nq,) where to begin.
+        goals: the equalities, resolved.
+        dofs: places in the tangent of what may move.
+    """
+    model, state = figure.model, _state(figure)
+    for _ in range(25):
+        state.update(q)
+        error = np.concatenate([goal.error(state) for goal in goals])
+        if np.abs(error).max() < 1e-10:  # m, rad
+            return q
+        rows = np.vstack([state.dense_jacobian(goal.jacobian(state)) for goal in goals])
+        step = _shortest(rows, -error, dofs, *figure.tangent_bounds(q))
+        # Farther away than half a radian or metre the rows are no longer true.
+        step *= min(1.0, 0.5 / max(float(np.abs(step).max()), 1e-300))
+        q = figure.clamp(pin.integrate(model, q, step))
+    return None
+
+
+@lru_cache(maxsize=8)
+def _state(figure: wb.Figure) -> State:
+    """One for all postures of a figure: making it takes as long as twenty turns."""
+    return State(figure.model)
+
+
+def _shortest(rows: Array, wanted: Array, dofs: Indices, lower: Array, upper: Array) -> Array:
+    """Step (nv,) of the given degrees of freedom that does what is wanted; those that would leave their limits stop.
+
+    1e-9 keeps the step finite where rows depend on each other.
+    """
+    step = np.zeros(rows.shape[1])
+    left = dofs
+    while len(left):
+        part = rows[:, left]
+        rest = step.copy()
+        rest[left] = 0.0
+        step[left] = part.T @ np.linalg.solve(part @ part.T + 1e-9 * np.eye(len(rows)), wanted - rows @ rest)
+        beyond = (step[left] < lower[left]) | (step[left] > upper[left])
+        if not beyond.any():
+            break
+        stopped = left[beyond]
+        step[stopped] = np.clip(step[stopped], lower[stopped], upper[stopped])
+        left = left[~beyond]
+    return step

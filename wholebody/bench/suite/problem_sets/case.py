@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.files import parsed_toml
 from wholebody.problem import Problem
 from wholebody.tasks.base import Goal
 
@@ -38,6 +43,8 @@ class Case:
 Posed = tuple[Problem, Array] | tuple[Problem, Array, tuple[tuple[Goal, ...], ...], tuple[Array, ...]]
 """What a set poses: the first fields of a `Case` after its number."""
 
+Pose = Callable[[int, np.random.Generator], Posed]
+
 
 @dataclass(frozen=True)
 class ProblemSet:
@@ -54,12 +61,29 @@ class ProblemSet:
     name: str
     title: str
     about: str
-    pose: Callable[[int, np.random.Generator], Posed]
+    pose: Pose
     moving: bool = False
 
     def make(self, number: int, seed: int) -> Case:
         """A case from its number and the seed of the set; the same ones make the same case."""
         return Case(self.name, number, *self.pose(number, generator(self.name, number, seed)))
+
+
+def numbers(name: str) -> Any:
+    """What `sets.toml` says of a set, as attributes."""
+    return _data()[name]
+
+
+@cache
+def _data() -> dict[str, Any]:
+    file = Path(__file__).with_name("sets.toml")
+    return {name: _attributes(values) for name, values in parsed_toml(file.read_text("utf-8"), file.name).items()}
+
+
+def _attributes(value: Any) -> Any:
+    if isinstance(value, dict):
+        return SimpleNamespace(**{name: _attributes(each) for name, each in value.items()})
+    return [_attributes(each) for each in value] if isinstance(value, list) else value
 
 
 def generator(name: str, number: int, seed: int) -> np.random.Generator:

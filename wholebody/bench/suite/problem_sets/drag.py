@@ -18,23 +18,18 @@ from wholebody.bench.suite.problem_sets.bodies import (
     shaken,
     standing_problem,
 )
-from wholebody.bench.suite.problem_sets.case import Posed, ProblemSet
+from wholebody.bench.suite.problem_sets.case import Posed, numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 
-THINGS = 12
-SPAN = 24  # frames from one knot of the spline to the next: 0.4 s
-SPANS = (5, 8)  # fewest and most spans of a drag, the last of which come to rest
-AT_REST = 2  # spans that the spline takes to come to rest on its last posture
-STRIDE = 0.35  # share of the range of every joint between one control posture and the next
-TRIES, STARTS = 40, 50  # postures tried for a knot, and ways begun anew where none of them would do
+given = numbers("drag")
 
 
-def _posed(number: int, rng: np.random.Generator) -> Posed:
+def posed(number: int, rng: np.random.Generator) -> Posed:
     """The goals are where the fingertip is in each posture of `way`; the first is where it is at the start."""
     figure, tip = human(), TIPS[number % len(TIPS)]
     postures = way(figure, rng)
     scene = floor_scene(figure)
-    add_things(scene, THINGS, Occupied(figure, postures), ROOM, rng)
+    add_things(scene, given.things, Occupied(figure, postures), ROOM, rng)
     goals = [point(figure, q, tip) for q in postures]
     moving = tuple((goal,) for goal in goals[1:])
     return standing_problem(scene, postures[0], goals[:1]), postures[0], moving, tuple(postures[1:])
@@ -51,13 +46,13 @@ def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
         InputError: none was found.
     """
     standing = figure.posture("standing")
-    spans = int(rng.integers(SPANS[0], SPANS[1] + 1))
-    for _ in range(STARTS):
+    spans = int(rng.integers(given.spans[0], given.spans[1] + 1))
+    for _ in range(50):
         control, frames = [standing] * 3, [standing[None]]
         while len(frames) <= spans:
-            resting = len(frames) > spans - AT_REST
-            for _ in range(1 if resting else TRIES):
-                point = control[-1] if resting else shaken(figure, control[-1], STRIDE, rng)
+            resting = len(frames) > spans - given.spans_to_rest
+            for _ in range(1 if resting else 40):
+                point = control[-1] if resting else shaken(figure, control[-1], given.stride, rng)
                 span = _span(np.array([*control[-3:], point]))
                 if all(is_free(alone(figure), q) for q in span):
                     control.append(point)
@@ -67,21 +62,11 @@ def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
                 break
         else:
             return np.vstack(frames)
-    raise InputError(f"none of {STARTS} ways is free; give another seed")
+    raise InputError("none of 50 ways is free; give another seed")
 
 
 def _span(control: Array) -> Array:
-    """Postures (SPAN, nq) of the span between the second and the third of four control postures (4, nq)."""
-    t = np.arange(1, SPAN + 1)[:, None] / SPAN
+    """Postures (frames, nq) of the span between the second and the third of four control postures (4, nq)."""
+    t = np.arange(1, given.frames_a_span + 1)[:, None] / given.frames_a_span
     weights = np.hstack([(1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3])
     return np.asarray(weights @ control / 6.0)
-
-
-SET = ProblemSet(
-    "drag",
-    "drag",
-    "A fingertip is dragged for two to three seconds along a smooth curve past twelve things, a goal every sixtieth of "
-    "a second; what counts is how closely and how calmly the body follows.",
-    _posed,
-    moving=True,
-)

@@ -15,38 +15,25 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.suite.problem_sets.bodies import alone, is_free, movable, until_found
-from wholebody.bench.suite.problem_sets.case import ProblemSet
-from wholebody.bench.suite.problem_sets.fitting import fitted
+from wholebody.bench.suite.problem_sets.bodies import alone, bent, fitted, is_free, movable, until_found
+from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.figures.postures import lowest, support
 
-PEOPLE = tuple((sex, percentile) for sex in ("female", "male") for percentile in (5, 20, 35, 50, 65, 80, 95))
-SEATED = {
-    "hip_flexion": (80.0, 105.0), "knee_flexion": (35.0, 85.0), "shoulder_flexion": (15.0, 60.0),
-    "shoulder_abduction": (8.0, 30.0), "elbow_flexion": (35.0, 95.0), "elbow_pronation": (-20.0, 40.0),
-}  # fmt: skip
-"""Degrees between which both sides of a witness are, in turn for all of it."""
-LEANS, LESS = (3.0, 11.0), (2.0, 12.0)  # degrees: the pelvis leans backwards, and the backrest less than that
-SLOPES = (0.0, 35.0)  # degrees: of what the feet are on
-FEET_APART = (0.09, 0.14)  # m: of each foot from the middle
-OFF_FLOOR = 0.1  # m: of the lowest point
-AWAY = 0.3  # m: of the start from the witness, along both axes of the ground
-BAR, PANEL = (0.015, 0.24), 0.02  # m: radius and length of a bar; half the thickness of a panel
-EXACT = 1e-6  # m, rad: to which a witness is one
-TRUNK = ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
+given = numbers("drivers")
 
 
-@lru_cache(maxsize=len(PEOPLE))
+@lru_cache(maxsize=14)
 def driver(number: int) -> wb.Figure:
-    """One of `PEOPLE`."""
-    sex, percentile = PEOPLE[number]
-    return wb.load("human", sex=sex, percentile=percentile)
+    """One of the women and then the men, from small to large."""
+    sex, percentile = divmod(number, len(given.percentiles))
+    return wb.load("human", sex=("female", "male")[sex], percentile=given.percentiles[percentile])
 
 
-def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """Persons take turns; after all of them the feet, and then the right hand, have other controls."""
-    figure = driver(number % len(PEOPLE))
-    kind = number // len(PEOPLE)
+    people = 2 * len(given.percentiles)
+    figure = driver(number % people)
+    kind = number // people
 
     def attempt() -> tuple[wb.Problem, Array] | None:
         witness, slope, lean = _seated(figure, rng)
@@ -56,17 +43,18 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
         if problem is None:
             return None
         judged = wb.assess(problem, witness)
-        return (problem, witness) if judged.met(EXACT) and judged.holds(EXACT) else None
+        return (problem, witness) if judged.met(1e-6) and judged.holds(1e-6) else None
 
     return until_found(attempt)
 
 
 def _seated(figure: wb.Figure, rng: np.random.Generator) -> tuple[Array | None, float, float]:
     """A seated posture (nq,) with both soles in one plane, its slope and how the pelvis leans, degrees."""
-    lean, slope, apart = (float(rng.uniform(*ends)) for ends in (LEANS, SLOPES, FEET_APART))
-    angles = {name: np.radians(rng.uniform(*ends)) for name, ends in SEATED.items()}
-    values = {f"{side}_{name}": angle for side in ("left", "right") for name, angle in angles.items()}
-    q = figure.clamp(figure.with_joints(figure.posture("sitting"), values))
+    lean, slope, apart = (
+        float(rng.uniform(*ends)) for ends in (given.leans_degrees, given.slopes_degrees, given.feet_apart_m)
+    )
+    degrees = {name: rng.uniform(*ends) for name, ends in vars(given.seated_degrees).items()}
+    q = figure.clamp(bent(figure, figure.posture("sitting"), degrees))
     q[3:7] = _pitch(-lean)
     rest, goals = figure.posture("standing"), []
     for side, sign in (("left", 1.0), ("right", -1.0)):
@@ -76,7 +64,7 @@ def _seated(figure: wb.Figure, rng: np.random.Generator) -> tuple[Array | None, 
     legs = np.intersect1d(movable(figure), figure.dofs(figure.groups["legs"]))
     found = fitted(figure, q, [goal.resolve(alone(figure), q) for goal in goals], legs)
     if found is not None:
-        found[2] += OFF_FLOOR - lowest(figure, found)
+        found[2] += given.off_floor_m - lowest(figure, found)
     return found, slope, lean
 
 
@@ -87,10 +75,10 @@ def _cabin(
     scene = wb.Scene(figure)
     seat = _lowest_along(figure, q, np.array((0.0, 0.0, 1.0)), ("pelvis", "left_thigh", "right_thigh"))
     scene.add(wb.Box((0.46, 0.52, 0.08)), name="seat", at=(q[0] - 0.02, 0.0, seat - 0.04))
-    lean -= float(rng.uniform(*LESS))
+    lean -= float(rng.uniform(*given.less_degrees))
     ahead = np.array((np.cos(np.radians(lean)), 0.0, np.sin(np.radians(lean))))
-    back, pelvis = _lowest_along(figure, q, ahead, TRUNK), _lowest_along(figure, q, ahead, ("pelvis",))
-    if back > pelvis:
+    back = _lowest_along(figure, q, ahead, ("lower_lumbar", "upper_lumbar", "lower_thorax", "thorax"))
+    if back > _lowest_along(figure, q, ahead, ("pelvis",)):
         return None
     middle = q[:3] + (0.0, 0.0, 0.25)
     middle = middle + (back - middle @ ahead - 0.04) * ahead
@@ -109,17 +97,17 @@ def _cabin(
             scene.add(wb.Box((0.12, 0.12, 0.02)), name=f"{side}_pedal", at=(*center, *_pitch(-slope)))
             goals.append(wb.Touch(f"{side}_ball", f"{side}_pedal"))
     for side in ("left", "right") if kind // 2 % 2 == 0 else ("left",):
-        scene.add(wb.Capsule(*BAR), name=f"{side}_bar", at=_bar(figure, q, side))
+        scene.add(wb.Capsule(*given.bar_m), name=f"{side}_bar", at=_bar(figure, q, side))
         goals.append(wb.Grasp(side, f"{side}_bar", kind="power"))
     if kind // 2 % 2:
         tip = figure.placement(q, "right_index_tip")
-        at = pin.SE3(tip.rotation, tip.act(np.array((PANEL, 0.0, 0.0))))
-        scene.add(wb.Box((2.0 * PANEL, 0.12, 0.12)), name="panel", at=at)
+        at = pin.SE3(tip.rotation, tip.act(np.array((given.panel_m, 0.0, 0.0))))
+        scene.add(wb.Box((2.0 * given.panel_m, 0.12, 0.12)), name="panel", at=at)
         goals.append(wb.Touch("right_index_tip", "panel"))
     look = figure.placement(q, "gaze").rotation[:, 0]
     goals.append(wb.Axis("gaze", (1, 0, 0), direction=look, weight=0.1))
     start = figure.posture("sitting")
-    start[:2] += q[:2] + rng.uniform(-AWAY, AWAY, 2) * (1.0, 0.3)
+    start[:2] += q[:2] + rng.uniform(-given.away_m, given.away_m, 2) * (1.0, 0.3)
     return wb.Problem(scene, start, goals=goals, constraints=constraints)
 
 
@@ -149,7 +137,7 @@ def _bar(figure: wb.Figure, q: Array, side: str) -> pin.SE3:
         for piece, place in zip(figure.geometry.geometryObjects, _placed(figure, q), strict=True)
         if piece.parentJoint == joint
     ]
-    shape, request = coal.Capsule(*BAR), coal.DistanceRequest()
+    shape, request = coal.Capsule(*given.bar_m), coal.DistanceRequest()
     request.gjk_tolerance = request.epa_tolerance = 1e-9
     turn = np.column_stack([palm.rotation[:, 2], palm.rotation[:, 0], palm.rotation[:, 1]])
 
@@ -171,12 +159,3 @@ def _placed(figure: wb.Figure, q: Array) -> list[pin.SE3]:
     geometry_data = pin.GeometryData(figure.geometry)
     pin.updateGeometryPlacements(figure.model, data, figure.geometry, geometry_data, q)
     return list(geometry_data.oMg)
-
-
-SET = ProblemSet(
-    "drivers",
-    "drivers",
-    f"{len(PEOPLE)} women and men sit against a backrest, take bars or press a panel, and have their feet on a board "
-    "or on two pedals; what touches may slide.",
-    _posed,
-)

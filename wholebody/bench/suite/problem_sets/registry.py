@@ -1,4 +1,4 @@
-"""The problem sets by name."""
+"""The problem sets by name; `sets.toml` has their titles and numbers."""
 
 from __future__ import annotations
 
@@ -11,36 +11,51 @@ from wholebody.bench.suite.problem_sets import (
     closed_loop,
     drag,
     drivers,
-    held_out,
     passage,
     reaching,
     robot_arm,
     robots,
     self_contact,
 )
-from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
-_ALL = (
-    reaching.FREE, reaching.SEVERAL, reaching.CLUTTER, self_contact.SET, balance.SET, closed_loop.SET, passage.SET,
-    drag.SET, robot_arm.SET,
-)  # fmt: skip
-SETS: Mapping[str, ProblemSet] = MappingProxyType({each.name: each for each in _ALL})
+
+def _sets(poses: Mapping[str, Pose]) -> Mapping[str, ProblemSet]:
+    made = {}
+    for name, pose in poses.items():
+        given = numbers(name)
+        made[name] = ProblemSet(name, given.title, given.about, pose, getattr(given, "moving", False))
+    return MappingProxyType(made)
+
+
+SETS = _sets(
+    {
+        "free_reach": reaching.free,
+        "free_reach_several": reaching.several,
+        "clutter": reaching.among,
+        "self_contact": self_contact.posed,
+        "balance": balance.posed,
+        "closed_loop": closed_loop.posed,
+        "passage": passage.posed,
+        "drag": drag.posed,
+        "robot_arm": robot_arm.posed,
+    }
+)
 """By name, as they are listed in reports."""
 
-NAMED: Mapping[str, ProblemSet] = MappingProxyType(
-    {each.name: each for each in (held_out.UNIFORM, held_out.PEOPLE_SET, held_out.CLUTTER, robots.SET, drivers.SET)}
+NAMED = _sets(
+    {
+        "uniform_witnesses": reaching.uniform,
+        "other_people": reaching.people,
+        "other_clutter": reaching.clutter,
+        "robots": robots.posed,
+        "drivers": drivers.posed,
+    }
 )
 """Sets that take part where they are named: distributions that nothing was tuned on, of which the robots need files
 that are not a part of this package; and drivers, whose contacts most other tools and the published files lack."""
 
-TUNED_ON: Mapping[str, str] = MappingProxyType(
-    {
-        held_out.UNIFORM.name: reaching.SEVERAL.name,
-        held_out.PEOPLE_SET.name: reaching.CLUTTER.name,
-        held_out.CLUTTER.name: reaching.CLUTTER.name,
-        robots.SET.name: robot_arm.SET.name,
-    }
-)
+TUNED_ON = MappingProxyType({name: numbers(name).beside for name in NAMED if numbers(name).beside})
 """Those distributions -> the set of the same question that constants were tuned on."""
 
 CASES = 200

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -10,19 +10,15 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.files import Scratch
 from wholebody.bench.suite.problem_sets.bodies import CLEARANCE, ROOM, alone, floor_scene, is_free, until_found
-from wholebody.bench.suite.problem_sets.case import ProblemSet
+from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 
-THINGS = 8
-SPACE = ((-0.8, -0.8, 0.05), (0.8, 0.8, 1.3))  # m: where they are put
-KINDS = ("seven axes", "industrial", "parallel")
-RADII = (0.065, 0.030)  # m: of the first link and of the last one
-SHORT = 0.06  # m: a link shorter than this is a ball
+given = numbers("robot_arm")
 
 
-def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """The kinds of arm in turn; a place and an orientation in every other round, only a place in the others."""
-    figure, ready = arm(KINDS[number % len(KINDS)], rng)
+    figure, ready = arm(given.kinds[number % len(given.kinds)], rng)
     model, start = figure.model, figure.with_joints(figure.neutral, ready)
 
     def sampled() -> Array | None:
@@ -31,9 +27,9 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
     witness = until_found(sampled)
     scene = floor_scene(figure)
-    add_things(scene, THINGS, Occupied(figure, (start, witness)), ROOM, rng, SPACE)
+    add_things(scene, given.things, Occupied(figure, (start, witness)), ROOM, rng, given.space_m)
     place = figure.placement(witness, "tool")
-    turned = number // len(KINDS) % 2 == 1
+    turned = number // len(given.kinds) % 2 == 1
     goal = wb.Frame("tool", place) if turned else wb.Point("tool", place.translation)
     return wb.Problem(scene, start, goals=[goal], clearance=CLEARANCE), witness
 
@@ -56,41 +52,19 @@ def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float
             no three of the last crossing.
         rng: for the lengths.
     """
-    lower, upper, fore, hand = (
-        round(float(length), 3) for length in rng.uniform((0.22, 0.28, 0.26, 0.12), (0.36, 0.48, 0.44, 0.20))
-    )
-    if kind == "seven axes":
-        axes = [
-            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
-            Axis("0 1 0", (0.0, 0.0, lower - 0.10), 2.05, 0.5),
-            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
-            Axis("0 1 0", (0.0, 0.0, upper - 0.10), 2.3, 1.3),
-            Axis("0 0 1", (0.0, 0.0, 0.10), 2.95, 0.0),
-            Axis("0 1 0", (0.0, 0.0, fore - 0.10), 2.05, 1.0),
-            Axis("0 0 1", (0.0, 0.0, 0.08), 3.05, 0.0),
-        ]
-        tool = (0.0, 0.0, hand)
-    elif kind == "industrial":
-        beside = round(float(rng.uniform(0.03, 0.12)), 3)
-        axes = [
-            Axis("0 0 1", (0.0, 0.0, 0.12), 2.95, 0.0),
-            Axis("0 1 0", (beside, 0.0, lower - 0.12), 1.9, 0.2),
-            Axis("0 1 0", (0.0, 0.0, upper), 2.4, 1.4),
-            Axis("0 0 1", (beside, 0.0, 0.12), 3.1, 0.0),
-            Axis("0 1 0", (0.0, 0.0, fore - 0.12), 2.1, 0.9),
-            Axis("0 0 1", (0.0, 0.0, 0.09), 3.1, 0.0),
-        ]
-        tool = (0.0, 0.0, hand)
-    else:
-        axes = [
-            Axis("0 0 1", (0.0, 0.0, 0.08), 3.1, 0.0),
-            Axis("0 1 0", (0.0, 0.13, lower - 0.15), 2.0, 0.3),
-            Axis("0 1 0", (0.0, -0.12, upper), 2.7, 1.5),
-            Axis("0 1 0", (0.0, 0.11, fore), 2.7, 0.6),
-            Axis("0 0 1", (0.0, 0.0, 0.09), 3.1, 0.0),
-            Axis("0 1 0", (0.0, 0.09, 0.0), 3.1, 0.0),
-        ]
-        tool = (0.0, hand, 0.0)
+    lengths = [round(float(length), 3) for length in rng.uniform(*given.lengths_m)]
+    lower, upper, fore, hand = lengths
+    beside = round(float(rng.uniform(*given.beside_m)), 3) if kind == "industrial" else 0.0
+    known = {"lower": lower, "upper": upper, "fore": fore, "hand": hand, "beside": beside}
+
+    def place(words: list[Any]) -> tuple[float, float, float]:
+        """Metres, from numbers and sums of a length and a number."""
+        x, y, z = (_length(word, known) for word in words)
+        return x, y, z
+
+    made = getattr(given, kind.replace(" ", "_"))
+    axes = [Axis(axis, place(at), limit, ready) for axis, at, limit, ready in made.axes]
+    tool = place(made.tool)
     with Scratch() as folder:
         path = folder / f"{kind.replace(' ', '_')}.urdf"
         path.write_text(_urdf(kind.replace(" ", "_"), axes, tool), encoding="utf-8")
@@ -98,10 +72,19 @@ def arm(kind: str, rng: np.random.Generator) -> tuple[wb.Figure, dict[str, float
     return figure, {f"axis{number}": axis.ready for number, axis in enumerate(axes, start=1)}
 
 
+def _length(word: str | float, known: dict[str, float]) -> float:
+    """Metres: a number, or a length by its name, less a number where one follows."""
+    if not isinstance(word, str):
+        return word
+    name, _, less = word.partition(" - ")
+    return known[name] - float(less) if less else known[name]
+
+
 def _urdf(name: str, axes: list[Axis], tool: tuple[float, float, float]) -> str:
     """The file: every link is a cylinder from its joint to the next one."""
     ends = [axis.at for axis in axes] + [tool]
-    radii = np.linspace(*RADII, len(ends))
+    thick, thin = given.radii_m
+    radii = np.linspace(thick, thin, len(ends))
     lines = [f'<robot name="{name}">']
     lines += [_link(f"link{number}", end, float(radii[number])) for number, end in enumerate(ends)]
     lines.append('<link name="tool"/>')
@@ -122,7 +105,7 @@ def _link(name: str, end: tuple[float, float, float], radius: float) -> str:
     way = np.array(end)
     length = float(np.linalg.norm(way))
     middle = _numbers(tuple(0.5 * way))
-    if length < SHORT:
+    if length < given.short_m:
         shape = f'<geometry><sphere radius="{radius:.4f}"/></geometry>'
         turn = (0.0, 0.0, 0.0)
     else:
@@ -139,12 +122,3 @@ def _link(name: str, end: tuple[float, float, float], radius: float) -> str:
 
 def _numbers(values: tuple[float, ...]) -> str:
     return " ".join(f"{value:.6f}" for value in values)
-
-
-SET = ProblemSet(
-    "robot_arm",
-    "robot arms",
-    "Arms of six or seven axes, every one with links of other lengths, bring their tool to a place among eight things, "
-    "in half of the problems with an orientation.",
-    _posed,
-)

@@ -11,6 +11,8 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.bodies import (
     alone,
+    bent,
+    fitted,
     floor_scene,
     human,
     is_free,
@@ -18,29 +20,9 @@ from wholebody.bench.suite.problem_sets.bodies import (
     standing_problem,
     until_found,
 )
-from wholebody.bench.suite.problem_sets.case import ProblemSet
-from wholebody.bench.suite.problem_sets.fitting import fitted
+from wholebody.bench.suite.problem_sets.case import numbers
 
-LEAST, MOST = 0.0027, 0.005  # m: between a hand and what it lies on, in the witness
-TURNS = 6  # of laying a hand on what is under it
-FAR = 0.5  # m: distances beyond are not looked for
-SIDES = ("left", "right")
-OTHER = {"left": "right", "right": "left"}
-ELBOW, FRONT = (0.0, 2.5), (-0.5, 1.5)  # rad: around an upper arm from its front outwards
-BEGIN = (
-    {"shoulder_flexion": 60.0, "shoulder_abduction": 15.0, "shoulder_rotation": 45.0, "elbow_flexion": 90.0},
-    {"shoulder_abduction": 40.0, "elbow_flexion": 80.0, "shoulder_rotation": 20.0},
-    {
-        "clavicle_protraction": 25.0,
-        "clavicle_elevation": 30.0,
-        "shoulder_flexion": 65.0,
-        "shoulder_abduction": 20.0,
-        "shoulder_rotation": 65.0,
-        "elbow_flexion": 105.0,
-    },
-)
-"""Degrees that both arms begin with, for each kind."""
-SPREAD = 0.2  # share of the range of every joint of the upper body that is added or taken away
+given = numbers("self_contact")
 
 
 @dataclass(frozen=True)
@@ -66,18 +48,17 @@ class Touch:
         return self.axis + height * self.normal
 
 
-def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
     figure = human()
     start = figure.posture("standing")
     kind, turned = number % 3, number // 3 % 2 == 1
-    bent = {f"{side}_{name}": np.radians(angle) for side in SIDES for name, angle in BEGIN[kind].items()}
-    begin = figure.with_joints(start, bent)
+    begin = bent(figure, start, vars(given.begin_degrees[kind]))
 
     def attempt() -> tuple[Array, list[Touch]] | None:
-        touches = _touches(kind, SIDES[number // 6 % 2], rng)
-        witness = _laid(figure, shaken(figure, begin, SPREAD, rng), touches)
-        return (witness, touches) if witness is not None and is_free(alone(figure), witness, LEAST) else None
+        touches = _touches(kind, ("left", "right")[number // 6 % 2], rng)
+        witness = _laid(figure, shaken(figure, begin, given.spread, rng), touches)
+        return (witness, touches) if witness is not None and is_free(alone(figure), witness, given.gap_m[0]) else None
 
     witness, touches = until_found(attempt)
     goals = [_goal(figure, witness, touch, turned) for touch in touches]
@@ -86,15 +67,15 @@ def _posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
 def _touches(kind: int, hand: str, rng: np.random.Generator) -> list[Touch]:
     if kind == 0:
-        return [_on_arm(hand, (-0.30, -0.22), ELBOW, rng)]
+        return [_on_arm(hand, (-0.30, -0.22), given.elbow_rad, rng)]
     if kind == 1:
-        return [_on_hip(side, rng) for side in SIDES]
-    return [_on_arm(side, (-0.34, -0.16), FRONT, rng) for side in SIDES]
+        return [_on_hip(side, rng) for side in ("left", "right")]
+    return [_on_arm(side, (-0.34, -0.16), given.front_rad, rng) for side in ("left", "right")]
 
 
 def _on_arm(hand: str, along: tuple[float, float], around: tuple[float, float], rng: np.random.Generator) -> Touch:
     """A place on the other upper arm, which goes along -z of its axes."""
-    side = OTHER[hand]
+    side = "right" if hand == "left" else "left"
     out = 1.0 if side == "left" else -1.0
     angle = rng.uniform(*around)
     normal = np.array((np.cos(angle), out * np.sin(angle), 0.0))
@@ -111,13 +92,14 @@ def _on_hip(hand: str, rng: np.random.Generator) -> Touch:
 
 
 def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
-    """A posture near q, (nq,), with the hands between `LEAST` and `MOST` from what they lie on; None if there is none.
+    """A posture near q, (nq,), with the hands some millimetres from what they lie on; None if there is none.
 
     The distances are measured, and the hands moved along the normals by what is too much or too little.
     """
     scene, dofs = alone(figure), figure.dofs("upper_body")
+    least, most = given.gap_m
     heights = [0.1] * len(touches)
-    for _ in range(TURNS):
+    for _ in range(6):
         goals = [
             wb.Relative(f"{touch.hand}_palm", touch.segment, touch.at(height), orientation=False).resolve(scene, q)
             for touch, height in zip(touches, heights, strict=True)
@@ -127,17 +109,17 @@ def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
             return None
         q = found
         gaps = [_gap(scene, q, touch) for touch in touches]
-        if all(LEAST <= gap <= MOST for gap in gaps):
+        if all(least <= gap <= most for gap in gaps):
             return q
-        heights = [height - gap + 0.5 * (LEAST + MOST) for height, gap in zip(heights, gaps, strict=True)]
+        heights = [height - gap + 0.5 * (least + most) for height, gap in zip(heights, gaps, strict=True)]
     return None
 
 
 def _gap(scene: wb.Scene, q: Array, touch: Touch) -> float:
     owners, wanted = scene.piece_owner, [{f"{touch.hand}_hand", segment} for segment in touch.near]
-    near = scene.contacts(q, within=FAR)
+    near = scene.contacts(q, within=0.5)
     found = [d for (a, b), d in zip(near.pair, near.distance, strict=True) if {owners[a], owners[b]} in wanted]
-    return float(min(found, default=FAR))
+    return float(min(found, default=0.5))
 
 
 def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relative:
@@ -146,12 +128,3 @@ def _goal(figure: wb.Figure, q: Array, touch: Touch, turned: bool) -> wb.Relativ
     state = alone(figure).state(q)
     base, hand = (pin.SE3(state.frame(figure.frame_id(name))) for name in (touch.segment, palm))
     return wb.Relative(palm, touch.segment, base.actInv(hand), orientation=turned)
-
-
-SET = ProblemSet(
-    "self_contact",
-    "self-contact",
-    "A standing person lays a hand on the other elbow, both hands on the hips, or crosses its arms: hands end a few "
-    "millimetres from the body they belong to, in half of the problems turned as asked.",
-    _posed,
-)

@@ -16,9 +16,6 @@ from wholebody.geometry.placement import placement
 from wholebody.geometry.swept_points import swept_points
 
 KINDS = ("box", "sphere", "capsule", "hull")
-SPACE = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0))  # m: where things are put around a person
-TRIES = 5000
-"""Places that are tried for one thing: many times what the most crowded postures have needed."""
 
 
 def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3) -> float:
@@ -86,18 +83,19 @@ def add_things(
     taken: Occupied,
     room: float,
     rng: np.random.Generator,
-    space: Sequence[Sequence[float]] = SPACE,
+    space: Sequence[Sequence[float]] = ((-0.6, -1.0, 0.1), (1.2, 1.0, 2.0)),
     make: Callable[[int, np.random.Generator], tuple[str, wb.Shape]] | None = None,
 ) -> None:
     """Put random things into a box of space, in any orientation, clear of what is taken up; they may cross each other.
 
-    `make` gives the kind and the shape of a thing by its number; `household_thing` where it is left out.
+    `space` is in metres; without it, around a person. `make` gives the kind and the shape of a thing by its number;
+    `household_thing` where it is left out.
 
     Raises:
         InputError: no place was found for one of them.
     """
     for number in range(count):
-        for _ in range(TRIES):
+        for _ in range(5000):  # many times what the most crowded postures have needed
             kind, shape = (make or household_thing)(number, rng)
             turn = rng.normal(size=4)
             at = (*rng.uniform(space[0], space[1]), *(turn / np.linalg.norm(turn)))

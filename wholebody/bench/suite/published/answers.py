@@ -20,7 +20,6 @@ Seed = Literal["near", "far"]
 SEEDS: tuple[Seed, ...] = ("near", "far")
 KEYS = {"format", "version", "method", "about", "machine", "kernel_seconds", "answers"}
 ANSWER_KEYS = {"problem", "seed", "posture", "postures", "seconds", "refused"}
-LARGEST = 1e6  # of a number in a posture [rad, m]; more is refused as a mistake
 LONGEST = 200  # characters of a method's name
 
 
@@ -142,7 +141,8 @@ def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
     if len(row) != count:
         raise FileFormatError(f"{where} has {len(row)} numbers; {name} takes {count}, one a coordinate of {body}")
     for place, value in enumerate(row):
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= LARGEST:
+        # A number of more than 1e6 rad or m is a mistake.
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not abs(value) <= 1e6:
             raise FileFormatError(f"{where}[{place}] is {shown(value)}; give finite radians and metres")
     q = np.array(row, dtype=float)
     if problem.free:

@@ -12,19 +12,60 @@ from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.published.reading import VERSION
-from wholebody.bench.suite.published.shapes import Meshes, described, pose_of
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
 
+Meshes = dict[str, str]
+"""Text of OBJ files by their path below the folder of an export."""
+
+
+def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
+    """What a shape of coal is called in the files; one with corners is put among the meshes under a name.
+
+    Raises:
+        InputError: a shape that the files have no word for.
+    """
+    if geometry.getSweptSphereRadius() != 0.0:
+        raise InputError(f"{name}: it has a rounding of {geometry.getSweptSphereRadius():g} m; publish it without")
+    if isinstance(geometry, coal.Box):
+        return {"type": "box", "size": [2.0 * float(half) for half in geometry.halfSide]}
+    if isinstance(geometry, coal.Sphere):
+        return {"type": "sphere", "radius": float(geometry.radius)}
+    if isinstance(geometry, coal.Capsule):
+        return {"type": "capsule", "radius": float(geometry.radius), "length": 2.0 * float(geometry.halfLength)}
+    if isinstance(geometry, coal.Ellipsoid):
+        return {"type": "ellipsoid", "semi_axes": [float(length) for length in geometry.radii]}
+    if isinstance(geometry, coal.Halfspace):
+        return {"type": "half-space", "normal": [float(x) for x in geometry.n], "offset": float(geometry.d)}
+    if isinstance(geometry, coal.ConvexBase):
+        path = f"meshes/{name.replace(' ', '-').replace(':', '-')}.obj"
+        meshes[path] = _obj(geometry)
+        return {"type": "convex", "mesh": path}
+    raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+
+
+def pose_of(place: pin.SE3) -> list[float]:
+    """A placement as x, y, z and the quaternion x, y, z, w."""
+    return [float(value) + 0.0 for value in pin.SE3ToXYZQUAT(place)]
+
+
+def _obj(convex: Any) -> str:
+    points = np.array(convex.points())
+    faces = [convex.polygons(number) for number in range(convex.num_polygons)]
+    lines = [f"v {' '.join(repr(float(value) + 0.0) for value in point)}" for point in points]
+    lines += [f"f {' '.join(str(int(face[corner]) + 1) for corner in range(3))}" for face in faces]
+    return "\n".join(lines) + "\n"
+
+
 ROOT = ("root x", "root y", "root z", "root qx", "root qy", "root qz", "root qw")
 NO_LIMIT = 1e6  # rad, m: beyond which a limit is none
-LIGHT = 1e-6  # kg: of a link that only has a place
 
 
 @dataclass(frozen=True)
@@ -154,7 +195,7 @@ def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
 
 
 def _inertial(inertia: pin.Inertia) -> list[str]:
-    if inertia.mass < LIGHT:
+    if inertia.mass < 1e-6:  # kg: of a link that only has a place
         return []
     spin = inertia.inertia
     names = (("ixx", 0, 0), ("ixy", 0, 1), ("ixz", 0, 2), ("iyy", 1, 1), ("iyz", 1, 2), ("izz", 2, 2))

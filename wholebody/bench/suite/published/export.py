@@ -19,18 +19,22 @@ from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import wilson
 from wholebody.bench.suite.problem_sets.bodies import human
 from wholebody.bench.suite.problem_sets.case import Case, ProblemSet, generator
-from wholebody.bench.suite.problem_sets.difficulty import away, descended
 from wholebody.bench.suite.published.bodies import BodyFiles, body_files
-from wholebody.bench.suite.published.problems import problem_content, problem_name, witness_content
+from wholebody.bench.suite.published.problems import (
+    away,
+    descended,
+    far_seed,
+    problem_content,
+    problem_name,
+    witness_content,
+)
 from wholebody.bench.suite.published.reading import INDEX, VERSION, dumped
 from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
-from wholebody.bench.suite.published.seeds import far_seed
 
 STATIC = Path(__file__).parent / "static"
 NAMES = ("problem", "body", "answers", "verdict")
 """Schemas that are published: `NAME.schema.json`."""
 
-BEST_TOLERANCE = 1e-7  # m, rad: asked of the solve that finds an effort to compare with
 DIGITS = 9  # of efforts and distances: what is left of the last digits is rounding
 
 
@@ -176,7 +180,8 @@ def _best(case: Case, body: BodyFiles, rebuilt: Rebuilt, proof: Score) -> float:
     """Least effort known: of the witness, and of an exact answer of our own method, without a limit of time."""
     problem = copy.copy(case.problem)
     problem.measures = tuple(term for term in problem.measures if isinstance(term, wb.Effort))
-    found = wb.QP(tolerance=BEST_TOLERANCE, time_limit=math.inf).solve(problem)
+    # The effort to compare with is that of an exact answer.
+    found = wb.QP(tolerance=1e-7, time_limit=math.inf).solve(problem)
     score = rebuilt.score(np.array(body.posture(found.q)))
     return min(proof.effort, score.effort) if score.worst <= EXACT else proof.effort
 

@@ -1,22 +1,22 @@
-"""What a file of answers is worth: every answer scored by the files alone, and shares with intervals for every set."""
+"""What a file of answers is worth: every answer scored by the files alone, shares with intervals, and both in words."""
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from math import inf, isfinite, nan
 from pathlib import Path
 from typing import Any
 
+from wholebody.bench.report import formatted, spanned, words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
 from wholebody.bench.suite.published.reading import VERSION, read_index, read_json
 from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, worst_of
 from wholebody.bench.tables import flat
 
-FINE = 1e-4  # m, rad: the stricter of the two accuracies
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time
-SHARE = ("share_low", "share_high")  # in the file of a verdict, low and high alone
 ANSWERED, REFUSED, UNANSWERED = "answered", "refused", "unanswered"
 NONE = Score(inf, inf, inf, inf, inf, inf, inf)
 
@@ -131,7 +131,8 @@ def _judged(folder: Path, name: str, seed: str, answer: Answer | None, best: flo
     score = worst_of([problem.score(q, frame) for frame, q in enumerate(answer.postures)])
     solved = score.worst <= SOLVED
     above = score.effort / best - 1.0 if solved and best else nan
-    return Judged(name, seed, ANSWERED, "", score, solved, score.worst <= FINE, above, answer.seconds)
+    # 1e-4 m and rad is the stricter of the two accuracies.
+    return Judged(name, seed, ANSWERED, "", score, solved, score.worst <= 1e-4, above, answer.seconds)
 
 
 def set_score(name: str, seed: str, mine: Sequence[Judged]) -> SetScore:
@@ -181,7 +182,11 @@ def as_json(verdict: Verdict) -> dict[str, Any]:
 
 
 def _row(row: SetScore) -> dict[str, Any]:
-    return {name.removeprefix("share_") if name in SHARE else name: value for name, value in flat(row).items()}
+    # In the file of a verdict they are low and high alone.
+    return {
+        name.removeprefix("share_") if name in ("share_low", "share_high") else name: value
+        for name, value in flat(row).items()
+    }
 
 
 def _answer(one: Judged) -> dict[str, Any]:
@@ -196,3 +201,64 @@ def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {name: _plain(item) for name, item in value.items()}
     return [_plain(item) for item in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
+
+
+CRITERIA = {
+    "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
+    "limits": "joint limits", "holds": "holds and balance",
+}  # fmt: skip
+
+COLUMNS = (
+    "problems", "seed", "asked", "refused", "unanswered", "solved %", "to 1e-4 %", "worst error", "overlap mm",
+    "effort above best %", "median ms", "mean ms",
+)  # fmt: skip
+
+
+def cells(row: SetScore) -> tuple[str, ...]:
+    """A row of a table, each figure with its interval of 95 %."""
+    return (
+        words(row.set),
+        row.seed,
+        str(row.problems),
+        str(row.refused or ""),
+        str(row.unanswered or ""),
+        spanned(row.share, ".0f", 100.0),
+        spanned(row.share_fine, ".0f", 100.0),
+        spanned(row.worst, ".0e"),
+        formatted(1e3 * row.overlap, ".2g"),
+        spanned(row.effort_above, ".2g", 100.0),
+        spanned(row.seconds, ".3g", 1e3),
+        spanned(row.mean_seconds, ".3g", 1e3),
+    )
+
+
+def left_out(verdict: Verdict) -> list[str]:
+    """Sentences on refusals, on problems without an answer, and on why answers are none."""
+    said = []
+    reasons: dict[str, list[str]] = {}
+    for one in verdict.judged:
+        if one.outcome == REFUSED:
+            reasons.setdefault(one.said, []).append(one.problem)
+    for reason, problems in reasons.items():
+        said.append(f"Refused {len(problems)}, {problems[0]} first: {reason}")
+    silent = [one.problem for one in verdict.judged if one.outcome == UNANSWERED]
+    if silent:
+        said.append(f"Without an answer, and so not solved: {len(silent)}, {silent[0]} first.")
+    failed = Counter(_worst(one.score) for one in verdict.judged if one.outcome == ANSWERED and not one.solved)
+    if failed:
+        listed = ", ".join(f"{name} {count}" for name, count in failed.most_common())
+        said.append(f"Answered and not solved: {failed.total()}; what is worst of each: {listed}.")
+    # A joint that is more than a turn out of its limits was hardly meant.
+    far = [one for one in verdict.judged if one.outcome == ANSWERED and one.score.limits > 6.3]
+    if far:
+        how = f"{len(far)}, {far[0].problem} first, by {far[0].score.limits:.3g}"
+        said.append(f"Far out of the joint limits: {how}; a posture is in radians and metres, in the body's order.")
+    timed = [row for row in verdict.sets if isfinite(row.seconds.value)]
+    if timed:
+        said.append("The mean time is the shifted geometric mean; a problem that is not solved counts 10 s.")
+    return said
+
+
+def _worst(score: Score) -> str:
+    """What an answer misses most, in words."""
+    return CRITERIA[max(CRITERIA, key=lambda name: float(getattr(score, name)))]

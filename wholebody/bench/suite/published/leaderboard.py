@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import inf, isfinite
+from math import isfinite
 from pathlib import Path
 
 from numpy import nan_to_num
@@ -14,21 +14,25 @@ from wholebody.base.files import is_folder
 from wholebody.base.records import with_values
 from wholebody.bench import plot_style
 from wholebody.bench.plot_style import Style, method_style
-from wholebody.bench.report import render, spanned, words
-from wholebody.bench.statistics import Ranking, ranking, ratio
-from wholebody.bench.suite.compare.pages import write_page
-from wholebody.bench.suite.compare.rankings import in_words
+from wholebody.bench.report import page, render, spanned, words
+from wholebody.bench.statistics import ratio
 from wholebody.bench.suite.published.answers import read_answers
-from wholebody.bench.suite.published.judging import ANSWERED, Judged, SetScore, Verdict, judge, set_score
+from wholebody.bench.suite.published.judging import (
+    ANSWERED,
+    Judged,
+    SetScore,
+    Verdict,
+    cells,
+    judge,
+    left_out,
+    set_score,
+)
 from wholebody.bench.suite.published.reading import read_index
 from wholebody.bench.suite.published.rebuilt import EXACT
-from wholebody.bench.suite.published.words import cells, left_out
 from wholebody.bench.tables import write_text
 
 PAGE = "leaderboard.html"
 MOST = 6  # methods in a chart
-SPARE = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99", "#332288", "#88ccee", "#cc6677", "#ddcc77")
-LEAST_TIME = 1e-6  # s: times below are not told apart
 
 
 @dataclass(frozen=True)
@@ -39,14 +43,12 @@ class Board:
         set, seed: which.
         rows: the methods that take part, those that solve most first.
         leading: methods whose share is not below the greatest by more than chance, the greatest first.
-        ranking: by time, of those that told their times and took every problem.
     """
 
     set: str
     seed: str
     rows: tuple[tuple[str, SetScore], ...]
     leading: tuple[str, ...]
-    ranking: Ranking | None
 
 
 def judge_folder(folder: Path, problems: Path) -> list[Verdict]:
@@ -101,7 +103,7 @@ def boards(verdicts: Sequence[Verdict], sets: Sequence[str]) -> list[Board]:
             rows = [(v.answers.method, row) for v in verdicts for row in v.sets if (row.set, row.seed) == (name, seed)]
             if rows:
                 rows.sort(key=lambda entry: (-nan_to_num(entry[1].share.value, nan=-1.0), entry[1].mean_seconds.value))
-                made.append(Board(name, seed, tuple(rows), _leading(rows), _ranked(verdicts, name, seed)))
+                made.append(Board(name, seed, tuple(rows), _leading(rows)))
     return made
 
 
@@ -112,18 +114,6 @@ def _leading(rows: Sequence[tuple[str, SetScore]]) -> tuple[str, ...]:
         return ()
     low = max(row.share.low for _, row in whole)
     return tuple(name for name, row in whole if row.share.high >= low)
-
-
-def _ranked(verdicts: Sequence[Verdict], name: str, seed: str) -> Ranking | None:
-    costs = {}
-    for verdict in verdicts:
-        mine = [one for one in verdict.judged if (one.set, one.seed) == (name, seed)]
-        timed = any(isfinite(one.seconds) for one in mine)
-        if mine and timed and all(one.outcome != "refused" for one in mine):
-            costs[verdict.answers.method] = [
-                one.seconds if one.solved and isfinite(one.seconds) else inf for one in mine
-            ]
-    return ranking(costs)
 
 
 def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
@@ -138,17 +128,14 @@ def sentences(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     below = [name for name, row in board.rows if name not in board.leading and not row.refused]
     if below:
         said.append(f"{', '.join(below)} {'solves' if len(below) == 1 else 'solve'} fewer.")
-    said += _faster(board, verdicts)
-    if board.ranking:
-        said.append(f"Mean ranks by time, 1 being the fastest: {in_words(board.ranking)}")
-    return said
+    return said + _faster(board, verdicts)
 
 
 def _faster(board: Board, verdicts: Sequence[Verdict]) -> list[str]:
     """The time of the others over that of the first, on the problems that both solve."""
     times = {
         verdict.answers.method: {
-            (one.problem, 0): max(one.seconds, LEAST_TIME)
+            (one.problem, 0): max(one.seconds, 1e-6)
             for one in verdict.judged
             if (one.set, one.seed) == (board.set, board.seed) and one.solved and isfinite(one.seconds)
         }
@@ -173,11 +160,11 @@ def publish(verdicts: Sequence[Verdict], problems: Path, out: Path) -> list[Boar
     charts = _charts(verdicts, found, out)
     text = render(
         "leaderboard.md", boards=found, verdicts=verdicts, index=index, cells=cells, left_out=left_out,
-        sentences=lambda board: sentences(board, verdicts), words=words,
+        sentences=lambda board: sentences(board, verdicts), charts=list(charts),
         units={verdict.answers.method: _in_kernels(verdict) for verdict in verdicts},
     )  # fmt: skip
     write_text(out / "leaderboard.md", text + "\n")
-    write_page(out / PAGE, "Leaderboard", text, charts, [])
+    write_text(out / PAGE, page("Leaderboard", text, charts) + "\n")
     return found
 
 
@@ -187,7 +174,7 @@ def _in_kernels(verdict: Verdict) -> float:
     return seconds[len(seconds) // 2] / verdict.answers.kernel_seconds if seconds else float("nan")
 
 
-def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> list[Path]:
+def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> dict[str, Path]:
     """One row a set and seed: shares and mean times with their intervals; at most six methods a chart."""
     names = [verdict.answers.method for verdict in verdicts]
     seen = styles(names)
@@ -197,11 +184,11 @@ def _charts(verdicts: Sequence[Verdict], found: Sequence[Board], out: Path) -> l
         }
         for board in found
     }
-    drawn = []
+    drawn = {}
     for first in range(0, len(names), MOST):
         part = {name: seen[name] for name in names[first : first + MOST]}
         path = out / "charts" / f"leaderboard-{first // MOST + 1}"
-        drawn.append(plot_style.shares_and_times(rows, part, "one that is not solved counts 10 s", "", path)[0])
+        drawn[path.name] = plot_style.shares_and_times(rows, part, "one that is not solved counts 10 s", "", path)[0]
     return drawn
 
 
@@ -211,7 +198,7 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
     for name in names:
         style = method_style(name)
         taken = {other.color for other in found.values()}
-        free = (other for other in SPARE if other not in taken)
+        free = (other for other in plot_style.OTHERS if other not in taken)
         found[name] = style if style.color not in taken else with_values(style, color=next(free, style.color))
     return found
 

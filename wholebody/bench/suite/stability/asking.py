@@ -1,4 +1,7 @@
-"""Asks methods hard questions, each in a process of its own: what hangs or crashes costs one cell and a time."""
+"""Asks methods hard questions, each in a process of its own, and measures the answers on questions made anew.
+
+What hangs or crashes costs one cell and a time. Answers are measured by the independent assessment and the sweep.
+"""
 
 from __future__ import annotations
 
@@ -8,17 +11,112 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from wholebody.assessment.motion import depth_between, velocities
+from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.compiled import compile_all
 from wholebody.base.errors import WholebodyError
 from wholebody.base.runner import BY_THE_CLOCK, Child, EndedError, Job, allow_processor, run_jobs, tell
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.case import NOTHING, Answer, HardCase, Nonsense, Posed, Stream
-from wholebody.bench.suite.stability.judging import Judged, judge
+from wholebody.problem import Problem
+from wholebody.tasks import Point
 from wholebody.tracking.drag import Drag
+
+INSIDE = 1e-4  # m: deeper than this is inside
+
+
+@dataclass(frozen=True)
+class Judged:
+    """What an answer measures, the worst of all frames where there are several.
+
+    Attributes:
+        finite: whether it is made of numbers.
+        goal_error: largest goal error at the end [m, rad].
+        penetration: deepest overlap [m].
+        start_penetration: deepest overlap at the start [m]; 0 for a stream.
+        limit_violation: farthest out of a joint's limits [rad, m].
+        constraint_violation: farthest from what must hold [m, rad].
+        speed_excess: by how much the fastest joint is too fast, as a share of what is allowed.
+        passed: what it went into between frames, in words; "" for nothing.
+        dip: how deep, at the deepest [m].
+        misreported: largest difference between what it says is left and what is [m, rad].
+    """
+
+    finite: bool = True
+    goal_error: float = 0.0
+    penetration: float = 0.0
+    start_penetration: float = 0.0
+    limit_violation: float = 0.0
+    constraint_violation: float = 0.0
+    speed_excess: float = 0.0
+    passed: str = ""
+    dip: float = 0.0
+    misreported: float = 0.0
+
+
+def judge(case: HardCase, answer: Answer) -> Judged:
+    """Measure an answer; nothing where there is no posture."""
+    question = case.question()
+    if isinstance(question, Nonsense) or not len(answer.postures):
+        return Judged()
+    if not np.isfinite(answer.postures).all():
+        return Judged(finite=False, goal_error=float("nan"))
+    if isinstance(question, Posed):
+        return _measured(question.problem, answer)
+    return _followed(question, answer)
+
+
+def _measured(problem: Problem, answer: Answer) -> Judged:
+    found = assess(problem, answer.postures[0])
+    left = _left(found)
+    return Judged(
+        goal_error=left,
+        penetration=found.penetration,
+        start_penetration=assess(problem, problem.scene.figure.clamp(problem.start)).penetration,
+        limit_violation=found.limit_violation,
+        constraint_violation=found.constraint_violation,
+        misreported=abs(left - answer.left[0]),
+    )
+
+
+def _followed(question: Stream, answer: Answer) -> Judged:
+    problem, scene = question.problem, question.problem.scene
+    first = problem.goals[0]
+    assert isinstance(first, Point)
+    found: list[Assessment] = []
+    passed, deepest_way, excess, misreported = "", 0.0, 0.0, 0.0
+    before = scene.figure.clamp(problem.start)
+    for number, (frame, q) in enumerate(zip(question.frames, answer.postures, strict=True)):
+        for name, place in frame.moved.items():
+            scene.move(name, at=place)
+        # The straight way between two postures may go in deeper than its ends by 1 mm.
+        depth, owners = depth_between(scene, before, q, 1e-3)
+        if depth > deepest_way:
+            passed, deepest_way = f"{owners}, frame {number}", depth
+        problem.retarget([Point(first.frame, frame.target)])
+        found.append(assess(problem, q))
+        misreported = max(misreported, abs(_left(found[-1]) - answer.left[number]))
+        speed = np.abs(velocities(scene.model, np.array([before, q]), question.dt)).max()
+        excess = max(excess, float(speed / question.speed - 1.0))
+        before = q
+    return Judged(
+        goal_error=_left(found[-1]),
+        penetration=max(each.penetration for each in found),
+        limit_violation=max(each.limit_violation for each in found),
+        constraint_violation=max(each.constraint_violation for each in found),
+        speed_excess=excess,
+        passed=passed,
+        dip=deepest_way,
+        misreported=misreported,
+    )
+
+
+def _left(found: Assessment) -> float:
+    return max(found.goal_error, found.goal_angle)
+
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
 CAP = 20.0  # s of the processor: a method that has not answered by then, or has not made its next frame, hangs
-JUDGING = 120.0  # s of the processor: a judgement of many frames, all pairs of each
 
 
 @dataclass(frozen=True)
@@ -62,7 +160,7 @@ def _cell(case: HardCase, adapter: Adapter, cap: float) -> Judged:
     """Ask, send the answer, then judge it: the time of the method ends with the answer."""
     allow_processor(cap)
     answer = ask(case, adapter, lambda: allow_processor(cap))
-    allow_processor(JUDGING)
+    allow_processor(120.0)  # s of the processor: a judgement of many frames, all pairs of each
     tell(answer)
     return judge(case, answer)
 

@@ -21,8 +21,6 @@ JOINTS = {
 
 TURN = 2.9  # rad: limit of a joint if nothing else is said
 SLIDE = 2.0  # m
-THICK = 0.04  # m: radius of an arm in space
-COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
 class Builder:
@@ -52,7 +50,7 @@ class Builder:
         segment = f"{self.model.names[joint]}_link"
         name = f"{segment}:{sum(piece.parentJoint == joint for piece in self.geometry.geometryObjects)}"
         made = pin.GeometryObject(name, joint, self.model.getFrameId(segment), place, geometry)
-        made.meshColor[:] = COLOR
+        made.meshColor[:] = (0.62, 0.66, 0.70, 1.0)
         self.geometry.addGeometryObject(made)
 
     def shape(self, joint: int, shape: Shape, at: pin.SE3 | None = None) -> None:
@@ -120,7 +118,7 @@ def spatial_arm() -> Figure:
         ("rz", "roll", 0.15, 0.8), ("ry", "pitch", 0.1, 0.7), ("rz", "hand", 0.08, 0.6),
     ):  # fmt: skip
         joint = builder.joint(kind, name, parent=joint, at=(0.0, 0.0, at))
-        builder.rod(joint, (0.0, 0.0, length), share * THICK)
+        builder.rod(joint, (0.0, 0.0, length), share * 0.04)  # m: radius of an arm in space
         at = 0.2 if name == "base" else length  # the shoulder is a little above the end of the base
     builder.frame(joint, "tip", (0.0, 0.0, at))
     return builder.figure()

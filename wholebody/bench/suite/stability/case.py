@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeVar
+from typing import Literal, TypeVar
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.problem import Problem
 
-Kind = Literal["solved", "honest", "refusal", "adapter", "wrong"]
+Kind = Literal["solved", "honest", "refusal", "wrong"]
 
 FRAME = 1.0 / 60.0  # s: a frame of a screen
 
@@ -54,14 +54,12 @@ class Stream:
         frames: where the goal and the things are.
         dt: seconds a frame.
         speed: most that a joint may move [rad/s]; inf where nothing bounds it.
-        shown: the frame to draw; negative numbers count from the end.
     """
 
     problem: Problem
     frames: tuple[Frame, ...]
     dt: float = FRAME
     speed: float = np.inf
-    shown: int = -1
 
 
 @dataclass(frozen=True)
@@ -70,11 +68,9 @@ class Nonsense:
 
     Attributes:
         attempts: what is given, in words, to a call that gives it to a method.
-        problem: the same with sense in it, for a picture.
     """
 
     attempts: Mapping[str, Callable[[Adapter], object]]
-    problem: Problem
 
 
 Question = Posed | Stream | Nonsense
@@ -88,19 +84,16 @@ class HardCase:
     Attributes:
         name: as typed at the command line.
         group: heading under which it stands.
-        title: as written over its picture.
+        title: its heading.
         why: why it is hard.
         acceptable: what an acceptable answer is, in words.
         question: what is asked, made anew at each call: what a method does to it does not reach the judge.
-        drawn: what is drawn with an answer's postures, where that is not what is asked.
         expected: the best verdict that there can be.
         also: verdicts that are acceptable besides.
         best: goal error of the best possible answer [m, rad]; None where only the best answer of all is known.
         near: by how much an honest best effort may miss the best known answer and still be as good as it [m, rad].
         tolerance: to which an answer counts as solved [m, rad].
         can_hold: whether all constraints can hold together.
-        see_through: things that are drawn transparent because they would hide what is to be seen.
-        eye: (3,) direction from which one looks at it.
     """
 
     name: str
@@ -109,15 +102,12 @@ class HardCase:
     why: str
     acceptable: str
     question: Callable[[], Question]
-    drawn: Callable[[], Question] | None = None
     expected: Kind = "solved"
     also: tuple[Kind, ...] = ()
     best: float | None = 0.0
     near: float = 1e-3
     tolerance: float = 1e-4
     can_hold: bool = True
-    see_through: tuple[str, ...] = ()
-    eye: tuple[float, float, float] = (0.35, -1.0, 0.3)
 
     def accepts(self, kind: Kind, miss: float) -> bool:
         """Whether an answer is acceptable.
@@ -129,23 +119,18 @@ class HardCase:
         return kind in self.also or (kind == self.expected and (kind != "honest" or miss <= self.near))
 
 
-class Group:
-    """Cases under one heading, in the order of reports."""
+QUESTIONS: dict[str, Callable[[], Question]] = {}
+"""What each case asks, by its name."""
 
-    def __init__(self, title: str, **shared: Any) -> None:
-        """Begin with none; `shared` are attributes that all of them have."""
-        self.title, self.shared = title, shared
-        self.cases: list[HardCase] = []
 
-    def case(self, name: str, title: str, *, why: str, acceptable: str, **facts: Any) -> Callable[[_Ask], _Ask]:
-        """Make the case that asks what the decorated function returns; `facts` are further attributes."""
+def asks(name: str) -> Callable[[_Ask], _Ask]:
+    """Make the decorated function the question of a case; `cases.toml` has all else of it."""
 
-        def added(question: _Ask) -> _Ask:
-            facts.update(self.shared)
-            self.cases.append(HardCase(name, self.title, title, why, acceptable, question, **facts))
-            return question
+    def kept(question: _Ask) -> _Ask:
+        QUESTIONS[name] = question
+        return question
 
-        return added
+    return kept
 
 
 def still(target: tuple[float, float, float], count: int) -> tuple[Frame, ...]:

@@ -1,68 +1,42 @@
-"""Hard problems that are solved once: singular postures, goals out of reach, wrong starts, and contact itself."""
+"""Hard problems that are solved once: singular postures, goals out of reach, wrong starts, contact, loops, numbers."""
 
 from __future__ import annotations
 
 from functools import partial
+from math import inf, nan
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.bench.suite.stability.bodies import human_arm, planar_arm, sliding_tool, spatial_arm, turned
-from wholebody.bench.suite.stability.case import Group, Posed
+from wholebody.bench.suite.adapters.base import Adapter
+from wholebody.bench.suite.stability.bodies import Builder, human_arm, planar_arm, sliding_tool, spatial_arm, turned
+from wholebody.bench.suite.stability.case import FRAME, Nonsense, Posed, asks
+from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Box, Sphere
+from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
-from wholebody.tasks import Orientation, Point
+from wholebody.tasks import Hold, Orientation, Point
+from wholebody.tracking.drag import Drag
 
-SINGULAR = Group("Singular postures")
-OUT_OF_REACH = Group("Goals out of reach")
-STARTS = Group("Starts that are wrong")
-CONTACT = Group("Contact")
-
-LENGTHS = (0.5, 0.4, 0.3)
-REACH = sum(LENGTHS)
+LENGTHS, RADIUS = (0.5, 0.4, 0.3), 0.03  # m: of the links of an arm
 BENT = np.array([-0.6, 0.8, 0.5])
-RADIUS = 0.03
-ABOVE_BLOCK = "Solved: the goal is 10 cm above the block. Less good: an honest answer no deeper than the start."
-DOWN = np.array([0.5, 0.5, 0.57])  # of an arm whose last link is straight down
-BACK = (-0.154, -0.0056, 1.0116)  # m: place of the fingertip in a witness posture behind the back
-TIP_DOWN = np.arccos(1.0 / np.sqrt(3.0))  # rad: by which a cube's diagonal leans from its face's normal
 
 
-@SINGULAR.case(
-    "straight-arm",
-    "Straight-arm singularity",
-    why="The goal is a micrometre short of full stretch. Where the arm is straight no joint moves the tip along it, so "
-    "the last stretch is quadratic in the joints: 1 µm of reach is a bend of 2 mrad, and a method that inverts the "
-    "Jacobian asks for enormous steps.",
-    acceptable="Solved: the goal can be reached.",
-)
+@asks("straight-arm")
 def straight_arm() -> Posed:
     """An arm bent at the start."""
     scene = Scene(planar_arm(LENGTHS))
     return Posed(Problem(scene, BENT, goals=[Point("tip", (sum(LENGTHS) - 1e-6, 0.0, 0.0))]))
 
 
-@SINGULAR.case(
-    "collinear-start",
-    "CCD's collinear start",
-    why="The arm is straight and the goal lies on its line, nearer to the shoulder. Every joint's gradient is exactly "
-    "zero: coordinate descent does not move, and Gauss-Newton steps are zero too, although half the workspace "
-    "leads to the goal.",
-    acceptable="Solved: any bend away from the line leads there.",
-)
+@asks("collinear-start")
 def collinear_start() -> Posed:
     """A straight arm, and a goal at half its length."""
     return Posed(Problem(Scene(planar_arm(LENGTHS)), np.zeros(3), goals=[Point("tip", (0.6, 0.0, 0.0))]))
 
 
-@SINGULAR.case(
-    "goal-on-axis",
-    "Goal on a joint's axis",
-    why="The goal is straight above the base, on the axis about which the whole arm turns. At the goal that joint "
-    "moves nothing, and near it a small sideways error asks for a large turn.",
-    acceptable="Solved: shoulder and elbow alone can reach it.",
-)
+@asks("goal-on-axis")
 def on_the_axis() -> Posed:
     """An arm that reaches forward."""
     scene = Scene(spatial_arm())
@@ -70,17 +44,7 @@ def on_the_axis() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("tip", (0.0, 0.0, 0.95))]))
 
 
-@SINGULAR.case(
-    "goal-at-shoulder",
-    "Goal at the shoulder",
-    why="A fingertip is asked into the middle of its own shoulder, which stays where it is. The direction from the "
-    "joint to the goal has no length, and the body is in the way.",
-    acceptable="An honest best effort: nothing can be there; near the best known answer and outside the body.",
-    expected="honest",
-    best=None,
-    near=0.01,
-    eye=(1.0, -0.8, 0.35),
-)
+@asks("goal-at-shoulder")
 def at_the_shoulder() -> Posed:
     """A person with the arm forward."""
     figure = human_arm(clavicle=False)
@@ -89,13 +53,7 @@ def at_the_shoulder() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("right_index_tip", shoulder)]))
 
 
-@SINGULAR.case(
-    "gimbal",
-    "Gimbal posture",
-    why="The wrist is straight, which makes its first and its third axis one. The hand is to "
-    "turn about the direction that has been lost: at first no joint does that, and the way there is a detour.",
-    acceptable="Solved: another combination of the three joints has this orientation.",
-)
+@asks("gimbal")
 def gimbal() -> Posed:
     """Roll, pitch and hand of an arm with the pitch at zero: roll and hand are one axis."""
     scene = Scene(spatial_arm())
@@ -109,84 +67,38 @@ def gimbal() -> Posed:
 def _beyond(by: float) -> Posed:
     """A bent arm, and a goal beyond full stretch in another direction."""
     way = np.array([np.cos(0.7), 0.0, np.sin(0.7)])
-    return Posed(Problem(Scene(planar_arm(LENGTHS)), BENT, goals=[Point("tip", (REACH + by) * way)]))
+    return Posed(Problem(Scene(planar_arm(LENGTHS)), BENT, goals=[Point("tip", (sum(LENGTHS) + by) * way)]))
 
 
-OUT_OF_REACH.case(
-    "out-by-1-mm",
-    "Out of reach by 1 mm",
-    why="The goal is 1 mm beyond full stretch: the nearest posture is singular, the error cannot vanish, and it is so "
-    "small that a careless test calls it solved.",
-    acceptable="An honest best effort: the arm straight towards the goal, 1 mm left.",
-    expected="honest",
-    best=1e-3,
-)(partial(_beyond, 1e-3))
+asks("out-by-1-mm")(partial(_beyond, 1e-3))
 
 
-OUT_OF_REACH.case(
-    "out-by-1-m",
-    "Out of reach by 1 m",
-    why="The goal is 1 m beyond full stretch. The pull never ends: steps that follow it fully thrash from limit to "
-    "limit, and every method is at a singular posture where it should come to rest.",
-    acceptable="An honest best effort: the arm straight towards the goal, 1 m left.",
-    expected="honest",
-    best=1.0,
-)(partial(_beyond, 1.0))
+asks("out-by-1-m")(partial(_beyond, 1.0))
 
 
-@OUT_OF_REACH.case(
-    "inside-obstacle",
-    "Goal inside an obstacle",
-    why="The goal is in the middle of a box: what pulls and what pushes balance, and a soft contact gives way.",
-    acceptable="An honest best effort: the tip at the box, outside of it.",
-    expected="honest",
-    best=None,
-    near=0.005,
-    see_through=("box",),
-)
+@asks("inside-obstacle")
 def inside_an_obstacle() -> Posed:
     """A box of 20 cm before an arm."""
     scene = Scene(planar_arm(LENGTHS)).add(Box((0.2, 0.4, 0.2)), name="box", at=(0.75, 0.0, 0.3))
     return Posed(Problem(scene, np.array([0.3, 0.8, 0.5]), goals=[Point("tip", (0.75, 0.0, 0.3))]))
 
 
-@OUT_OF_REACH.case(
-    "conflict",
-    "Two goals that conflict",
-    why="One fingertip is asked to two places 20 cm apart. Both goals can be met alone; together they have no answer.",
-    acceptable="An honest best effort: half way, 10 cm from each.",
-    expected="honest",
-    best=0.1,
-    near=1e-3,
-)
+@asks("conflict")
 def conflict() -> Posed:
     """Two goals of equal weight within reach."""
     goals = [Point("tip", (0.7, 0.0, 0.3)), Point("tip", (0.7, 0.0, 0.5))]
     return Posed(Problem(Scene(planar_arm(LENGTHS)), BENT, goals=goals))
 
 
-@OUT_OF_REACH.case(
-    "behind-the-back",
-    "Behind the back, with limits in between",
-    why="The hand begins in front and is to go to the small of the back. The straight way leads through the trunk and "
-    "ends at limits of the shoulder; the way round leads away from the goal first.",
-    acceptable="Solved: the place was taken from a posture without overlap within all limits.",
-    eye=(-1.0, -0.7, 0.35),
-)
+@asks("behind-the-back")
 def behind_the_back() -> Posed:
     """A person with the arm forward."""
     figure = human_arm()
-    goal = Point("right_index_tip", BACK)
+    goal = Point("right_index_tip", (-0.154, -0.0056, 1.0116))
     return Posed(Problem(Scene(figure), figure.posture("arms_forward"), goals=[goal]))
 
 
-@OUT_OF_REACH.case(
-    "long-way-round",
-    "The long way round a limit",
-    why="The goal is 40 degrees further than the shoulder's limit lets it turn, and 320 degrees back the other way. "
-    "Every step towards the goal presses against the limit.",
-    acceptable="Solved: within the limits on the other side.",
-)
+@asks("long-way-round")
 def the_long_way_round() -> Posed:
     """A stiff arm of two joints, the first one near its limit of 160 degrees either way."""
     limit = np.radians(160.0)
@@ -197,54 +109,24 @@ def the_long_way_round() -> Posed:
 
 def _inside(depth: float) -> Posed:
     """An arm whose last link begins in a block that is far wider than the link is deep in it."""
-    figure = planar_arm((0.5, 0.4, 0.4), RADIUS, base=(0.0, 0.0, 0.9))
+    figure, down = planar_arm((0.5, 0.4, 0.4), RADIUS, base=(0.0, 0.0, 0.9)), np.array([0.5, 0.5, 0.57])
     scene = Scene(figure)
-    tip = scene.state(DOWN).frame(figure.frame_id("tip")).translation.copy()
+    tip = scene.state(down).frame(figure.frame_id("tip")).translation.copy()
     top = tip[2] - RADIUS + depth
     scene.add(Box((1.0, 0.8, 0.8)), name="block", at=(tip[0], 0.0, top - 0.4))
-    return Posed(Problem(scene, DOWN, goals=[Point("tip", (tip[0], 0.0, top + 0.1))]))
+    return Posed(Problem(scene, down, goals=[Point("tip", (tip[0], 0.0, top + 0.1))]))
 
 
-STARTS.case(
-    "start-1-mm-inside",
-    "Start 1 mm inside",
-    why="The tip begins 1 mm inside a block: methods that take only feasible starts give up, and barriers are "
-    "infinite.",
-    acceptable=ABOVE_BLOCK,
-)(partial(_inside, 1e-3))
+asks("start-1-mm-inside")(partial(_inside, 1e-3))
 
 
-STARTS.case(
-    "start-5-cm-inside",
-    "Start 5 cm inside",
-    why="The tip begins 5 cm inside a block, more than its own radius: the nearest surface is no longer the one "
-    "beside it.",
-    acceptable=ABOVE_BLOCK,
-)(partial(_inside, 0.05))
+asks("start-5-cm-inside")(partial(_inside, 0.05))
 
 
-STARTS.case(
-    "start-30-cm-inside",
-    "Start 30 cm inside",
-    why="Most of the last link begins inside a block. Linearised contacts are trusted over a few centimetres, and the "
-    "way out is longer.",
-    acceptable=ABOVE_BLOCK,
-    see_through=("block",),
-)(partial(_inside, 0.3))
+asks("start-30-cm-inside")(partial(_inside, 0.3))
 
 
-@STARTS.case(
-    "cancelling-normals",
-    "Convex pieces whose normals cancel",
-    why="A fork is pushed over a plate that is thicker than its gap. Each prong overlaps the plate from its own side; "
-    "the two normals are opposed and add up to nothing (figure 4b of Schmidl and Lin's paper), although the fork "
-    "only has to be pulled back.",
-    acceptable="An honest best effort: the fork pulled back by its 12 cm, off the plate.",
-    expected="honest",
-    best=0.12,
-    near=0.002,
-    see_through=("plate",),
-)
+@asks("cancelling-normals")
 def cancelling() -> Posed:
     """The goal keeps the fork where it is, so that nothing but the contact moves it."""
     prong = Box((0.30, 0.12, 0.06))
@@ -256,16 +138,7 @@ def cancelling() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("tool", (0.0, 0.0, 0.5))]))
 
 
-@STARTS.case(
-    "coincident-centres",
-    "Coincident centres",
-    why="A ball begins exactly in the middle of another one, and its goal is there. Every way out is as good as any "
-    "other: the normal is zero divided by zero.",
-    acceptable="An honest best effort: the balls touching, 10 cm from middle to middle, in any direction.",
-    expected="honest",
-    best=0.1,
-    near=0.001,
-)
+@asks("coincident-centres")
 def coincident() -> Posed:
     """Both of 5 cm."""
     scene = Scene(sliding_tool((Sphere(0.05), pin.SE3.Identity())))
@@ -274,27 +147,14 @@ def coincident() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("tool", (0.0, 0.0, 0.5))]))
 
 
-@STARTS.case(
-    "out-of-limits",
-    "Start out of limits",
-    why="Two joints begin 0.5 rad beyond their limits, as postures from a tracker or another model do. Bounds on the "
-    "first step contradict each other where they are taken at their word.",
-    acceptable="Solved, within all limits.",
-)
+@asks("out-of-limits")
 def out_of_limits() -> Posed:
     """An arm of six joints."""
     start = np.array([3.4, 0.5, 0.9, 0.0, 0.5, -3.4])
     return Posed(Problem(Scene(spatial_arm()), start, goals=[Point("tip", (0.5, 0.2, 0.6))]))
 
 
-@CONTACT.case(
-    "non-convex-corner",
-    "Non-convex corner",
-    why="The goal is in the inner corner of a floor and a wall, 1 mm from touching both. Two contacts hold the tip at "
-    "once, their active set changes from step to step, and methods that leave one contact at a time go to and fro.",
-    acceptable="Solved: there is 1 mm of room.",
-    eye=(-0.6, -1.0, 0.6),
-)
+@asks("non-convex-corner")
 def corner() -> Posed:
     """An arm over the corner."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3), RADIUS, base=(0.0, 0.0, 0.6)))
@@ -304,14 +164,7 @@ def corner() -> Posed:
     return Posed(Problem(scene, np.array([-1.0, 1.6, 0.8]), goals=[goal]))
 
 
-@CONTACT.case(
-    "narrow-passage",
-    "Passage 2 mm wider than the limb",
-    why="The goal is 20 cm deep in a slot with 1 mm of room on either side. The last link has to be straight in line "
-    "with the slot before it enters; nearly all postures near the goal overlap.",
-    acceptable="Solved: the arm fits.",
-    see_through=("upper block", "lower block"),
-)
+@asks("narrow-passage")
 def narrow_passage() -> Posed:
     """A slot between two blocks, the arm above its mouth."""
     scene = Scene(planar_arm((0.4, 0.4, 0.3, 0.3), RADIUS))
@@ -322,15 +175,7 @@ def narrow_passage() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("tip", (1.0, 0.0, 0.1))]))
 
 
-@CONTACT.case(
-    "edge-on-edge",
-    "Edge on edge",
-    why="Two boxes meet with crossing edges. The normal there is the cross product of the edges, no face has it, and a "
-    "small motion along either edge moves the witness points far.",
-    acceptable="An honest best effort: the edges in touch, 5 cm short of the goal.",
-    expected="honest",
-    best=0.05,
-)
+@asks("edge-on-edge")
 def edge_on_edge() -> Posed:
     """A box turned on its edge above one turned on the other; it may slide but not turn."""
     scene = Scene(sliding_tool((Box((0.6, 0.2, 0.2)), turned("x", np.pi / 4))))
@@ -340,19 +185,149 @@ def edge_on_edge() -> Posed:
     return Posed(Problem(scene, start, goals=[Point("tool", (0.02, 0.01, touching - 0.05))]))
 
 
-@CONTACT.case(
-    "vertex-on-vertex",
-    "Vertex on vertex",
-    why="A cube stands tip on tip on another cube, and its goal is straight below, on the other side. The normal is "
-    "any in a wide cone, it jumps with the slightest motion, and every sideways way is as good as its opposite.",
-    acceptable="Solved: the goal is free. Less good: an honest answer that rests on the tip or beside it.",
-)
+@asks("vertex-on-vertex")
 def vertex_on_vertex() -> Posed:
     """Both cubes of 20 cm, tip to tip."""
-    tilt = turned("x", np.pi / 4)
-    stand = pin.SE3(pin.utils.rotate("y", np.pi / 2 - TIP_DOWN) @ tilt.rotation, np.zeros(3))
+    leans = np.arccos(1.0 / np.sqrt(3.0))  # rad: a cube's diagonal from the normal of a face
+    stand = pin.SE3(pin.utils.rotate("y", np.pi / 2 - leans) @ turned("x", np.pi / 4).rotation, np.zeros(3))
     scene = Scene(sliding_tool((Box((0.2, 0.2, 0.2)), stand)))
     half = 0.1 * np.sqrt(3.0)
     scene.add(Box((0.2, 0.2, 0.2)), name="cube", at=pin.SE3(stand.rotation, np.array([0.0, 0.0, 0.5])))
     start = np.array([0.0, 0.0, 0.5 + 2.0 * half + 1e-4])
     return Posed(Problem(scene, start, goals=[Point("tool", (0.0, 0.0, 0.5 - 2.0 * half - 0.05))]))
+
+
+BAR = np.array([-1.0, 1.1, 0.9, 0.3])
+"""Start of a four-bar linkage, an arm in a plane whose tip is held."""
+
+
+@asks("redundant-loop")
+def redundant_loop() -> Posed:
+    """The crank's end is to go where it is after a turn that the loop allows."""
+    figure, start = planar_arm((0.3, 0.5, 0.4, 0.1), 0.02), BAR
+    scene = Scene(figure)
+    crank = BAR[0] + 0.3
+    target = 0.3 * np.array([np.cos(crank), 0.0, -np.sin(crank)])
+    goal = Point("turn1_link", target, offset=(0.3, 0.0, 0.0))
+    return Posed(Problem(scene, start, goals=[goal], constraints=[Hold("tip"), Hold("tip")]))
+
+
+@asks("inconsistent-loop")
+def inconsistent_loop() -> Posed:
+    """Both places are within reach."""
+    figure, start = planar_arm((0.3, 0.5, 0.4, 0.1), 0.02), BAR
+    scene = Scene(figure)
+    tip = scene.state(start).frame(figure.frame_id("tip")).translation.copy()
+    holds = [Hold("tip", tip + (0.0, 0.0, step), orientation=False) for step in (0.025, -0.025)]
+    goal = Point("turn1_link", scene.state(start).frame(figure.frame_id("turn2_link")).translation.copy(),
+                 offset=(0.3, 0.0, 0.0))  # fmt: skip
+    return Posed(Problem(scene, start, goals=[goal], constraints=holds))
+
+
+@asks("dense-column")
+def dense_column() -> Posed:
+    """A hub that slides and turns."""
+    figure = _star()
+    scene = Scene(figure)
+    start = np.array([0.0, 0.0, 0.0] + [0.4, 0.8] * 12)
+    witness = start + np.array([0.15, 0.1, 0.4] + [0.2, -0.4] * 12)
+    state = scene.state(witness)
+    goals = [Point(f"tip{k}", state.frame(figure.frame_id(f"tip{k}")).translation.copy()) for k in range(1, 13)]
+    return Posed(Problem(scene, start, goals=goals))
+
+
+def _star() -> Figure:
+    builder = Builder("star of twelve arms")
+    slide = builder.joint("px", "slide_x")
+    slide = builder.joint("pz", "slide_z", parent=slide)
+    hub = builder.joint("ry", "hub", parent=slide)
+    for k in range(12):
+        angle = 2.0 * np.pi * k / 12
+        rim = 0.15 * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+        upper = builder.joint("ry", f"upper{k + 1}", parent=hub, at=rim)
+        builder.model.jointPlacements[upper] = pin.SE3(pin.utils.rotate("y", angle), rim)
+        builder.rod(upper, (0.2, 0.0, 0.0), 0.01)
+        lower = builder.joint("ry", f"lower{k + 1}", parent=upper, at=(0.2, 0.0, 0.0))
+        builder.rod(lower, (0.2, 0.0, 0.0), 0.01)
+        builder.frame(lower, f"tip{k + 1}", (0.2, 0.0, 0.0))
+    return builder.figure(pairs=False)
+
+
+def _scaled(size: float) -> Posed:
+    """An arm that reaches over a box, all lengths times `size`."""
+    scene = Scene(planar_arm(size * np.array([0.4, 0.3, 0.29]), size * 0.02))
+    scene.add(Box((size * 0.1, size * 0.3, size * 0.4)), name="box", at=size * np.array([0.5, 0.0, 0.0]))
+    goal = Point("tip", size * np.array([0.62, 0.0, 0.1]))
+    return Posed(Problem(scene, np.array([-0.9, 0.3, 0.2]), goals=[goal]))
+
+
+asks("1-cm-scale")(partial(_scaled, 0.01))
+
+
+asks("100-m-scale")(partial(_scaled, 100.0))
+
+
+@asks("goal-1e-12-away")
+def tiny_difference() -> Posed:
+    """From a bent arm."""
+    scene = Scene(planar_arm((0.5, 0.4, 0.3)))
+    tip = scene.state(BENT).frame(scene.figure.frame_id("tip")).translation.copy()
+    return Posed(Problem(scene, BENT, goals=[Point("tip", tip + (1e-12, 0.0, 0.0))]))
+
+
+@asks("weight-1e-12")
+def tiny_weight() -> Posed:
+    """Within easy reach."""
+    scene = Scene(planar_arm((0.5, 0.4, 0.3)))
+    return Posed(Problem(scene, BENT, goals=[Point("tip", (0.7, 0.0, 0.5), weight=1e-12)]))
+
+
+@asks("not-a-number")
+def not_numbers() -> Nonsense:
+    """A start, a goal, a goal in the middle of a drag, a thing's place, and the method's own tolerance."""
+    return Nonsense(
+        {
+            "NaN in the start": lambda adapter: _solve(adapter, start=nan),
+            "NaN in a goal": lambda adapter: _solve(adapter, goal=nan),
+            "infinity in a goal": lambda adapter: _solve(adapter, goal=inf),
+            "NaN in a thing's place": lambda adapter: _solve(adapter, box=nan),
+            "NaN in a drag": lambda adapter: Drag(_reach(), adapter.make(1e-5, None)).to((nan, 0.0, 0.5)),
+            "NaN in where a drag is": _step_from_nowhere,
+            "NaN as tolerance": lambda adapter: adapter.make(nan, None).solve(_reach()),
+        }
+    )
+
+
+@asks("two-iterations")
+def few_iterations() -> Posed:
+    """An arm of six joints over a table."""
+    return Posed(_across(), iterations=2)
+
+
+@asks("qp-iteration-limit")
+def qp_limit() -> Posed:
+    """The same reach."""
+    return Posed(_across(), hindered=True)
+
+
+def _reach(start: float = 0.5, goal: float = 0.5, box: float = 0.0) -> Problem:
+    scene = Scene(planar_arm((0.5, 0.4, 0.3)))
+    scene.add(Box((0.1, 0.1, 0.1)), name="box", at=(0.9, 0.0, -0.8))
+    problem = Problem(scene, np.array([-0.6, 0.8, start]), goals=[Point("tip", (0.7, 0.0, goal))])
+    if box != 0.0:
+        scene.move("box", at=(0.9, box, -0.8))
+    return problem
+
+
+def _solve(adapter: Adapter, **changed: float) -> object:
+    return adapter.make(1e-5, None).solve(_reach(**changed))
+
+
+def _step_from_nowhere(adapter: Adapter) -> object:
+    return as_method(adapter.make(1e-5, None)).tracker(_reach(), FRAME).step(np.array([-0.6, nan, 0.5]))
+
+
+def _across() -> Problem:
+    scene = Scene(spatial_arm()).add(Box((0.5, 0.8, 0.1)), name="table", at=(0.55, 0.0, 0.35))
+    start = np.array([-0.9, 0.5, 0.9, 0.0, 0.5, 0.0])
+    return Problem(scene, start, goals=[Point("tip", (0.55, 0.35, 0.45))])

@@ -7,30 +7,16 @@ from functools import partial
 import numpy as np
 
 from wholebody.bench.suite.stability.bodies import planar_arm, spatial_arm
-from wholebody.bench.suite.stability.case import FRAME, Frame, Group, Stream, still
+from wholebody.bench.suite.stability.case import FRAME, Frame, Stream, asks, still
 from wholebody.geometry.shapes import Box, Sphere
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Point, StepLimit
 
-STREAMS = Group("Goals and things that move", tolerance=1e-3)  # a moderate accuracy, as frames have it
-OUTSIDE = "Solved in the end, and outside of the boulder in every frame and between them."
-REST = 40  # frames at the end in which the goal rests
-RADIUS = 0.03
+REST, RADIUS = 40, 0.03  # frames at the end in which the goal rests; m
 
 
-@STREAMS.case(
-    "thin-plate",
-    "Thin plate crossed in one step",
-    why="From one frame to the next the goal is behind a plate of 4 mm that the arm cannot go round. A step to the "
-    "goal ends free of overlap: who looks only at where a step ends passes through.",
-    acceptable="An honest best effort: the tip at the plate, on its side of it, in every frame and between them.",
-    expected="honest",
-    near=0.01,
-    best=0.8 - (0.598 - RADIUS),
-    eye=(-0.5, -1.0, 0.3),
-    see_through=("plate",),
-)
+@asks("thin-plate")
 def thin_plate() -> Stream:
     """Thirty frames at rest before the plate would be too kind: it begins at once."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3), RADIUS))
@@ -40,13 +26,7 @@ def thin_plate() -> Stream:
     return Stream(problem, still((0.45, 0.0, 0.1), 3) + still((0.8, 0.0, 0.1), REST))
 
 
-@STREAMS.case(
-    "goal-jumps-1-m",
-    "A goal that jumps 1 m between frames",
-    why="The goal jumps by 1 m every 40 frames, over a block that stands between: the linearisation is worth nothing "
-    "at that distance, and the way there counts.",
-    acceptable="Solved in the end, and never inside of the block on the way. Less good: an honest answer beside it.",
-)
+@asks("goal-jumps-1-m")
 def goal_jumps() -> Stream:
     """To the other side and back."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3), RADIUS))
@@ -54,20 +34,10 @@ def goal_jumps() -> Stream:
     start = np.array([-0.9, 0.5, 0.3])
     problem = Problem(scene, start, goals=[Point("tip", (0.8, 0.0, 0.5))])
     sides = still((0.8, 0.0, 0.5), 5) + still((0.8, 0.0, -0.5), REST) + still((0.8, 0.0, 0.5), REST)
-    return Stream(problem, sides, shown=5 + REST // 4)
+    return Stream(problem, sides)
 
 
-@STREAMS.case(
-    "wrong-active-set",
-    "Warm start from the wrong active set",
-    why="In a channel the goal is behind the floor in one frame and behind the ceiling in the next. The contacts and "
-    "limits that held the last step are those that do not hold this one: a warm start is wrong every time.",
-    acceptable="An honest answer in the channel, in every frame.",
-    see_through=("ceiling", "floor"),
-    expected="honest",
-    best=0.5 - (0.15 - RADIUS),
-    near=np.inf,
-)
+@asks("wrong-active-set")
 def wrong_active_set() -> Stream:
     """Forty changes of side."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3), RADIUS))
@@ -89,38 +59,14 @@ def _interval(dt: float) -> Stream:
     way = tuple(Frame((0.5, -0.4 + 0.8 * k / count, 0.35)) for k in steps)
     lead = still(way[0].target, REST)
     ends = still((0.5, 0.4, 0.35) if count <= 200 else (0.5, 0.05, 0.45), REST)
-    return Stream(problem, lead + way + ends, dt=dt, shown=REST + len(way) // 2)
+    return Stream(problem, lead + way + ends, dt=dt)
 
 
-for _dt, _name, _title, _why in (
-    (
-        1e-3, "dt-1-ms", "Frames of 1 ms",
-        "The goal moves half a millimetre a frame: steps are smaller than tolerances, and errors of each step add up.",
-    ),
-    (
-        1e-2, "dt-10-ms", "Frames of 10 ms",
-        "The goal moves 5 mm a frame over a boulder, 5 cm below its surface: the usual case, for comparison.",
-    ),
-    (
-        0.1, "dt-100-ms", "Frames of 100 ms",
-        "The goal moves 5 cm a frame, as far as contacts are looked for: steps begin to cut through what is curved.",
-    ),
-    (
-        1.0, "dt-1-s", "Frames of 1 s",
-        "The goal moves 50 cm a frame and is past the boulder in two: nothing that was known in the last frame holds.",
-    ),
-):  # fmt: skip
-    STREAMS.case(_name, _title, why=_why, acceptable=OUTSIDE)(partial(_interval, _dt))
+for _dt, _name in ((1e-3, "dt-1-ms"), (1e-2, "dt-10-ms"), (0.1, "dt-100-ms"), (1.0, "dt-1-s")):
+    asks(_name)(partial(_interval, _dt))
 
 
-@STREAMS.case(
-    "speed-bound",
-    "A goal faster than the joints may move",
-    why="The problem bounds every joint to 1 rad/s, and the goal moves three times as fast. The bound has to hold in "
-    "every frame, and the goal is caught up with when it rests.",
-    acceptable="Solved in the end, and no joint faster than 1 rad/s. Or a clear refusal of the bound.",
-    also=("refusal",),
-)
+@asks("speed-bound")
 def speed_bound() -> Stream:
     """Across the front in half a second."""
     scene = Scene(planar_arm((0.5, 0.4, 0.3), RADIUS))
@@ -139,23 +85,10 @@ def _ball(speed: float) -> Stream:
     problem = Problem(scene, start, goals=[Point("tip", target)])
     way = np.arange(-0.6, 0.6, speed * FRAME)
     frames = tuple(Frame(target, {"ball": (0.35, float(y), 0.6)}) for y in way)
-    return Stream(problem, frames + still(target, REST), shown=len(frames) // 2)
+    return Stream(problem, frames + still(target, REST))
 
 
-STREAMS.case(
-    "moving-obstacle",
-    "Moving obstacle",
-    why="A ball of 20 cm goes through where the forearm is, at 0.5 m/s; the goal stays. At the beginning of every "
-    "frame the ball is 8 mm inside of an arm that did nothing wrong, and the arm has to give way before the "
-    "frame ends.",
-    acceptable="Solved in the end, and outside of the ball after every frame.",
-)(partial(_ball, 0.5))
+asks("moving-obstacle")(partial(_ball, 0.5))
 
 
-STREAMS.case(
-    "fast-obstacle",
-    "Fast obstacle",
-    why="The same ball at 2 m/s: 33 mm a frame, about the radius of the forearm. One frame has to bring the arm "
-    "farther than linearised contacts can be trusted.",
-    acceptable="Solved in the end, and outside of the ball after every frame.",
-)(partial(_ball, 2.0))
+asks("fast-obstacle")(partial(_ball, 2.0))

@@ -1,68 +1,39 @@
 """Decides what answers are worth, by rules, in order: solved, an honest best effort, a clear refusal, or WRONG.
 
-All verdicts together are a result, of which everything is drawn and written.
+All verdicts together are a result, of which the report is written and the matrix of cases and methods is drawn.
 """
 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
-from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
-from wholebody.base.records import with_values
-from wholebody.bench.suite.adapters import registry
-from wholebody.bench.suite.stability import catalogue
-from wholebody.bench.suite.stability.asking import Cell
+from wholebody.bench import plot_style
+from wholebody.bench.report import render
+from wholebody.bench.rows import Figure, Row
+from wholebody.bench.suite.adapters.base import Adapter
+from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
-from wholebody.bench.suite.stability.judging import INSIDE, Judged
-from wholebody.bench.tables import filled, read_rows
 
-BEYOND = 1e-6  # rad, m: farther than this is out of limits
 BROKEN = 1e-4  # m, rad: farther than this a constraint does not hold
-FAST = 0.01  # share by which a joint may be faster than its bound: rounding, and steps along curves
-NOT_HELD = ("infeasible", "stalled")  # statuses that say that something may be violated
-SAME = 2e-5  # m: nearer to the best known answer than this is as good
-LEAST_SENTENCE = 15  # letters of a refusal that says anything
 
-SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "adapter": "△", "wrong": "✗"}
+SYMBOLS: dict[Kind, str] = {"solved": "✓", "honest": "○", "refusal": "–", "wrong": "✗"}
 WORDS: dict[Kind, str] = {
     "solved": "solved",
     "honest": "honest best effort",
     "refusal": "clear refusal",
-    "adapter": "our adapter",
     "wrong": "WRONG",
 }
-
-
-_NUMBER = r"[\d.]+(?:e[+-]\d+)?"
-_AMOUNT = rf"({_NUMBER} (?:rad|m|mm|µm))"
-BRIEF = {
-    r"(hangs|crashes): .*": r"\1",
-    r"takes .*": "takes it",
-    r"refuses with .* only": "unclear",
-    r"answers|NaN": r"\g<0>",
-    rf"{_AMOUNT} out of limits": r"\1",
-    rf"{_AMOUNT} inside on the way: .*": r"\1 way",
-    rf"{_AMOUNT} inside, not deeper": r"\1 in",
-    rf"{_AMOUNT} inside(, says \w+)?": r"\1",
-    rf"a constraint missed by {_AMOUNT} \(or mrad\)(, says \w+)?": r"\1",
-    rf"({_NUMBER}) times too fast": r"\1 × speed",
-    rf"claims solved, {_AMOUNT} left": r"claims \1",
-    rf"misreports what is left by {_AMOUNT}": "misreports",
-}
-"""How figures are shortened for the cell of a table; any other wrong answer is an error, whatever words it has."""
 
 
 class Verdict(NamedTuple):
     """What one method's answer to one case is worth.
 
     Attributes:
-        kind: of the five; "adapter" is given by the audit alone, to what would be wrong.
+        kind: of the four.
         figure: the worst figure, in a few words; "" where there is nothing to add.
         acceptable: whether the case accepts it.
     """
@@ -75,15 +46,6 @@ class Verdict(NamedTuple):
     def symbol(self) -> str:
         """One sign: an honest answer that is as good as can be is a full circle."""
         return "●" if self.kind == "honest" and self.acceptable else SYMBOLS[self.kind]
-
-    @property
-    def brief(self) -> str:
-        """The figure for the cell of a table."""
-        words = self.figure.partition("; alone")[0]
-        for pattern, short in BRIEF.items():
-            if found := re.fullmatch(pattern, words, re.DOTALL):
-                return found.expand(short)
-        return "error" if self.kind in ("wrong", "adapter") else words
 
 
 def decide(case: HardCase, answer: Answer, judged: Judged, best: float | None = None) -> Verdict:
@@ -111,12 +73,13 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
     if answer.taken:
         return "takes " + ", ".join(answer.taken)
     if answer.refusal:
-        return "" if len(answer.refusal) >= LEAST_SENTENCE else f"refuses with {answer.refusal!r} only"
+        # A shorter refusal says nothing.
+        return "" if len(answer.refusal) >= 15 else f"refuses with {answer.refusal!r} only"
     if case.expected == "refusal":
         return "answers"
     if not judged.finite:
         return "NaN"
-    if judged.limit_violation > BEYOND:
+    if judged.limit_violation > 1e-6:  # rad, m: farther than this is out of limits
         return f"{judged.limit_violation:.2g} rad out of limits"
     if judged.passed:
         return f"{length(judged.dip)} inside on the way: {judged.passed}"
@@ -125,13 +88,14 @@ def _wrong(case: HardCase, answer: Answer, judged: Judged) -> str:
 
 def _missed(case: HardCase, answer: Answer, judged: Judged) -> str:
     """What lengths tell: overlap, constraints, speed, and what the method says of them."""
-    doubts = answer.status in NOT_HELD
+    doubts = answer.status in ("infeasible", "stalled")  # statuses that say that something may be violated
     allowed = judged.start_penetration + INSIDE if doubts else INSIDE
     if judged.penetration > allowed:
         return f"{length(judged.penetration)} inside{_said(answer)}"
     if judged.constraint_violation > BROKEN and (case.can_hold or not doubts):
         return f"a constraint missed by {length(judged.constraint_violation)} (or mrad){_said(answer)}"
-    if judged.speed_excess > FAST:
+    # Rounding, and steps along curves, make a joint faster than its bound by less than 1 %.
+    if judged.speed_excess > 0.01:
         return f"{1.0 + judged.speed_excess:.1f} times too fast"
     if answer.status == "solved" and judged.goal_error > case.tolerance:
         return f"claims solved, {length(judged.goal_error)} left"
@@ -152,7 +116,8 @@ def _short(judged: Judged, known: float | None, miss: float) -> str:
         return f"{length(judged.penetration)} inside, not deeper"
     if not known:
         return f"{length(judged.goal_error)} left"
-    return "best known" if miss <= SAME else f"+{length(miss)}"
+    # An answer within 20 µm of the best known one is as good.
+    return "best known" if miss <= 2e-5 else f"+{length(miss)}"
 
 
 def length(metres: float) -> str:
@@ -162,60 +127,6 @@ def length(metres: float) -> str:
     return f"{1e3 * metres:.3g} mm" if metres >= 1e-4 else f"{1e6 * metres:.2g} µm"
 
 
-ALONE: dict[tuple[str, str], str] = {
-    ("inside-obstacle", "mink"): "alone, mink stays outside (0 mm inside)",
-    ("edge-on-edge", "mink"): "alone, mink stays outside (0 mm inside)",
-    ("narrow-passage", "mink"): "alone, mink solves it with a minimum distance of 0.3 mm",
-    ("100-m-scale", "mink"): "alone, mink solves it with its distances scaled by 100",
-    ("dt-10-ms", "mink"): "alone, mink solves it",
-    ("dt-1-s", "mink"): "alone, mink solves it",
-    ("100-m-scale", "pink"): "alone, pink solves it",
-    (
-        "narrow-passage",
-        "pink",
-    ): "alone, pink solves it with d_min 0.5 mm; our margin of 1 mm is all the room of the slot",
-    ("moving-obstacle", "pink"): "alone, pink solves it with its default d_min of 2 cm and 10 steps a frame",
-}
-"""What a tool does by itself, by case and method: a wrong answer there is its adapter's fault, were there one again."""
-
-
-def audited(case: str, method: str, verdict: Verdict) -> Verdict:
-    """The verdict, but "adapter" in place of "wrong" where the tool alone does better."""
-    if verdict.kind != "wrong" or (case, method) not in ALONE:
-        return verdict
-    return with_values(verdict, kind="adapter", figure=f"{verdict.figure}; {ALONE[case, method]}")
-
-
-@dataclass(frozen=True)
-class StabilityRow:
-    """One method's answer to one case; errors in m and rad.
-
-    Attributes:
-        verdict: "solved", "honest", "refusal", "adapter" or "wrong".
-        acceptable: whether the case accepts it.
-        figure: the worst figure, in a few words.
-        status: what the method says.
-        goal_error, best: largest goal error left, and that of the best answer known.
-        frames: postures that were judged.
-        sentence: what the method says in words, or its refusal.
-    """
-
-    case: str
-    method: str
-    verdict: str
-    acceptable: bool
-    figure: str
-    status: str
-    goal_error: float
-    best: float
-    penetration: float
-    limit_violation: float
-    constraint_violation: float
-    frames: int
-    seconds: float
-    sentence: str
-
-
 @dataclass(frozen=True)
 class Result:
     """All cells with their verdicts.
@@ -223,19 +134,14 @@ class Result:
     Attributes:
         cases: in the order of reports.
         methods: in the order in which they were asked.
-        rows: by case's name and method.
-        cells: the same; none where the rows were read from a file.
+        verdicts: by case's name and method.
+        rows: the same with figures.
     """
 
     cases: tuple[HardCase, ...]
     methods: tuple[str, ...]
-    rows: Mapping[tuple[str, str], StabilityRow]
-    cells: Mapping[tuple[str, str], Cell] = field(default_factory=dict)
-
-    @cached_property
-    def verdicts(self) -> dict[tuple[str, str], Verdict]:
-        """By case's name and method."""
-        return {key: Verdict(cast(Kind, row.verdict), row.figure, row.acceptable) for key, row in self.rows.items()}
+    verdicts: Mapping[tuple[str, str], Verdict]
+    rows: tuple[Row, ...]
 
     def count(self, method: str, kind: Kind) -> int:
         """How many of a method's verdicts are of one kind."""
@@ -244,7 +150,7 @@ class Result:
     @property
     def minutes(self) -> float:
         """How long all answers took together, by the clock."""
-        return sum(row.seconds for row in self.rows.values()) / 60.0
+        return float(sum(row["seconds"] for row in self.rows)) / 60.0
 
     def acceptable(self, method: str) -> int:
         """How many of a method's answers are acceptable."""
@@ -270,68 +176,31 @@ def result(cases: Sequence[HardCase], methods: Sequence[str], cells: Iterable[Ce
     placed = {(cell.case.name, cell.method): cell for cell in cells}
     best = _known(placed.values()) | {case.name: case.best for case in cases if case.best is not None}
     keys = [(case.name, method) for case in cases for method in methods]
-    return Result(tuple(cases), tuple(methods), {key: _row(placed[key], best.get(key[0])) for key in keys}, placed)
+    verdicts, rows = {}, []
+    for key in keys:
+        cell, known = placed[key], best.get(key[0])
+        verdicts[key] = decide(cell.case, cell.answer, cell.judged, known)
+        rows.append(_row(cell, verdicts[key], math.nan if known is None else known))
+    return Result(tuple(cases), tuple(methods), verdicts, tuple(rows))
 
 
-def read_result(
-    path: Path, cases: Iterable[str] | None = None, methods: Iterable[str] | None = None
-) -> tuple[Result, dict[str, str]]:
-    """Cells of an earlier run, from the file of its rows; and the facts of the machine that it ran on.
-
-    Args:
-        path: the file.
-        cases: names; None for all that the file has.
-        methods: names; None for all that the file has. "all", and the name of a method with several adapters, such as
-            "newton", mean those that the file has. Their packages need not be installed.
-
-    Raises:
-        FileFormatError: the file is none of such rows, or has none.
-        InputError: it lacks a cell.
-        UnknownNameError: there is no such case or method.
-    """
-    facts, read = read_rows(path, StabilityRow)
-    if not read:
-        raise FileFormatError(f"{path}: has no answers; give the stability.csv of a run")
-    rows = {(row.case, row.method): row for row in read}
-    asked = tuple(dict.fromkeys(row.method for row in read))
-    if methods is not None:
-        asked = tuple(dict.fromkeys(each for name in methods for each in _meant(name, asked)))
-    if cases is None:
-        chosen = catalogue.cases(dict.fromkeys(row.case for row in read), str(path))
-    else:
-        chosen = catalogue.cases(cases)
-    keys = [(case.name, method) for case in chosen for method in asked]
-    for case, method in keys:
-        if (case, method) not in rows:
-            raise InputError(f"{path}: has no answer of {method} to {case}; ask for others, or run it")
-    return Result(chosen, asked, {key: rows[key] for key in keys}), facts
-
-
-def _meant(name: str, known: Sequence[str]) -> Sequence[str]:
-    """The methods of a file that a name means; the name itself where the file lacks it."""
-    if name == registry.ALL:
-        return known
-    every = registry.names()
-    if name in known or name in every:
-        return (name,)
-    if name not in {each.partition("/")[0] for each in every}:
-        raise UnknownNameError("method", name, {*known, *every, registry.ALL})
-    return [each for each in known if each.startswith(f"{name}/")] or (name,)
-
-
-def _row(cell: Cell, best: float | None) -> StabilityRow:
-    case, answer = cell.case, cell.answer
-    verdict = judged_verdict(cell, best)
-    return filled(
-        StabilityRow, verdict, answer, cell.judged, case=case.name, method=cell.method, verdict=verdict.kind,
-        best=math.nan if best is None else best, frames=len(answer.postures),
-        sentence=answer.refusal or answer.message,
-    )  # fmt: skip
-
-
-def judged_verdict(cell: Cell, best: float | None) -> Verdict:
-    """The verdict on a cell as the audit leaves it; `best` is as for `decide`."""
-    return audited(cell.case.name, cell.method, decide(cell.case, cell.answer, cell.judged, best))
+def _row(cell: Cell, verdict: Verdict, best: float) -> Row:
+    answer, judged = cell.answer, cell.judged
+    figures: dict[str, Figure] = {
+        "verdict": verdict.kind,
+        "acceptable": verdict.acceptable,
+        "figure": verdict.figure,
+        "status": answer.status,
+        "goal error": judged.goal_error,
+        "best known": best,
+        "penetration": judged.penetration,
+        "limit violation": judged.limit_violation,
+        "constraint violation": judged.constraint_violation,
+        "frames": len(answer.postures),
+        "seconds": answer.seconds,
+        "sentence": answer.refusal or answer.message,
+    }
+    return Row(cell.case.name, cell.method, figures)
 
 
 def _known(cells: Iterable[Cell]) -> dict[str, float]:
@@ -343,3 +212,52 @@ def _known(cells: Iterable[Cell]) -> dict[str, float]:
             name = cell.case.name
             found[name] = min(found.get(name, math.inf), cell.judged.goal_error)
     return found
+
+
+METHODS = ("qp", "qp/osqp", "newton/slack", "newton/barrier", "ccd", "dls", "placo", "pink", "mink")
+"""One or two of each algorithm, for a chart that can be read; others are asked by name."""
+
+COLORS = {
+    "✓": ("#8fd0b5", "solved"),
+    "●": ("#f6ec9c", "honest, as good as can be"),
+    "○": ("#fbf7d9", "honest, a better answer exists"),
+    "–": ("#d9d9d9", "clear refusal"),
+    "✗": ("#e8794a", "WRONG"),
+}
+"""Told apart by people with any colour vision, and by their signs in print."""
+
+
+def report(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str]) -> str:
+    """The counts, the cases by methods, every case in words, and every wrong answer."""
+    return render("stability.md", result=result, kinds=WORDS, adapters=adapters, facts=facts)
+
+
+def matrix(result: Result, path: Path) -> tuple[Path, Path]:
+    """Draw all verdicts; return the paths of the SVG and the PNG."""
+    width = max(8.0, 3.1 + 0.6 * len(result.methods))
+    chart, axes = plot_style.figure(1, 1, (width, 1.5 + 0.22 * len(result.cases)))
+    axis = axes[0][0]
+    for row, case in enumerate(result.cases):
+        for column, method in enumerate(result.methods):
+            _cell(axis, row, column, result.verdicts[case.name, method].symbol)
+    axis.set(xlim=(-0.5, len(result.methods) - 0.5), ylim=(len(result.cases) - 0.5, -0.5))
+    axis.set_xticks(range(len(result.methods)), [name.replace("/", "\n") for name in result.methods], fontsize=8.5)
+    axis.xaxis.tick_top()
+    axis.set_yticks(range(len(result.cases)), [case.title for case in result.cases], fontsize=8.5)
+    axis.tick_params(length=0)
+    axis.grid(visible=False)
+    for side in axis.spines.values():
+        side.set_visible(False)
+    from matplotlib.patches import Patch
+
+    handles = [Patch(facecolor=color, label=f"{symbol}  {words}") for symbol, (color, words) in COLORS.items()]
+    chart.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8.5)
+    return plot_style.save(chart, path)
+
+
+def _cell(axis: Any, row: int, column: int, symbol: str) -> None:
+    from matplotlib.patches import Rectangle
+
+    axis.add_patch(Rectangle((column - 0.48, row - 0.45), 0.96, 0.9, facecolor=COLORS[symbol][0], edgecolor="none"))
+    weight = "bold" if symbol == "✗" else "normal"
+    axis.text(column, row, symbol, fontsize=8, ha="center", va="center", color="#111111", fontweight=weight)

@@ -1,0 +1,227 @@
+"""Things that fly at a person who stands, walks or is dragged, and ten minutes of things that move by themselves.
+
+With swift limits the person may move as fast as the thing comes, so a free posture is within reach in every frame:
+going along with it is one. With human limits there may be none. Depths are found by fine subdivision in a scene of
+their own.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.base.arrays import Array
+from wholebody.bench.rows import Figure, Row, measured_ms
+from wholebody.dynamics.rigid_bodies import RigidBodies
+from wholebody.tracking.moving_goals import retarget
+
+Path = Sequence[tuple[float, Array]]
+"""Shares of a frame, and postures (nq,)."""
+
+DT = 1.0 / 60.0
+SHAPES = {
+    "plate of 1 mm": wb.Box((0.001, 0.5, 0.5)),
+    "board": wb.Box((0.02, 0.6, 0.4)),
+    "ball": wb.Sphere(0.08),
+    "rod": wb.Capsule(0.01, 0.9),
+}
+
+
+class Throw:
+    """A thing that flies towards the body of a standing person with constant velocity, and turns.
+
+    Attributes:
+        scene: the person, the floor and the "thing".
+        truth: the same scene once more, for judgements; `instants` moves its thing.
+        at: where the thing is.
+        frames: until it is past.
+    """
+
+    def __init__(self, rng: np.random.Generator, shape: wb.Shape, speed: float, turn: float = 3.0) -> None:
+        """Begin half a metre before the body, from anywhere around; `speed` in m/s, `turn` in rad/s."""
+        angle = rng.uniform(0.0, 2.0 * np.pi)
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        self.at = pin.SE3(pin.exp3(np.array([0.0, 0.0, angle])), -0.5 * way + [0.0, 0.0, rng.uniform(0.7, 1.5)])
+        self._way, self._turn = speed * DT * way, pin.exp3(turn * DT * rng.normal(size=3))
+        self.scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+        self.scene.add(shape, name="thing", at=self.at)
+        self.truth = copy.copy(self.scene)
+        self.frames = int(0.7 / (speed * DT)) + 1
+
+    def next(self) -> tuple[pin.SE3, pin.SE3]:
+        """Let it fly for a frame; where it was and is."""
+        before = self.at
+        self.at = pin.SE3(before.rotation @ self._turn, before.translation + self._way)
+        self.scene.move("thing", at=self.at, over=DT)
+        return before, self.at
+
+    def instants(self, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int) -> Iterator[Array]:
+        """Postures (nq,) along a path of shares and postures, each with the thing of `truth` put where it is then."""
+        turn = pin.log3(way[0].rotation.T @ way[1].rotation)
+        for (s0, q0), (s1, q1) in pairwise(path):
+            for share in np.linspace(0.0, 1.0, parts):
+                s = s0 + share * (s1 - s0)
+                centre = (1.0 - s) * way[0].translation + s * way[1].translation
+                self.truth.move("thing", at=pin.SE3(way[0].rotation @ pin.exp3(s * turn), centre))
+                yield pin.interpolate(self.truth.model, q0, q1, share)
+
+
+def _deepest(throw: Throw, path: Path, way: tuple[pin.SE3, pin.SE3], parts: int) -> float:
+    """Depth of the thing in the body along a path, metres."""
+    worst, owner = 0.0, throw.truth.piece_owner
+    for q in throw.instants(path, way, parts):
+        near = throw.truth.contacts(q, 0.0)
+        rows = [row for row, pair in enumerate(near.pair) if "thing" in {owner[k] for k in pair}]
+        worst = max(worst, float(-near.distance[rows].min(initial=0.0)))
+    return worst
+
+
+def throws(thing: str, speed: float, person: str, swift: bool, count: int, seed: int = 0) -> Row:
+    """Throw a thing at a person who is posed by "qp", several times.
+
+    An end deeper than 0.1 mm is deep. Silent is a frame that ends deeper than 0.12 mm, or in which something is deeper
+    than 0.4 mm on every way, and nothing is named.
+    """
+    rng = np.random.default_rng([seed, *map(ord, thing + person), int(10.0 * speed)])
+    depths, spent, named, silent = [], [], 0, 0
+    for _ in range(count):
+        throw = Throw(rng, SHAPES[thing], speed)
+        turning, going = (max(12.0, 3.0 * speed), max(4.0, 1.6 * speed)) if swift else (12.0, 4.0)  # rad/s, m/s
+        start = throw.scene.figure.posture("standing")
+        tip = throw.scene.state(start).frame(throw.scene.frame_id("right_index_tip")).translation.copy()
+        goal = wb.Point("right_index_tip", tip)
+        limits = wb.StepLimit(turning, root_velocity=going, root_turn=1.5 * going)
+        problem = wb.Problem(throw.scene, start, goals=[goal], constraints=[limits], clearance=0.001)
+        tracker, q = wb.QP().tracker(problem, DT), problem.start
+        for frame in range(throw.frames):
+            way = throw.next()
+            if person == "walks":
+                retarget(problem, 0, tip + (1.3 * DT * (frame + 1), 0.0, 0.0))
+            elif person == "is dragged":
+                retarget(problem, 0, tip + DT * (frame + 1) * np.array([0.5, 0.5, 0.7]))
+            worked, _, step = measured_ms(partial(tracker.step, q))
+            spent.append(worked)
+            depths.append(_deepest(throw, ((1.0, step.q), (1.0, step.q)), way, 1))
+            named += bool(step.collisions)
+            silent += not step.collisions and _unnamed(throw, q, step, way, depths[-1])
+            q = step.q
+    figures: dict[str, Figure] = {
+        "limits": "swift" if swift else "human",
+        "m/s": speed,
+        "frames": len(depths),
+        "deepest mm": 1e3 * max(depths),
+        "deep": int((np.array(depths) > 1e-4).sum()),
+        "named": named,
+        "silent": silent,
+        "CPU median ms": float(np.median(spent)),
+    }
+    return Row(thing, f"who {person}", figures)
+
+
+def _unnamed(throw: Throw, q: Array, step: Any, way: tuple[pin.SE3, pin.SE3], end: float) -> bool:
+    """Whether a step that names nothing ends too deep, or goes through the thing on every way."""
+    if _deepest(throw, ((0.0, q), (0.0, q)), way, 1) >= 1.2e-4:  # what was in before was named then
+        return False
+    straight = ((0.0, q), (1.0, step.q))
+    ways = ((straight, 60), (step.path, 4))
+    return end > 1.2e-4 or all(_deepest(throw, path, way, parts) > 4e-4 for path, parts in ways)
+
+
+def all_throws(count: int, quick: bool = False) -> Iterator[Row]:
+    """Throw everything at everybody with both limits, `count` times each; where quick, at one speed."""
+    for swift in (True, False):
+        for person in ("stands", "walks", "is dragged"):
+            for thing in SHAPES:
+                for speed in (5.0,) if quick else (1.0, 2.5, 5.0, 10.0, 20.0):
+                    yield throws(thing, speed, person, swift, count)
+
+
+PEN = 1.5  # m: half the side
+AWAY = np.array([20.0, 0.0, 0.0])  # from the hand that a scene needs
+
+
+def long_run(minutes: float, seed: int = 0) -> Row:
+    """Run it.
+
+    The drift is of the stack that nothing can reach, from where it lay after the first ten seconds; "outside" are
+    things that left the pen, or are not finite.
+    """
+    engine, names, pillar = _engine(seed)
+    rng = np.random.default_rng(seed)
+    frames, kicks = round(60.0 * minutes / DT), round(10.0 / DT)
+    times, impacts, asleep, deepest, grew, energy = [], 0, 0, 0.0, 0.0, engine.energy()
+    lay: Array | None = None
+    for number in range(frames):
+        if number % kicks == kicks - 1:
+            _kick(engine, f"ball {rng.integers(6)}", rng)
+            energy = engine.energy()
+        spent, _, made = measured_ms(partial(engine.advance, DT))
+        times.append(spent)
+        impacts, deepest = impacts + len(made.events), max(deepest, made.deepest)
+        grew, energy, asleep = max(grew, made.energy - energy), made.energy, made.sleeping
+        if number == kicks:
+            lay = _places(engine, pillar)
+    end = _places(engine, names) - AWAY
+    inside = (np.abs(end[:, :2]) < PEN).all(axis=1) & (end[:, 2] > 0.0) & (end[:, 2] < 3.0)
+    drift = 0.0 if lay is None else float(np.linalg.norm(_places(engine, pillar) - lay, axis=1).max())
+    figures: dict[str, Figure] = {
+        "things": len(names),
+        "CPU s": 1e-3 * sum(times),
+        "median ms": float(np.median(times)),
+        "p99 ms": float(np.quantile(times, 0.99)),
+        "impacts": impacts,
+        "deepest mm": 1e3 * deepest,
+        "largest gain of energy J": grew,
+        "drift mm": 1e3 * drift,
+        "outside": int((~inside).sum()),
+        "asleep at the end": asleep,
+    }
+    return Row("a pen", f"{minutes:g} minutes", figures)
+
+
+def _places(engine: RigidBodies, names: list[str]) -> Array:
+    return np.array([engine.placement(name).translation for name in names])
+
+
+def _kick(engine: RigidBodies, name: str, rng: np.random.Generator) -> None:
+    angle = rng.uniform(0.0, 2.0 * np.pi)
+    place = engine.placement(name).translation
+    mass = 1.0 / engine.mobility(name, place)[0, 0]
+    engine.push(name, mass * 2.0 * np.array([np.cos(angle), np.sin(angle), 0.3]), place)
+
+
+def _engine(seed: int) -> tuple[RigidBodies, list[str], list[str]]:
+    """The pen with everything in it; names of all that moves, and of the pillar behind its own fence."""
+    scene = wb.Scene(wb.load("hand")).add(wb.HalfSpace(), name="floor")
+    names: list[str] = []
+
+    def put(shape: wb.Shape, name: str, x: float, y: float, z: float, body: wb.Body | None) -> None:
+        scene.add(shape, name=name, at=AWAY + (x, y, z), body=body)
+        if body is not None:
+            names.append(name)
+
+    thick, wall = 0.1, 0.6
+    for k, (x, y) in enumerate(((1, 0), (-1, 0), (0, 1), (0, -1))):
+        size = (thick, 2.0 * PEN, wall) if x else (2.0 * PEN, thick, wall)
+        put(wb.Box(size), f"wall {k}", x * (PEN + 0.5 * thick), y * (PEN + 0.5 * thick), 0.5 * wall, None)
+    put(wb.Box((0.05, 0.6, wall)), "fence 1", 0.9, 1.2, 0.5 * wall, None)
+    put(wb.Box((0.6, 0.05, wall)), "fence 2", 1.2, 0.9, 0.5 * wall, None)
+    put(wb.Box((0.7, 0.7, 0.02)), "roof", 1.2, 1.2, wall + 0.02, None)
+    for k in range(4):
+        put(wb.Box((0.12, 0.12, 0.12)), f"pillar {k}", 1.2, 1.2, 0.0601 + 0.1201 * k, wb.Body())
+    for k in range(5):
+        put(wb.Box((0.2, 0.2, 0.1)), f"box {k}", -0.7, -0.7, 0.0501 + 0.1001 * k, wb.Body())
+    for k in range(8):
+        put(wb.Box((0.02, 0.08, 0.16)), f"domino {k}", 0.09 * k - 0.3, 0.3, 0.0801, wb.Body())
+    rng = np.random.default_rng(seed)
+    for k in range(6):
+        forward, left = (float(v) for v in rng.normal(size=2))
+        put(wb.Sphere(0.06), f"ball {k}", 0.25 * k - 0.7, -0.2, 0.3, wb.Body(velocity=(forward, left, 0.0)))
+    return RigidBodies(scene), names, [name for name in names if name.startswith("pillar")]

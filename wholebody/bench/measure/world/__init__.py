@@ -1,1 +1,0 @@
-"""The same drops in wholebody, MuJoCo and Rapier: penetration, energy, time."""

@@ -1,0 +1,316 @@
+"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world`, `robots`: what things cost and achieve."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterable, Sequence
+from functools import partial
+from itertools import product
+from pathlib import Path
+
+from wholebody.base import checks
+from wholebody.base.files import make_folder
+from wholebody.bench.rows import Panel, Row, chart, report
+from wholebody.bench.tables import machine, write_rows
+from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
+from wholebody.cli.command import count, option
+
+
+def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
+    """The names that an option chooses; all of them where it is left out.
+
+    Raises:
+        UnknownNameError: one is not known.
+    """
+    names = tuple(known)
+    return names if wanted is None else tuple(checks.known(name, names, "name", flag) for name in wanted)
+
+
+def _charts(name: str, panels: Sequence[Panel], caption: str) -> dict[str, Chart]:
+    return {name: Chart(partial(chart, panels), caption)} if panels else {}
+
+
+@measuring(
+    "step",
+    "one step of tracking by every tool",
+    "The same 200-step reach by every tool that is installed, interleaved, judged independently. With "
+    "--figure it is made by these figures in place of the standing human; tools that do not take one say why.",
+    listed("--figure", "URDF or MJCF files, or names of figures", "FILE"),
+    count("--repeats", 5, "timed runs of every tool"),
+    option("--steps", type=int, default=200, metavar="N", help="of each run (default: 200)"),
+    listed("--tools", "only these (default: all that are installed)"),
+)
+def step(arguments: argparse.Namespace) -> None:
+    """Measure steps."""
+    from wholebody.bench.measure import step
+    from wholebody.bench.measure.track import VARIANTS, figure_tracks, track
+    from wholebody.bench.suite.adapters.registry import chosen_tools, tool_differences
+
+    tools = chosen_tools(arguments.tools)
+    repeats, steps = (1, 40) if arguments.quick else (arguments.repeats, arguments.steps)
+    facts = machine() | {"steps": str(steps), "repeats": str(repeats)}
+    figures = arguments.figure
+    courses = [course for spec in figures or () for course in figure_tracks(spec, steps)]
+    tracks = {course.name: course for course in courses or (track(name, steps) for name in VARIANTS)}
+    runs: dict[str, step.Runs] = {}
+    notes = [line for name in tools for line in tool_differences(name)]
+    tables: dict[str, list[Row]] = {}
+    for name, course in tracks.items():
+        taken, refused = step.taking(course, tools) if figures else (list(tools), {})
+        print(f"{name}: {course.pairs} pairs that can touch, tools {', '.join(taken)}")
+        notes += [f"{tool} does not take {name}: {sentence}" for tool, sentence in refused.items()]
+        runs[name] = step.measure(course, taken, repeats, print) if taken else {}
+        tables[f"{name}: time"] = step.time_rows(course, runs[name])
+        tables[f"{name}: result"] = step.result_rows(course, runs[name])
+    name = "step-figures" if figures else "step"
+    text = step.step_report(tables, facts, bool(figures), notes)
+    rows = {
+        f"{name}-{kind}": [row for title, some in tables.items() if title.endswith(kind) for row in some]
+        for kind in ("time", "result")
+    }
+    charts = _charts(name, step.panels(runs, tracks), "Share of steps within a time, and least distance of any pair")
+    publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
+
+
+PARTS = "task", "reaches", "detail"
+"""Of `wholebody bench solve`, each into a table of its own."""
+
+
+@measuring(
+    "solve",
+    "whole solves: a task and its memory, random reaches, levels of modelling",
+    """\
+Measure whole solves. `task`: the shelf, or a task of your own, with new and with used workspaces, and the memory of
+`wholebody pose`. `reaches`: random reaches from standing whose answer is known to exist; what was not solved is listed.
+`detail`: the same tasks with the person as spheres, capsules and hulls, with all joints and pairs and with those that a
+task needs, judged in the finest model.""",
+    listed("--parts", "what to measure (default: task reaches)", None, choices=PARTS, default=PARTS[:2]),
+    option("--task", type=Path, metavar="TASK.toml", help="of the part task (default: the shelf)"),
+    count("--count", None, "solves of the task (default: 30), reaches (200), cases of each level (8)"),
+    option("--first", type=int, default=0, metavar="SEED", help="seed of the first reach or case (default: 0)"),
+    listed("--methods", "such as qp, newton (default: qp, and qp/osqp for the task)"),
+    count("--jobs", 1, "processes of the reaches (default: 1, for steady times)"),
+)
+def solve(arguments: argparse.Namespace) -> None:
+    """Measure whole solves."""
+    for part in dict.fromkeys(arguments.parts):
+        {"task": _task, "reaches": _reaches, "detail": _detail}[part](arguments)
+
+
+def _task(arguments: argparse.Namespace) -> None:
+    """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
+    from wholebody.bench.measure import solve
+    from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.cli.demo import packaged_tasks
+
+    task, facts, rows = arguments.task or packaged_tasks()["shelf"], machine(), []
+    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count or 30
+    for row in solve.task_rows(task, methods, many):
+        rows.append(row)
+        print(f"{row.case}, {row.tool}, {row['problem and method']}: {row['median ms']:.1f} ms, {row['status']}")
+    peak = solve.memory(task)
+    about = "A task, solved with a new problem and a new method each time, and with the same ones again."
+    text = report(about, {"Solves": rows, "Memory": [peak]}, facts)
+    publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
+
+
+def _reaches(arguments: argparse.Namespace) -> None:
+    """Random reaches whose answer is known to exist."""
+    from wholebody.bench.measure import solve
+    from wholebody.bench.rows import shares
+    from wholebody.bench.suite.adapters.registry import adapters
+
+    seeds = range(arguments.first, arguments.first + (10 if arguments.quick else arguments.count or 200))
+    methods = [adapter.name for adapter in adapters(arguments.methods or ["qp"])]
+    facts, rows, notes = machine() | {"processes": str(arguments.jobs)}, list[Row](), list[str]()
+    for method in methods:
+        for row in solve.reaches(seeds, method, arguments.jobs):
+            rows.append(row)
+            if row["status"] != "solved":
+                notes.append(f"{row.case}, {method}: {row['status']}; {row['how']}")
+                print(notes[-1])
+    about = (
+        f"Random reaches from standing among twenty random objects and a floor, seeds {seeds[0]} to {seeds[-1]}; the "
+        "target is where a fingertip is in a sampled posture free of contact, so an answer exists. Both feet held, "
+        "effort minimised. Brackets hold 95 % intervals: Wilson's of shares, the bootstrap's of times."
+    )
+    text = report(about, {"": solve.reach_summary(rows)}, facts, notes or ["Every reach was solved."])
+    spent = {name: [row["ms"] for row in rows if row.tool == name and row["status"] == "solved"] for name in methods}
+    panel = shares("solved", "time of a solve [ms]", spent, dict.fromkeys(methods, len(seeds)))
+    charts = _charts("reaches", [panel], "Share of the reaches solved within a time")
+    publish("reaches", text, arguments, facts=facts, tables={"reaches": rows}, charts=charts)
+
+
+def _detail(arguments: argparse.Namespace) -> None:
+    """The same tasks with every detail of geometry, judged in the finest model."""
+    from wholebody.bench.measure import solve
+
+    facts, refused = machine(), dict[str, None]()
+    rows = list(solve.detail_rows(2 if arguments.quick else arguments.count or 8, arguments.first, refused.setdefault))
+    about = (
+        "Answers of `qp` that their own model calls solved, judged in the finest model with everything in it: how "
+        "many are inside something by more than 0.1 mm, and by how much the worst misses what it is asked; the effort "
+        "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
+        "is `wb.simplify`."
+    )
+    text = report(about, {"": solve.detail_summary(rows)}, facts, list(refused))
+    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
+
+
+@measuring(
+    "scaling",
+    "time of a step and a solve against joints, pieces and things, with exponents",
+    "Chains of 5 to 200 joints (500 bodies without a model of joints), 1 to 32 pieces a segment, 10 to "
+    "5000 things around, and the exponents with which times grow.",
+    count("--repeats", 5, "timed solves each"),
+    listed("--methods", "methods (default: qp newton ccd placo)"),
+)
+def scaling(arguments: argparse.Namespace) -> None:
+    """Measure, fit, draw."""
+    from wholebody.bench.measure import scaling
+
+    methods = chosen(arguments.methods, scaling.METHODS, "--methods")
+    repeats, sizes = (2, scaling.QUICK) if arguments.quick else (arguments.repeats, scaling.SIZES)
+    facts, said = machine(), list[str]()
+
+    def say(line: str) -> None:
+        said.append(line)
+        print(line, flush=True)
+
+    rows = list(scaling.rows(sizes, methods, repeats, say))
+    if "newton" in methods:
+        bodies = sizes["joints"] if arguments.quick else (*sizes["joints"], 500)
+        rows += scaling.assembly_rows(bodies, repeats)
+    about = (
+        "A chain 2 m long that reaches for a place among boxes. What does not grow: 12 joints with ten segments of "
+        "one box each, ten things around. Solves and judgements are the least of the repeats by the clock, the rest "
+        "is the processor's time. An exponent e means time ~ size^e; it is the slope of a line through the logarithms "
+        "over the sizes from a tenth of the largest on (at least three)."
+    )
+    tables = {"Exponents": scaling.exponents(rows), "Times": rows}
+    text = report(about, tables, facts, [line for line in said if "left out" in line])
+    charts = _charts("scaling", scaling.panels(rows), "Time of a solve and of a step, as one size grows")
+    publish("scaling", text, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
+
+
+CLIPS = (
+    option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),
+    listed("--only", "names of clips (default: all)", "CLIP"),
+)
+
+
+def clips(arguments: argparse.Namespace, most: int | None) -> dict[str, Path | None]:
+    """The chosen clips, at most so many: their recordings, None for one that needs none."""
+    from wholebody.bench.measure.clips import SYNTHETIC, recordings
+
+    known: dict[str, Path | None] = dict.fromkeys(SYNTHETIC)
+    known |= {path.stem: path for path in recordings(arguments.clips)}
+    return {name: known[name] for name in chosen(arguments.only, known, "--only")[:most]}
+
+
+@measuring(
+    "motion",
+    "clips freed of collisions by each method, with each piece of equipment",
+    "Free clips of collisions by each method, with each piece of equipment, and judge every frame and "
+    "every motion between frames; clips that need no recordings, and the recordings of a folder. Each case runs in "
+    "a process of its own. A run that was ended goes on where its folder holds what was measured.",
+    *CLIPS,
+    listed("--equipment", "what is worn (default: all)"),
+    listed("--methods", "methods, and check (default: all)"),
+    count("--jobs", 1, "cases at a time"),
+)
+def motion(arguments: argparse.Namespace) -> None:
+    """Measure, or go on; --quick takes two clips with two pieces of equipment."""
+    from wholebody.bench.measure import motion
+    from wholebody.bench.measure.clips import EQUIPMENT
+    from wholebody.motion.avoidance import METHODS
+
+    few = 2 if arguments.quick else None
+    recordings = clips(arguments, few)
+    worn = chosen(arguments.equipment, EQUIPMENT, "--equipment")[:few]
+    methods = chosen(arguments.methods, (motion.CHECKED, *METHODS), "--methods")
+    facts, cases = machine(), list(product(recordings, worn, methods))
+    rows = motion.run(recordings, cases, arguments.out, facts, arguments.jobs, partial(print, flush=True))
+    charts = _charts("motion", motion.panels(rows), "Share of the cases freed within a deviation, a jerk and a time")
+    publish("motion", motion.motion_report(rows, facts), arguments, charts=charts)
+
+
+WORLD = {
+    "closed": "Known by formula",
+    "throws": "Thrown at a person",
+    "drops": "The same drops in three engines",
+    "long": "For minutes",
+}
+"""Parts of `wholebody bench world`, and the titles of their tables."""
+
+
+@measuring(
+    "world",
+    "things that move by themselves: closed forms, throws at a person, drops beside MuJoCo and Rapier",
+    "Measure motions whose outcome is known by formula; throw things at a person who stands, walks or "
+    "is dragged; drop, slide and stack the same things in wholebody, MuJoCo and Rapier; let dominoes, stacks and "
+    "balls move for minutes. The whole takes about 15 minutes of one processor.",
+    listed("--parts", "closed, throws, drops, long (default: all)", "PART"),
+    listed("--only", "names of drops (default: all)", "DROP"),
+    listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
+    option("--minutes", type=float, default=10.0, metavar="N", help="simulated minutes of the long run (default: 10)"),
+)
+def world(arguments: argparse.Namespace) -> int:
+    """Measure; --quick takes three drops for half a second, one throw of each kind, three seconds of the long run."""
+    found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
+    given = _world(arguments)
+    make_folder(arguments.out)
+    facts = machine()
+    for part, rows in found.items():
+        for row in given[part]:
+            rows.append(row)
+            print(f"{row.case}, {row.tool}: {', '.join(f'{name} {value}' for name, value in row.figures.items())}")
+            write_rows(arguments.out / f"world-{part}.csv", facts, rows)
+    about = (
+        "Things fly at a person of 55 degrees of freedom who is posed by qp, 60 frames a second; with swift limits "
+        "the person may move faster than the thing, so a free posture is within reach; human limits are 12 rad/s and "
+        "4 m/s. MuJoCo runs with its default contacts in steps of 1/480 s, Rapier with its defaults in steps of a "
+        "frame; depths are measured by coal at the end of every frame, energies are in parts of that at the start. "
+        "Times are the processor's."
+    )
+    publish("world", report(about, {WORLD[part]: rows for part, rows in found.items()}, facts), arguments)
+    held = all(row["held"] == "yes" for row in found.get("closed", ()))
+    return 0 if held and not any(row["silent"] for row in found.get("throws", ())) else 1
+
+
+def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
+    """What measures each part; names are checked before anything is measured."""
+    from wholebody.bench.measure import closed_forms, drops, throws
+
+    quick = arguments.quick
+    known = {drop.name: drop for drop in drops.drops()}
+    names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
+    tools = drops.installed(chosen(arguments.engines, drops.ENGINES, "--engines"))
+    minutes = 0.05 if quick else checks.number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
+    frames = 30 if quick else None
+    return {
+        "closed": closed_forms.closed_forms(),
+        "throws": throws.all_throws(1 if quick else 3, quick),
+        "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
+        "long": (throws.long_run(each) for each in (minutes,)),
+    }
+
+
+@measuring(
+    "robots",
+    "load every robot description of a folder, and reach with its tips",
+    "Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
+    "of each robot to where random postures free of contact have them. With --update-docs the table becomes "
+    "docs/robots.md.",
+    option("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions"),
+)
+def robots(arguments: argparse.Namespace) -> None:
+    """Measure all descriptions; --quick makes three reaches instead of twelve."""
+    from wholebody.bench.measure.robots import measure, page
+
+    facts, reaches, found = machine(), 3 if arguments.quick else 12, []
+    for row in measure(arguments.folder, reaches):
+        found.append(row)
+        told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
+        print(f"{row.case}: {told}", flush=True)
+    publish_page("robots.md", page(found, facts, reaches), arguments)
