@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import MISSING, dataclass, fields
 from typing import Annotated, Literal
 
+import numpy as np
+import pinocchio as pin
 import pytest
 
 import wholebody as wb
@@ -56,6 +58,19 @@ def test_values_are_kept_in_the_form_in_which_they_are_used() -> None:
     made = Bench("park", height=1, load=float("inf"), size=[1, 2], seats=["left", "right"])  # type: ignore[arg-type]
     assert type(made.height) is float
     assert (made.load, made.size, made.seats) == (float("inf"), (1.0, 2.0), ("left", "right"))
+
+
+def test_a_term_keeps_what_it_was_given_and_not_the_callers_array() -> None:
+    place = np.array([0.1, 0.2, 0.3])
+    for term in (
+        wb.Point("right_palm", place),
+        wb.CenterOfMass(place),
+        wb.Frame("right_palm", pin.SE3(np.eye(3), place)),
+    ):
+        told = repr(term)
+        place += 1.0
+        assert repr(term) == told
+        place -= 1.0
 
 
 def test_every_field_of_the_package_can_be_read() -> None:

@@ -137,6 +137,8 @@ class Checked:
             value = getattr(self, field.name)
             if value is not None or not field.optional:
                 checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
+                if field.kept != field.name and hasattr(value, "copy"):  # the caller may change an array of its own
+                    checks.settle(self, field.name, value.copy())
 
 
 def called(record: object) -> str:
