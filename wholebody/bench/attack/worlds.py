@@ -72,13 +72,13 @@ def sleeper(rng: np.random.Generator, folder: Path) -> Verdict:
     step = chosen(rng, (1e-6, 5e-6, 2e-5, 7e-5, 3e-4))  # m or rad a frame
     far = 3.0 if way == "leaves" else chosen(rng, (5e-5, 2e-4, 1e-3))
     slow = way in ("slides", "turns")
-    first, places = np.array([3.0, 0.0, -0.1]), []
+    first, places = np.array([3.0, 0.0, -1.1]), []  # below the figure
     for frame in range(1, 61 if slow else 2):
         turn = pin.exp3(direction * step * frame) if way == "turns" else np.eye(3)
         shift = 0.0 if way == "turns" else step * frame if slow else far
         places.append(xyzquat(pin.SE3(turn, first + shift * direction)))
     scene = wb.Scene(planar_arm([0.5])).add(support, name="support", at=first)
-    scene.add(solid, name="sleeper", at=(3.0, 0.0, 0.5 * edge + 5e-5), body=wb.Body(density=700.0))
+    scene.add(solid, name="sleeper", at=(3.0, 0.0, -1.0 + 0.5 * edge + 5e-5), body=wb.Body(density=700.0))
     return slept(scene, places, over=bool(rng.random() < 0.5) and slow)
 
 
