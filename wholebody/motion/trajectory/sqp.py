@@ -201,7 +201,7 @@ class WindowProgram:
             cancel: told how far it is.
             radius: first trust region; None for that of the settings.
             largest: largest trust region; None for that of the settings.
-            early: end where much is missed after ten steps, or no longer less, for there are other deviations to begin with.
+            early: end where much is missed after ten steps, or no longer less, as there are other beginnings.
             rough: end as soon as little is missed, however much less the objective could be.
         """
         here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
