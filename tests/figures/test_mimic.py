@@ -146,12 +146,12 @@ def test_it_is_solved_swept_tracked_reduced_and_judged(load: Callable[..., wb.Fi
 def test_placo_couples_followers_by_gears(load: Callable[..., wb.Figure]) -> None:
     pytest.importorskip("placo", reason="placo is not installed (the extra placo)")
     figure = load(HAND.replace('offset="0.1"', 'offset="0"'))
-    goal_q = figure.with_joints(figure.neutral, {"z_leader": 0.3, "own": -0.4})
+    goal_q = figure.with_joints(figure.neutral, {"z_leader": -0.5, "own": -0.4})
     state = wb.Scene(figure).state(goal_q)
     goals = [wb.Point(link, state.frame(figure.frame_id(link)).translation.copy()) for link in ("c", "e")]
     solution = wb.solve(wb.Problem(wb.Scene(figure), goals=goals), method="placo")
     assert solution.solved, solution
-    assert figure.joint_values(solution.q)["z_leader"] == pytest.approx(0.3, abs=1e-3)
+    assert figure.joint_values(solution.q)["z_leader"] == pytest.approx(-0.5, abs=1e-3)
 
 
 def test_a_follower_of_what_does_not_move_is_fixed_where_it_is(load: Callable[..., wb.Figure]) -> None:

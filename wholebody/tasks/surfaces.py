@@ -281,8 +281,9 @@ def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -
         for step in (-EDGE, EDGE):
             slid = pin.SE3(b.rotation, b.translation + step * way)
             found.append(-np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
-    normals: Array = np.array(found)
-    return normals[np.linalg.norm(normals, axis=1) > 0.5]
+    normals = np.array(found)
+    sound: Array = normals[np.linalg.norm(normals, axis=1) > 0.5]
+    return sound
 
 
 def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:

@@ -201,15 +201,16 @@ class WindowProgram:
             cancel: told how far it is.
             radius: first trust region; None for that of the settings.
             largest: largest trust region; None for that of the settings.
-            early: end where much is missed still and no longer less, for there are other deviations to begin with.
+            early: end where much is missed after ten steps, or no longer less, as there are other beginnings.
             rough: end as soon as little is missed, however much less the objective could be.
         """
         here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
-        counts = self._counts(here)
+        counts, smallest = self._counts(here), 0.5 * ways.radius
         for number in range(self._iterations):
             missed.append(here.worst)
-            if early and here.worst > FAR and _stalled(missed):
+            vain = number >= 10 or ways.radius < smallest or _stalled(missed)
+            if early and here.worst > FAR and vain:
                 return SQPResult(here.x, here.objective, here.worst, programs, End.EARLY)
             if cancel(number, here.worst):
                 return SQPResult(here.x, here.objective, here.worst, programs, End.CANCELLED)
