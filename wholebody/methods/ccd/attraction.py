@@ -18,6 +18,8 @@ LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by le
 BLOCKED = 0.4  # a part that gains less than this share of the gain without contact is blocked (2 is all of it)
 ARRIVED = 1e-12  # rad^2: a part nearer than this has arrived
 
+LEAST_REACH = 1e-9  # m: of joints that move no point of the figure, such as the last of a link without shape
+
 
 class Attraction:
     """Moves the chains of one figure, and the remaining joints (the root and trunk) as one more part.
@@ -40,7 +42,8 @@ class Attraction:
             dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
             fresh = rest[dofs]
             rest[dofs] = False
-            self.parts.append((dofs[fresh], np.array(chain.reach)[fresh]))
+            reach = np.maximum(chain.reach, LEAST_REACH)  # steps are divided by it
+            self.parts.append((dofs[fresh], reach[fresh]))
         size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
         others = np.flatnonzero(rest)
         reach = np.full(len(others), 2.0 * size)

@@ -10,6 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.geometry.penetration import global_depth
 from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
@@ -149,6 +150,22 @@ def test_cancelling_normals_do_not_hold_a_link_inside(
     assert not left
     assert deepest(scene, q) <= 1e-4
     assert np.abs(q).max() < 0.4
+
+
+def test_a_joint_that_moves_no_point_follows_what_is_tracked() -> None:
+    builder = Builder("arm with a bare joint")
+    turn = builder.joint("ry", "turn")
+    builder.rod(turn, (0.3, 0.0, 0.0), 0.02)
+    builder.rod(builder.joint("ry", "fore", parent=turn, at=(0.3, 0.0, 0.0)), (0.3, 0.0, 0.0), 0.02)
+    builder.joint("rz", "bare", parent=turn, at=(0.1, 0.0, 0.0))
+    scene = wb.Scene(builder.figure()).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.0, -0.2))
+    wanted = np.array([0.4, 0.0, 0.5])
+    assert scene.overlapping(wanted).pair.size
+    q = np.zeros(3)
+    for _ in range(5):
+        q = resolve_overlap(scene, q, wanted, np.random.default_rng(0)).q
+    assert q[2] == pytest.approx(0.5)
+    assert not scene.overlapping(q).pair.size
 
 
 @pytest.mark.parametrize("bad", [np.zeros(3), np.full(38, np.nan)])
