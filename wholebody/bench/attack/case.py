@@ -18,6 +18,9 @@ PATTERN = (
     + ("file", "sweep", "file", "solve") * 3
     + ("file", "solve", "file", "stream") * 2
     + ("file", "solve", "file", "contact")
+    + ("file", "own-term", "file", "pairs")
+    + ("file", "sleeper", "file", "weights")
+    + ("file", "put")
 )
 """Kinds of cases in turn: two mutated files for each solve."""
 KINDS = tuple(dict.fromkeys(PATTERN))

@@ -78,7 +78,7 @@ class Pairs:
                 self._pieces.append((name, 0, thing.placement * piece.placement, piece.geometry))
         self.owners = [(self._pieces[a][0], self._pieces[b][0]) for a, b in pairs]
         self._pairs = pairs
-        self.size = max((_extent(geometry) for _, _, _, geometry in self._pieces), default=0.0)
+        self.size = max((extent(geometry) for _, _, _, geometry in self._pieces), default=0.0)
 
     def distances(self, q: Array) -> Array:
         """Signed distances (pairs,) at a posture (nq,), metres."""
@@ -147,7 +147,7 @@ def _limits(model: pin.Model, q: Array) -> float:
     return float(worst)
 
 
-def _extent(geometry: Any) -> float:
+def extent(geometry: Any) -> float:
     """Radius of a piece about its origin, metres; 0 for a half-space, whose distances need none."""
     if isinstance(geometry, coal.Halfspace):
         return 0.0
@@ -173,7 +173,7 @@ class _Body:
             left = self._after.com[0] - np.array(term.target, dtype=float)
             return float(np.linalg.norm(left[: len(term.axes)]))
         if isinstance(term, wb.Frame):
-            return _apart(self._at(term.frame), _placement(term.target))
+            return apart(self._at(term.frame), _placement(term.target))
         if isinstance(term, wb.Orientation):
             return _angle(self._at(term.frame).rotation, pin.Quaternion(np.array(term.target, dtype=float)).matrix())
         if isinstance(term, wb.Axis):
@@ -188,7 +188,7 @@ class _Body:
         """By how much a constraint or a frozen joint misses what must hold; nothing for bounds on speeds."""
         if isinstance(term, wb.Hold):
             wanted = self._at(term.frame, self._before) if term.at is None else _placement(term.at)
-            yield _apart(self._at(term.frame), wanted, term.orientation)
+            yield apart(self._at(term.frame), wanted, term.orientation)
         elif isinstance(term, wb.Plane):
             normal = np.array(term.normal, dtype=float)
             point = self._at(term.frame, self._before).translation if term.point is None else np.array(term.point)
@@ -226,7 +226,8 @@ def _placement(at: Any) -> pin.SE3:
     return pin.SE3(turn, values[:3])
 
 
-def _apart(a: pin.SE3, b: pin.SE3, orientation: bool = True) -> float:
+def apart(a: pin.SE3, b: pin.SE3, orientation: bool = True) -> float:
+    """Distance of two placements, metres, or their angle, radians, where it is larger."""
     distance = float(np.linalg.norm(a.translation - b.translation))
     return max(distance, _angle(a.rotation, b.rotation)) if orientation else distance
 

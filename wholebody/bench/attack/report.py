@@ -20,6 +20,11 @@ ATTACKED = {
     "stream": "streams of moving goals and things, every step and the way between two",
     "sweep": "sweeps against a fine subdivision",
     "contact": "contacts, against the effort of a point or frame at the place found",
+    "own-term": "solves and steps with terms of one's own that are not finite, or answer something odd",
+    "pairs": "things in each other, against every two pieces",
+    "sleeper": "sleeping bodies whose support slides, turns, jumps or leaves",
+    "weights": "goals of one frame with weights from 1 to 1e6, met in at most thrice the frames of equal ones",
+    "put": "things that are put into a figure that is shown, every frame free or told",
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
 }

@@ -17,7 +17,7 @@ from pathlib import Path
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs
-from wholebody.bench.attack import arguments, contacts, files, solves, ways
+from wholebody.bench.attack import arguments, contacts, files, frames, own_terms, solves, ways, worlds
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 
 CASES = {
@@ -27,6 +27,11 @@ CASES = {
     "stream": ways.stream,
     "sweep": ways.sweep,
     "contact": contacts.case,
+    "own-term": own_terms.case,
+    "pairs": worlds.pairs,
+    "sleeper": worlds.sleeper,
+    "weights": frames.weights,
+    "put": frames.put,
 }
 
 

@@ -36,7 +36,7 @@ class Thing:
         return pin.SE3(pin.Quaternion(np.array(self.at[3:])).matrix(), np.array(self.at[:3]))
 
 
-def _shape(rng: np.random.Generator, size: float) -> wb.Shape:
+def shape(rng: np.random.Generator, size: float) -> wb.Shape:
     """A shape of about a size, metres."""
     kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))
     scale = size * float(np.exp(rng.uniform(np.log(0.02), np.log(0.6))))
@@ -74,7 +74,7 @@ def _corner(size: float) -> wb.Shape:
     return wb.Mesh((np.array(vertices), np.array(faces)))
 
 
-def _somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
+def somewhere(rng: np.random.Generator, placed: Occupied, size: float) -> pin.SE3:
     """A place about a figure."""
     middle, spread = _extent(placed)
     reach = 1.3 * spread + 0.5 * size
@@ -90,8 +90,8 @@ def _extent(placed: Occupied) -> tuple[Array, float]:
 def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, postures: list[int]) -> Thing | None:
     """Return a thing that leaves some room, metres, around a figure in some of its postures; None if none was found."""
     for _ in range(20):
-        made = _shape(rng, size)
-        at = _somewhere(rng, placed, size)
+        made = shape(rng, size)
+        at = somewhere(rng, placed, size)
         if all(placed.distance(made, at, posture) > room for posture in postures):
             return Thing(made, xyzquat(at))
     return None
@@ -99,7 +99,7 @@ def clear(rng: np.random.Generator, placed: Occupied, size: float, room: float, 
 
 def inside(rng: np.random.Generator, placed: Occupied, size: float, depth: float) -> Thing | None:
     """Return a thing that is in the figure's first posture by a depth, metres; None where its shape does not let it."""
-    made = _shape(rng, size)
+    made = shape(rng, size)
     if not placed.places:
         return None
     start = placed.places[int(rng.integers(placed.count))]
