@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
-from wholebody.tasks.contact_parts import MOST_OF_PART
+from wholebody.tasks.kinks import MOST_FACES
 
 AS_CHEAP = 1.02  # times the effort at the place
 STATIONARY = 1e-2  # rad, m
@@ -93,7 +93,7 @@ def test_derivatives_of_supporting_planes(name: str) -> None:
     planes = term.supporting_planes(state.update(start))
     assert planes is not None
     assert len(planes.value) > 1
-    of_part = planes.key % MOST_OF_PART
+    of_part = planes.key % (3 * MOST_FACES)
     faces = (of_part < 6) | (of_part >= 6 + 4)  # those of edges are found anew at each posture
     half, rng = 1e-6, np.random.default_rng(1)
     for way in rng.normal(size=(6, model.nv)):

@@ -18,7 +18,8 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, edge_normals, faces_met, foot, nearest
+from wholebody.tasks.kinks import MOST_FACES, bends, edge_normals, faces_met
+from wholebody.tasks.surfaces import Face, Nearest, Surface, foot, nearest
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance

@@ -43,6 +43,12 @@ class Compiled:
         self.path, self.model = path, _compile(path)
         self.names = _names(self.model)
 
+    @property
+    def name(self) -> str:
+        """Of the model, or of the file where it has none."""
+        names: bytes = self.model.names
+        return names[: names.index(b"\0")].decode() or self.path.stem
+
     @cached_property
     def children(self) -> list[list[int]]:
         """Bodies that hang on each body."""

@@ -84,7 +84,7 @@ def mjcf_figure(
     untested = _Untested(compiled, [kept[number] for number in made.shapes])
     return robot_figure(
         Robot(
-            str(compiled.model.names[: compiled.model.names.index(b"\0")], "utf-8") or compiled.path.stem,
+            compiled.name,
             robot.model, links, made.geometry, (*notes, *made.notes), None, robot.sites,
             _postures(compiled, robot), robot.cones, untested=untested,
             place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,

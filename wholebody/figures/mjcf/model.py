@@ -88,7 +88,7 @@ class _Builder:
 
     def build(self) -> RobotModel:
         theirs, file, model = self._file.model, self._file, self._model
-        model.name = file.path.stem
+        model.name = file.name
         at: dict[int, tuple[int, pin.SE3]] = {0: (0, pin.SE3.Identity())}
         for body in self._bodies:
             joint, place = self._moved(body, *at[theirs.body_parentid[body]])

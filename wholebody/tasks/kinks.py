@@ -1,0 +1,146 @@
+"""Kinks of the distance between two surfaces: planes of faces, normals of edges that cross, round pieces that bend."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.figures.state import State
+from wholebody.tasks.axis import across
+from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, between_pieces, outermost
+
+FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
+MOST_FACES = 256  # more than a piece ever has
+SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
+GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
+STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
+EDGE = 1e-3  # m: by which pieces are moved along each other to find the normals of edges that cross near a contact
+
+NO_NORMALS: Array = np.zeros((0, 3))
+
+
+class FacePlane(NamedTuple):
+    """The plane of a face of one piece, and the point of another piece that is farthest behind it.
+
+    Attributes:
+        value: how far in front of the plane that point is [m]; not positive where the pieces touch.
+        normal: (3,) outward.
+        point: (3,) [m].
+        key: number of the face.
+    """
+
+    value: float
+    normal: Array
+    point: Array
+    key: int
+
+
+def faces_met(
+    first: Surface, second: Surface, pieces: tuple[int, int], state: State, others: Array = NO_NORMALS
+) -> list[FacePlane]:
+    """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
+
+    Faces beyond which another piece of the second surface goes on where it is touched are no end of it, and are left
+    out.
+
+    Args:
+        first: the surface that meets them.
+        second: the one that has them.
+        pieces: the nearest ones.
+        state: at the posture.
+        others: (k, 3) normals that count as those of faces too: where edges cross, neither piece has a face.
+    """
+    i, j = pieces
+    swept = second.swept[j]
+    if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
+        return []
+    ours, theirs = first.placed(i, state), second.placed(j, state)
+    normals = np.vstack([swept.faces[:, :3] @ theirs.rotation.T, others])
+    corners = swept.points @ theirs.rotation.T + theirs.translation
+    faces = swept.faces[:, 3] + normals[: len(swept.faces)] @ theirs.translation
+    offsets = np.append(faces, (corners @ others.T).max(axis=0))
+    points = np.array([_behind(first, i, ours, normal) for normal in normals])
+    values = np.einsum("ij,ij->i", normals, points) - offsets
+    found = []
+    for key in np.argsort(-values)[:FACES].tolist():
+        plane = FacePlane(float(values[key]), normals[key], points[key], key)
+        if not _goes_on(second, j, plane, first.shapes[i], ours, state):
+            found.append(plane)
+    return found
+
+
+def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Normals (k, 3) from the second surface to the first, of what meets where their pieces slide along each other.
+
+    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has.
+    There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
+    """
+    i, j = near.pieces
+    sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
+    if not sharp or abs(near.distance) > STEP:
+        return NO_NORMALS
+    a, b, found = first.placed(i, state), second.placed(j, state), []
+    for way in across(near.normal)[:2]:
+        for step in (-EDGE, EDGE):
+            slid = pin.SE3(b.rotation, b.translation + step * way)
+            found.append(-np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
+    normals = np.array(found)
+    sound: Array = normals[np.linalg.norm(normals, axis=1) > 0.5]
+    return sound
+
+
+def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
+
+    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none.
+    """
+    i, j = near.pieces
+    a, b = first.placed(i, state), second.placed(j, state)
+    round_by = _roundness(first, i) + _roundness(second, j)
+    if round_by == 0.0:
+        return np.zeros((0, 3))
+    along = across(near.normal)[:2]
+    turned, step = np.empty((2, 2)), SLIDE * round_by
+    for row, way in enumerate(along):
+        normals = []
+        for sign in (-step, step):
+            slid = pin.SE3(b.rotation, b.translation + sign * way)
+            normals.append(np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
+        turned[row] = along @ (normals[1] - normals[0]) / (2.0 * step)
+    values, vectors = np.linalg.eigh(0.5 * (turned + turned.T))
+    values = np.where(np.isfinite(values), np.clip(values, 0.0, 2.0 / round_by), 0.0)
+    return np.asarray((np.sqrt(values)[:, None] * vectors.T)[values > 0.0] @ along)
+
+
+def _roundness(surface: Surface, number: int) -> float:
+    """Radius by which a piece is round [m]; 0 for a point and what has flat faces, the least of an ellipsoid."""
+    if surface.fixed is not None:
+        return 0.0
+    swept = surface.swept[number]
+    return float(swept.radius) if len(swept.points) or not np.isfinite(swept.reach) else 0.5 * float(swept.width)
+
+
+def _behind(surface: Surface, number: int, placement: pin.SE3, normal: Array) -> Array:
+    """The point (3,) of a piece that is farthest against a direction (3,)."""
+    points = outermost(surface.shapes[number], placement, -normal, surface.swept[number])
+    return np.asarray(points[int(np.argmin(points @ normal))])
+
+
+def _goes_on(thing: Surface, number: int, plane: FacePlane, shape: Any, placed: pin.SE3, state: State) -> bool:
+    """Whether another piece than `number` reaches beyond a plane near its point, and a placed shape touches it."""
+    offset = float(plane.normal @ plane.point) - plane.value
+    for other, own in enumerate(thing.shapes):
+        if other != number:
+            place = thing.placed(other, state)
+            if float(np.linalg.norm(place.translation - plane.point)) < thing.reach[other] + GOES_ON:
+                beyond = (
+                    not np.isfinite(thing.reach[other])
+                    or float((outermost(own, place, plane.normal, thing.swept[other]) @ plane.normal).max())
+                    > offset + ACCURACY
+                )
+                if beyond and between_pieces(shape, placed, own, place).min_distance <= STEP:
+                    return True
+    return False
