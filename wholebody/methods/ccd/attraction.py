@@ -17,7 +17,6 @@ from wholebody.scene.scene import Scene
 LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
 BLOCKED = 0.4  # a part that gains less than this share of the gain without contact is blocked (2 is all of it)
 ARRIVED = 1e-12  # rad^2: a part nearer than this has arrived
-
 LEAST_REACH = 1e-9  # m: of joints that move no point of the figure, such as the last of a link without shape
 
 
