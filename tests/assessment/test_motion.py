@@ -63,6 +63,14 @@ def test_a_way_through_a_plate_is_seen_though_both_ends_are_free(beside_a_plate:
     assert depth_between(beside_a_plate, after, after, 1e-3) == (0.0, "")
 
 
+def test_a_joint_without_limits_has_jerk() -> None:
+    model = pin.Model()
+    model.addJoint(0, pin.JointModelRUBZ(), pin.SE3.Identity(), "turn")  # two coordinates, one degree of freedom
+    angle = 2.0 * (0.01 * np.arange(8)) ** 3
+    motion = np.column_stack([np.cos(angle), np.sin(angle)])
+    np.testing.assert_allclose(motion_assessment.jerk(model, motion, 0.01), 12.0, rtol=1e-6)
+
+
 def test_limits_speeds_and_jerk_of_a_known_motion(planar_arm: Arms) -> None:
     """A joint that moves as a t^3 has the third derivative 6 a; a motion without acceleration has none."""
     scene, dt = wb.Scene(planar_arm((0.4, 0.3))), 0.01

@@ -20,6 +20,7 @@ from wholebody.figures.description import ROOT_JOINT, Description, followers_of,
 from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.model_check import LARGEST, check_model
 from wholebody.figures.reduction import reduced_parts
+from wholebody.figures.state import has_free_root
 
 
 def _with_limits(made_from: tuple[Any, ...], limits: Mapping[str, Array]) -> Figure:
@@ -94,8 +95,7 @@ class Figure(checks.FixedAttributes):
         self._description = description
         self._made: dict[str, Array] = {}
         self._outer: tuple[pin.GeometryObject, ...] | None = None
-        first = model.joints[1] if model.njoints > 1 else None
-        self.root = "free" if first is not None and first.nq == 7 else "fixed"
+        self.root = "free" if has_free_root(model) else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
         self._joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)

@@ -184,6 +184,11 @@ def _restored(model: pin.Model, q: Array) -> State:
     return State(model).update(q)
 
 
+def has_free_root(model: pin.Model) -> bool:
+    """Whether a model has a floating base. A joint without limits too has more coordinates than degrees of freedom."""
+    return bool(model.njoints > 1 and model.joints[1].nq == 7)
+
+
 def joint_support(model: pin.Model) -> Array:
     """Which columns of the joint Jacobian move which joint: 0/1 array (njoints, n); the world's row is zero."""
     parents, firsts, widths = (vector.tolist() for vector in (model.parents, model.idx_vExtendeds, model.nvExtendeds))

@@ -16,6 +16,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.figures.state import has_free_root
 from wholebody.terms.linearisation import PackedLinearisation
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
@@ -94,7 +95,7 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
 def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
     """Displacements (nv,) to begin at, all within a box (2, nv)."""
     yield np.zeros(model.nv)
-    free = model.nq > model.nv
+    free = has_free_root(model)
     if free and np.isfinite(box[:, :ROOT]).all() and box[:, :ROOT].any():
         for way in WAYS:
             begun = np.zeros(model.nv)
