@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown, warn
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
@@ -62,31 +63,62 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     text = read_text(path, "track", LARGEST)
     lines = _lines(path, text)
     number, first = next(lines, (1, []))
-    if len(first) == 1 and ";" in first[0]:
-        raise FileFormatError(
-            f"{path.name}, line {number}: the columns are separated by semicolons; write commas between them, "
-            "and points in numbers"
-        )
-    in_degrees = [name.strip().lower().endswith(DEGREES) for name in first]
-    names = [
-        re.sub(r"\s*[\[(](deg|degrees|rad|radians)[\])]$", "", name.strip(), flags=re.IGNORECASE) for name in first
-    ]
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
-    for name in names:
-        known(name, wanted, "column", f"{path.name}, line {number}")
-    twice = [name for name in wanted if names.count(name) > 1]
-    if twice:
-        raise FileFormatError(f"{path.name}, line {number}: the column {twice[0]} stands there twice; leave one out")
-    missing = [name for name in wanted if name not in names]
-    root = [name for name in missing if name in ROOT_COLUMNS]
-    if TIME in missing or len(missing) >= len(wanted) - 1 or 0 < len(root) < len(ROOT_COLUMNS):
-        lacked = [TIME] if TIME in missing else root if 0 < len(root) < len(ROOT_COLUMNS) else missing
-        raise InputError(
-            f"{path.name}, line {number}: the columns lack {', '.join(lacked[:4])}; {len(missing)} are missing"
+    names = _columns(f"{path.name}, line {number}", first, wanted)
+    table, places, decimals = _numbers(path, number, lines, names)
+    in_degrees = [name.strip().lower().endswith(DEGREES) for name in first]
+    table[:, in_degrees] = np.radians(table[:, in_degrees])
+    dt = _time_step(path, table[:, names.index(TIME)], places, decimals)
+    broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
+    if len(broken):
+        row, column = (int(k) for k in broken[0])
+        raise FileFormatError(
+            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
+            f"finite or beyond {LARGEST_VALUE:g}; correct or cut those frames"
         )
+    missing = [name for name in wanted if name not in names]
     if missing:
         more = f" and {len(missing) - 4} more" if len(missing) > 4 else ""
         warn(f"{path.name}: no column for {', '.join(missing[:4])}{more}; they stay as in the neutral posture")
+    q = np.tile(figure.neutral, (len(table), 1))
+    for column, name in enumerate(wanted[1:]):
+        if name in names:
+            q[:, column] = table[:, names.index(name)]
+    track = Track.of(figure, q, dt, path.name)
+    track.check(figure)
+    return track
+
+
+def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:
+    """Names of the columns, without their units; see `read_track`."""
+    if len(first) == 1 and ";" in first[0]:
+        raise FileFormatError(
+            f"{place}: the columns are separated by semicolons; write commas between them, and points in numbers"
+        )
+    unit = re.compile(r"\s*[\[(](deg|degrees|rad|radians)[\])]$", re.IGNORECASE)
+    names = [unit.sub("", name.strip()) for name in first]
+    for name in names:
+        known(name, wanted, "column", place)
+    twice = [name for name in wanted if names.count(name) > 1]
+    if twice:
+        raise FileFormatError(f"{place}: the column {twice[0]} stands there twice; leave one out")
+    missing = [name for name in wanted if name not in names]
+    root = [name for name in missing if name in ROOT_COLUMNS]
+    if TIME in missing:
+        lacked = [TIME]
+    elif 0 < len(root) < len(ROOT_COLUMNS):
+        lacked = root
+    else:
+        lacked = missing if len(missing) == len(wanted) - 1 else []
+    if lacked:
+        raise InputError(f"{place}: the columns lack {', '.join(lacked[:4])}; {len(missing)} are missing")
+    return names
+
+
+def _numbers(
+    path: Path, number: int, lines: Iterator[tuple[int, list[str]]], names: list[str]
+) -> tuple[Array, list[int], int]:
+    """The numbers of all lines (n, columns), the line of each row, and how many decimals the times have."""
     rows, places, decimals, at = [], [], 0, names.index(TIME)
     for number, line in lines:
         if len(line) != len(names):
@@ -102,9 +134,11 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
         raise FileFormatError(
             f"{path.name}, line {number}: a track has a line of names and at least two frames; the file is cut off"
         )
-    table = np.array(rows)
-    table[:, in_degrees] = np.radians(table[:, in_degrees])
-    time = table[:, at]
+    return np.array(rows), places, decimals
+
+
+def _time_step(path: Path, time: Array, places: list[int], decimals: int) -> float:
+    """The mean step of times (n,) that are rounded to some decimals."""
     if not (np.abs(time) < LATEST).all():
         bad = int(np.flatnonzero(~(np.abs(time) < LATEST))[0])
         raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
@@ -115,22 +149,9 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     steps = np.diff(time)
     late = np.flatnonzero(np.abs(steps - np.median(steps)) > 1e-3 * dt + min(1.001 * 10.0**-decimals, 0.4 * dt))
     if len(late):
-        line_number = places[int(late[0]) + 1]
-        raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")
-    broken = np.argwhere(~(np.abs(table) <= LARGEST_VALUE))
-    if len(broken):
-        row, column = (int(k) for k in broken[0])
-        raise FileFormatError(
-            f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
-            f"finite or beyond {LARGEST_VALUE:g}; correct or cut those frames"
-        )
-    q = np.tile(figure.neutral, (len(table), 1))
-    for column, name in enumerate(wanted[1:]):
-        if name in names:
-            q[:, column] = table[:, names.index(name)]
-    track = Track.of(figure, q, dt, path.name)
-    track.check(figure)
-    return track
+        place = places[int(late[0]) + 1]
+        raise FileFormatError(f"{path.name}, line {place}: the time step changes; resample to a fixed one")
+    return dt
 
 
 def _lines(path: Path, text: str) -> Iterator[tuple[int, list[str]]]:

@@ -209,44 +209,48 @@ class _Builder:
         theirs = self._file.model
         laws: dict[int, Law] = {}
         mine = {joint for body in self._bodies for joint in self._file.joints(body)}
-        for row in range(theirs.neq):
-            if theirs.eq_type[row] != mujoco.mjtEq.mjEQ_JOINT:
-                continue
+        for row in np.flatnonzero(theirs.eq_type == mujoco.mjtEq.mjEQ_JOINT).tolist():
             first, second = int(theirs.eq_obj1id[row]), int(theirs.eq_obj2id[row])
             if first not in mine:
                 continue
-            name = self._file.names["joint"][first]
-            offset, slope, *higher = (float(value) for value in theirs.eq_data[row, :5])
-            if second < 0 or second not in mine or slope == 0.0 or any(higher) or not theirs.eq_active0[row]:
-                why = (
-                    "is switched off" if not theirs.eq_active0[row]
-                    else "is not linear in another joint"
-                )  # fmt: skip
-                self._notes.append(f"joint {shown(name)}: its <equality> {why}, so it moves by itself")
-                continue
-            if theirs.jnt_type[first] != theirs.jnt_type[second] or theirs.jnt_type[first] not in (HINGE, SLIDE):
-                self._notes.append(
-                    f"joint {shown(name)}: its <equality> joins a hinge and a slide, so it moves by itself"
-                )
-                continue
-            refs = [float(theirs.qpos0[theirs.jnt_qposadr[joint]]) for joint in (first, second)]
-            offset += refs[0] - slope * refs[1]
-            law = Law(second, slope, offset)
-            if first < second:
-                first, law = second, Law(first, 1.0 / slope, -offset / slope)
-            while law.leader in laws:
-                above = laws[law.leader]
-                law = Law(above.leader, law.slope * above.slope, law.offset + law.slope * above.offset)
-            if first in laws or first == law.leader:
-                self._notes.append(f"joint {shown(name)}: it follows more than one joint; the first <equality> is kept")
-                continue
-            laws[first] = law
-        others = sum(int(kind) != int(mujoco.mjtEq.mjEQ_JOINT) for kind in theirs.eq_type)
+            why = self._unlike(row, first, second, mine)
+            if not why:
+                law = self._law(row, first, second)
+                if first < second:
+                    first, law = second, Law(first, 1.0 / law.slope, -law.offset / law.slope)
+                while law.leader in laws:
+                    above = laws[law.leader]
+                    law = Law(above.leader, law.slope * above.slope, law.offset + law.slope * above.offset)
+                if first not in laws and first != law.leader:
+                    laws[first] = law
+                    continue
+                why = "is one of several, of which the first is kept"
+            name = self._file.names["joint"][int(theirs.eq_obj1id[row])]
+            free = "" if "first" in why else ", so it moves by itself"
+            self._notes.append(f"joint {shown(name)}: its <equality> {why}{free}")
+        others = int((theirs.eq_type != mujoco.mjtEq.mjEQ_JOINT).sum())
         if others:
             self._notes.append(
                 f"{others} <equality> between bodies or tendons: not kept; these parts move by themselves"
             )
         return laws
+
+    def _unlike(self, row: int, first: int, second: int, mine: set[int]) -> str:
+        """Why a joint does not follow another by an equality; empty if it does."""
+        theirs = self._file.model
+        if not theirs.eq_active0[row]:
+            return "is switched off"
+        if second not in mine or theirs.eq_data[row, 1] == 0.0 or theirs.eq_data[row, 2:5].any():
+            return "is not linear in another joint"
+        kinds = {int(theirs.jnt_type[joint]) for joint in (first, second)}
+        return "" if kinds in ({HINGE}, {SLIDE}) else "joins joints of two kinds"
+
+    def _law(self, row: int, first: int, second: int) -> Law:
+        """MuJoCo's ``q1 - ref1 = a + b (q2 - ref2)``."""
+        theirs = self._file.model
+        offset, slope = (float(value) for value in theirs.eq_data[row, :2])
+        refs = [float(theirs.qpos0[theirs.jnt_qposadr[joint]]) for joint in (first, second)]
+        return Law(second, slope, offset + refs[0] - slope * refs[1])
 
     def _cones(self) -> dict[str, JointCone]:
         """Limited balls: a cone about the direction of the limb, which bounds its swing and not its twist."""
