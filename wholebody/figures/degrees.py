@@ -30,9 +30,13 @@ class Turning:
         self._limits = low, high
         self._low = np.where(np.isfinite(low), low, -MOST_TURNED)
         self._high = np.where(np.isfinite(high), high, MOST_TURNED)
+        self._least, self._most = np.full(model.nq, -np.inf), np.full(model.nq, np.inf)  # beyond them something is said
+        self._least[self._places], self._most[self._places] = self._low - FAR_OUT, self._high + FAR_OUT
 
     def warn(self, q: Array, what: str) -> bool:
         """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
+        if np.ndim(q) == 1 and ((q >= self._least) & (q <= self._most)).all():  # at every step of a tracker
+            return False
         rows = np.atleast_2d(q)
         if not len(rows) or not len(self._places):
             return False

@@ -90,6 +90,7 @@ class QPTracker(NotCopyable):
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
         self._turning = Turning(self.workspace)
         self._left: Array | None = None
+        self._begun = False
         self._set_up()
 
     def step(self, q: Array, measures: bool = True) -> QPStep:
@@ -109,7 +110,8 @@ class QPTracker(NotCopyable):
         measures = flag(measures, "measures")
         with self._alone:
             self.problem.check_fresh()
-            q = begun(self.problem, q)
+            if not self._begun:  # a step takes as long as ten such checks
+                q, self._begun = begun(self.problem, q), True
             self.workspace.refresh()
             self._renew()
             motion = self.workspace.next_frame(q)
