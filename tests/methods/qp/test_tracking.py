@@ -44,6 +44,15 @@ CHANGES = {
 }  # fmt: skip
 
 
+def test_a_later_posture_is_checked_as_the_first(scene: wb.Scene) -> None:
+    tracker = wb.QP().tracker(wb.Problem(scene), 0.02)
+    q = tracker.step(scene.figure.neutral).q
+    assert np.isfinite(tracker.step(q.tolist()).q).all()
+    for bad in (np.full_like(q, np.nan), q[:5], "x", q.astype(complex)):
+        with pytest.raises(wb.InputError, match="posture"):
+            tracker.step(bad)
+
+
 @pytest.mark.parametrize("change", CHANGES)
 def test_other_goals_are_followed_as_by_a_new_tracker(scene: wb.Scene, change: str) -> None:
     """Without this the weights of the old goals stayed: a held foot moved by centimetres, or the step broke off."""

@@ -110,7 +110,7 @@ class QPTracker(NotCopyable):
         measures = flag(measures, "measures")
         with self._alone:
             self.problem.check_fresh()
-            if not self._begun:  # a step takes as long as ten such checks
+            if not self._begun or type(q) is not np.ndarray:  # a step takes as long as ten such checks
                 q, self._begun = begun(self.problem, q), True
             self.workspace.refresh()
             self._renew()
