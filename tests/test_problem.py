@@ -210,7 +210,7 @@ def test_defaults_follow_what_the_feet_carry():
     here, there = (0.0, 0.0, -0.08), (0.2, 0.0, -0.08)
     scene, fresh = shod(here), polygon(shod(there))
     first = polygon(scene)
-    scene.move("ski", there)
+    scene.move("ski", at=there)
     again = polygon(scene)
     assert np.abs(first.offsets.sum() - again.offsets.sum()) > 1e-3 or first.normals.shape != again.normals.shape
     np.testing.assert_array_equal(again.normals, fresh.normals)
