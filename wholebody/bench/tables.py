@@ -19,12 +19,6 @@ from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
 
-PACKAGES = (
-    "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
-    "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
-)  # fmt: skip
-THREADS = "OMP_NUM_THREADS"
-
 
 def machine() -> dict[str, str]:
     """Return what a reader has to know of the machine and of the versions, in the order in which it is written."""
@@ -36,10 +30,14 @@ def machine() -> dict[str, str]:
         "load": f"{os.getloadavg()[0]:.1f} in the minute before",
         "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[1] or 'unknown libc'}",
         "python": platform.python_version(),
-        THREADS: os.environ.get(THREADS, "not set"),
+        "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "not set"),
     }
     facts["numba"] = _version("numba") or "not installed"  # our own linearisation is faster with it
-    installed = {name: _version(name) for name in PACKAGES}
+    packages = (
+        "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
+        "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
+    )  # fmt: skip
+    installed = {name: _version(name) for name in packages}
     return facts | {name: version for name, version in installed.items() if version}
 
 

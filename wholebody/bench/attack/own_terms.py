@@ -18,9 +18,7 @@ from wholebody.figures.state import State, Wrench
 from wholebody.solution import Solution
 from wholebody.tasks.base import Surroundings, Term, filled
 
-PARTS = ("error", "jacobian", "value", "slope", "measure", "gradient", "curvature")
 USERS = "users"  # module of the terms below: answers are checked of classes from outside of the package alone
-BAD = (np.nan, np.inf, -np.inf, "far", None, 1j, np.zeros((2, 2)))
 
 
 class Asked(NamedTuple):
@@ -30,7 +28,8 @@ class Asked(NamedTuple):
         frame: that moves.
         way: (3,) from where it starts to its goal, metres.
         reach: along the way, metres; beyond it the answer is bad.
-        part: one of `PARTS`.
+        part: "error" or "jacobian" of the goal, "value" or "slope" of the constraint, "measure", its "gradient" or
+            "curvature".
         bad: number of which the part consists there, or what it answers.
     """
 
@@ -122,8 +121,9 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
     reach = float(rng.uniform(0.2, 0.98) * np.linalg.norm(way))
     method = chosen(rng, ("qp", "qp", "newton", "dls", "tracker"))
     constrained = method != "dls"  # which takes no constraints
-    parts = [part for part in PARTS if constrained or part not in ("value", "slope")]
-    asked = Asked(frame, way, reach, chosen(rng, parts), chosen(rng, BAD))
+    parts = ["error", "jacobian", *(("value", "slope") if constrained else ()), "measure", "gradient", "curvature"]
+    bad = (np.nan, np.inf, -np.inf, "far", None, 1j, np.zeros((2, 2)))
+    asked = Asked(frame, way, reach, chosen(rng, parts), chosen(rng, bad))
     constraints = [_Keep(asked)] if constrained else []
     problem = wb.Problem(wb.Scene(figure), goals=[_Reach(asked)], constraints=constraints, measures=[_Low(asked)])
     if method == "tracker":

@@ -11,12 +11,6 @@ import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.suite.problem_sets.things import Occupied
 
-SHARES = {
-    "box": 0.25, "sphere": 0.15, "capsule": 0.15, "ellipsoid": 0.1, "hull": 0.12, "plate": 0.12, "halfspace": 0.1,
-    "mesh": 0.01,
-}  # fmt: skip
-"""Of kinds of things."""
-
 
 @dataclass(frozen=True)
 class Thing:
@@ -38,7 +32,9 @@ class Thing:
 
 def shape(rng: np.random.Generator, size: float) -> wb.Shape:
     """A shape of about a size, metres."""
-    kind = str(rng.choice(list(SHARES), p=list(SHARES.values())))
+    shares = {"box": 0.25, "sphere": 0.15, "capsule": 0.15, "ellipsoid": 0.1, "hull": 0.12, "plate": 0.12}
+    shares |= {"halfspace": 0.1, "mesh": 0.01}
+    kind = str(rng.choice(list(shares), p=list(shares.values())))
     scale = size * float(np.exp(rng.uniform(np.log(0.02), np.log(0.6))))
 
     def length(low: float, high: float) -> float:

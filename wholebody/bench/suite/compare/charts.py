@@ -12,13 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from wholebody.bench import plot_style
-from wholebody.bench.plot_style import method_style
+from wholebody.bench.plot_style import MOST, method_style
 from wholebody.bench.rows import Panel, chart
 from wholebody.bench.suite.compare.advice import OURS
 from wholebody.bench.suite.compare.results import COARSE, Quantity, Results, middle
 from wholebody.bench.suite.compare.summary import Summary
-
-MOST = 6  # methods in a chart
 
 
 def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:

@@ -203,11 +203,6 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
 
 
-CRITERIA = {
-    "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
-    "limits": "joint limits", "holds": "holds and balance",
-}  # fmt: skip
-
 COLUMNS = (
     "problems", "seed", "asked", "refused", "unanswered", "solved %", "to 1e-4 %", "worst error", "overlap mm",
     "effort above best %", "median ms", "mean ms",
@@ -261,4 +256,8 @@ def left_out(verdict: Verdict) -> list[str]:
 
 def _worst(score: Score) -> str:
     """What an answer misses most, in words."""
-    return CRITERIA[max(CRITERIA, key=lambda name: float(getattr(score, name)))]
+    criteria = {
+        "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
+        "limits": "joint limits", "holds": "holds and balance",
+    }  # fmt: skip
+    return criteria[max(criteria, key=lambda name: float(getattr(score, name)))]

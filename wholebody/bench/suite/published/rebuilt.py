@@ -22,7 +22,6 @@ from wholebody.bench.suite.published.reading import read_json
 
 SOLVED = 1e-3  # m, rad: worst of goals and of all that must hold, up to which a problem counts as solved
 EXACT = 1e-6  # m, rad: what a witness meets, and an answer whose effort counts as the best known
-UNIT = 1e-6  # largest deviation of a quaternion from unit length
 
 
 @dataclass(frozen=True)

@@ -13,15 +13,6 @@ from wholebody.figures.description import Articulated, Description
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Shape
 
-JOINTS = {
-    "rx": pin.JointModelRX, "ry": pin.JointModelRY, "rz": pin.JointModelRZ,
-    "px": pin.JointModelPX, "py": pin.JointModelPY, "pz": pin.JointModelPZ,
-}  # fmt: skip
-"""Kind of joint and its axis: r turns, p slides."""
-
-TURN = 2.9  # rad: limit of a joint if nothing else is said
-SLIDE = 2.0  # m
-
 
 class Builder:
     """Builds a figure joint by joint."""
@@ -35,11 +26,15 @@ class Builder:
     def joint(
         self, kind: str, name: str, *, parent: int = 0, at: Any = (0.0, 0.0, 0.0), limits: Sequence[float] | None = None
     ) -> int:
-        """Add a joint and the segment that it carries, which has the joint's name; return its index."""
-        low, high = limits if limits is not None else (-TURN, TURN) if kind[0] == "r" else (-SLIDE, SLIDE)
+        """Add a joint and the segment that it carries, which has the joint's name; return its index.
+
+        The kind has the axis in it: "rx" turns about x, "px" slides along it.
+        """
+        most = 2.9 if kind[0] == "r" else 2.0  # rad, m: limit of a joint if nothing else is said
+        low, high = (-most, most) if limits is None else limits
         bounds = [np.array([value]) for value in (100.0, 10.0, low, high)]
         place = pin.SE3(np.eye(3), np.array(at, dtype=float))
-        index = int(self.model.addJoint(parent, JOINTS[kind](), place, name, *bounds))
+        index = int(self.model.addJoint(parent, getattr(pin, f"JointModel{kind.upper()}")(), place, name, *bounds))
         self.model.appendBodyToJoint(index, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
         self.model.addFrame(pin.Frame(f"{name}_link", index, 0, pin.SE3.Identity(), pin.FrameType.BODY))
         self._segments.append(f"{name}_link")
