@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_origin, get_type_hints
 
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import make_folder, read_text, write
@@ -74,7 +74,8 @@ def write_text(path: Path, text: str) -> None:
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
 
-    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
+    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key,
+    and is read back with numbers where cells are numbers, without those that are empty.
     """
     text = io.StringIO()
     for name, value in facts.items():
@@ -112,13 +113,17 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
         line, _, rest = rest.partition("\n")
         name, _, value = line[2:].removesuffix("\r").partition(": ")
         facts[name] = value
-    types = get_type_hints(kind)
-    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    names = [name for each in parts.values() for name in each]
     try:
         given = list(csv.reader(io.StringIO(rest, newline="")))  # cells may have line breaks
     except csv.Error as error:
         raise FileFormatError(f"{path}: is no CSV ({error}); measure again") from None
+    types = get_type_hints(kind)
+    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    for name in parts:
+        if get_origin(types[name]) is Mapping:  # which has all further columns
+            others = {part for other, each in parts.items() if other != name for part in each}
+            parts[name] = tuple(column for column in (given[0] if given else ()) if column not in others)
+    names = [name for each in parts.values() for name in each]
     if not given or given[0] != names:
         found = ", ".join(given[0])[:200] if given else "none"
         raise FileFormatError(f"{path}: the columns are {found}, not {', '.join(names)}; measure again")
@@ -126,7 +131,12 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     for number, cells in enumerate(given[1:], start=1):
         try:
             texts = dict(zip(names, cells, strict=True))
-            values = {name: _value(types[name], [texts[each] for each in parts[name]]) for name in parts}
+            values = {
+                name: {part: figure(texts[part]) for part in parts[name] if texts[part]}
+                if get_origin(types[name]) is Mapping
+                else _value(types[name], [texts[each] for each in parts[name]])
+                for name in parts
+            }
             rows.append(kind(**values))
         except ValueError as error:
             raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
@@ -200,6 +210,16 @@ def _line(cells: Iterable[str]) -> str:
 def _parts(name: str, kind: Any) -> tuple[str, ...]:
     """The columns of a field."""
     return (name, f"{name}_low", f"{name}_high") if kind is Interval else (name,)
+
+
+def figure(text: str) -> int | float | str:
+    """What a cell of a figure holds: a whole number, a number, or a text."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
 
 
 def _value(kind: Any, texts: Sequence[str]) -> Any:
