@@ -19,7 +19,7 @@ from wholebody.base.errors import UnknownNameError
 from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, Case, Verdict, kind_of
-from wholebody.bench.attack.files import mutated
+from wholebody.bench.attack.inputs import mutated
 from wholebody.bench.attack.report import Row, keep, report
 from wholebody.bench.attack.running import attack
 

@@ -13,8 +13,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError
-from wholebody.bench.suite.published.reading import VERSION, loaded, read_index
-from wholebody.bench.suite.published.rebuilt import Rebuilt
+from wholebody.bench.suite.published.rebuilt import VERSION, Rebuilt, loaded, read_index
 
 Seed = Literal["near", "far"]
 SEEDS: tuple[Seed, ...] = ("near", "far")

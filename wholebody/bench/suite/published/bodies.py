@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.published.reading import VERSION
+from wholebody.bench.suite.published.rebuilt import VERSION
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
 

@@ -28,8 +28,17 @@ from wholebody.bench.suite.published.problems import (
     problem_name,
     witness_content,
 )
-from wholebody.bench.suite.published.reading import INDEX, VERSION, dumped
-from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
+from wholebody.bench.suite.published.rebuilt import (
+    EXACT,
+    INDEX,
+    SOLVED,
+    VERSION,
+    Rebuilt,
+    Score,
+    dumped,
+    read_body,
+    worst_of,
+)
 
 
 @dataclass

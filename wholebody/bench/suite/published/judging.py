@@ -12,8 +12,16 @@ from typing import Any
 from wholebody.bench.report import formatted, spanned, words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
-from wholebody.bench.suite.published.reading import VERSION, read_index, read_json
-from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, worst_of
+from wholebody.bench.suite.published.rebuilt import (
+    EXACT,
+    SOLVED,
+    VERSION,
+    Rebuilt,
+    Score,
+    read_index,
+    read_json,
+    worst_of,
+)
 from wholebody.bench.tables import flat
 
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time

@@ -27,8 +27,7 @@ from wholebody.bench.suite.published.judging import (
     left_out,
     set_score,
 )
-from wholebody.bench.suite.published.reading import read_index
-from wholebody.bench.suite.published.rebuilt import EXACT
+from wholebody.bench.suite.published.rebuilt import EXACT, read_index
 from wholebody.bench.tables import write_text
 
 PAGE = "leaderboard.html"
