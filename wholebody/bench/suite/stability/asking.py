@@ -146,11 +146,12 @@ def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 2
 
 def _warm() -> None:
     """Import and compile in this process what most cells need, so that no cell is timed with it."""
-    from wholebody.bench.suite.stability.streams import thin_plate
+    from wholebody.bench.suite.stability.catalogue import cases
     from wholebody.methods.qp.method import QP
 
     compile_all()
-    question = thin_plate()
+    (question,) = (case.question() for case in cases(["thin-plate"]))
+    assert isinstance(question, Stream)
     judged = QP().solve(question.problem)
     question.problem.scene.sweep(question.problem.start, judged.q)
 

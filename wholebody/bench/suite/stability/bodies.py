@@ -140,6 +140,19 @@ def human_arm(*, clavicle: bool = True) -> Figure:
     return figure.reduced([name for name in joints if clavicle or "clavicle" not in name])
 
 
-def turned(axis: str, angle: float, at: Any = (0.0, 0.0, 0.0)) -> pin.SE3:
-    """A placement turned about an axis of the world [rad]."""
-    return pin.SE3(pin.utils.rotate(axis, angle), np.array(at, dtype=float))
+def star() -> Figure:
+    """A hub that slides and turns, with twelve arms of two joints; frames "tip1" to "tip12"."""
+    builder = Builder("star of twelve arms")
+    slide = builder.joint("px", "slide_x")
+    slide = builder.joint("pz", "slide_z", parent=slide)
+    hub = builder.joint("ry", "hub", parent=slide)
+    for k in range(12):
+        angle = 2.0 * np.pi * k / 12
+        rim = 0.15 * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+        upper = builder.joint("ry", f"upper{k + 1}", parent=hub, at=rim)
+        builder.model.jointPlacements[upper] = pin.SE3(pin.utils.rotate("y", angle), rim)
+        builder.rod(upper, (0.2, 0.0, 0.0), 0.01)
+        lower = builder.joint("ry", f"lower{k + 1}", parent=upper, at=(0.2, 0.0, 0.0))
+        builder.rod(lower, (0.2, 0.0, 0.0), 0.01)
+        builder.frame(lower, f"tip{k + 1}", (0.2, 0.0, 0.0))
+    return builder.figure(pairs=False)
