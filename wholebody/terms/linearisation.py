@@ -76,7 +76,7 @@ class Linearisation(NamedTuple):
     planes: TermPlanes | None = None
 
 
-_NO_CONTACTS = Contacts(
+NO_CONTACTS = Contacts(
     np.zeros((0, 2), dtype=np.intp), np.zeros(0), np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3)),
     np.zeros(0, dtype=np.intp), np.zeros((0, 4, 3)),
 )  # fmt: skip
@@ -254,7 +254,7 @@ class Lineariser:
         nv, rows = self.state.model.nv, self._plan.goal_rows + self._plan.value_rows
         none = np.zeros(0)
         return PackedLinearisation(
-            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), _NO_CONTACTS, none,
+            none, self._plan.goal_rows, np.empty(rows), np.empty((rows + len(self._gap), nv)), NO_CONTACTS, none,
             none.astype(np.intp), none, np.empty((2, nv + 1)), np.empty((2, nv)),
         )  # fmt: skip
 

@@ -15,7 +15,6 @@ from wholebody.bench.suite.ablation import Constant, Row, report
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
-from wholebody.methods.qp import working_set
 from wholebody.motion import per_frame
 
 CHANGES = ("free", "deepest_mm", "deviation", "jerk", "sliding_mm", "programs")
@@ -64,17 +63,6 @@ def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.Monk
     with ablation.replaced(places, 7.0):
         assert all(getattr(owner, name) == 7.0 for owner, name in places)
     assert all(getattr(owner, name) == constant.value for owner, name in places)
-
-
-def test_what_a_module_made_of_a_constant_is_made_anew() -> None:
-    """Loops get the limits of a working set in an array."""
-    before = working_set.LIMITS.copy()
-    constant = Constant("wholebody.methods.qp.working_set", "BOUND_TOLERANCE", working_set.BOUND_TOLERANCE)
-    with ablation.changed(constant, 2.0 * constant.value):
-        now = working_set.LIMITS
-        assert np.flatnonzero(now != before).size == 1
-        assert 2.0 * constant.value in now
-    assert (before == working_set.LIMITS).all()
 
 
 def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:

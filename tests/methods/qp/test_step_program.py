@@ -141,8 +141,8 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
             q = problem.scene.figure.clamp(pin.integrate(workspace.model, q, 0.02 * rng.normal(size=len(q) - 1)))
         at = lineariser.packed(q, 0.06)
         answer = compiled.solve(at, measures=True)
-        found, found_rows = compiled.program(), compiled.rows(at)
-        rows, program, wanted = plain.solve(whole(at), partial(compiled.motion, at))
+        found, found_rows = compiled.program, compiled.rows
+        rows, program, wanted = plain.solve(whole(at), partial(compiled.turning.motion, at))
         for field in ("soft", "soft_error", "soft_weight", "elastic", "elastic_violation", "contact", "key"):
             assert np.array_equal(getattr(found_rows, field), getattr(rows, field)), field
         assert (found_rows.goals, found_rows.contacts) == (rows.goals, rows.contacts)

@@ -119,7 +119,7 @@ def test_the_bound_holds_for_random_displacements(planar_arm, least_distance):
             continue
         at = lineariser.packed(q, 0.5)
         program.solve(at, True)
-        rows, x = program.rows(at), 0.05 * rng.normal(size=3)
+        rows, x = program.rows, 0.05 * rng.normal(size=3)
         foreseen = float((rows.elastic @ x - rows.elastic_violation).min())
         if turning.linearisation_error(at, rows, x) == 0.0:
             trusted += 1

@@ -197,7 +197,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp import multistart, sqp
     from wholebody.methods.qp.feasibility import Feasibility
     from wholebody.methods.qp.funnel import Funnel
-    from wholebody.methods.qp.multipliers import Multipliers
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
@@ -206,7 +205,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
-        "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
+        "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
         "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),

@@ -2,73 +2,113 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import dot
-from wholebody.methods.qp.face_kernel import minimise_on_face
+from wholebody.methods.qp.dense_kernel import add, dot, gram, least_squares, solve, sort
+from wholebody.methods.qp.quadratic_program import ActiveSet, Corrections, QuadraticProgram, Room
+
+
+class Face(NamedTuple):
+    """Rows that count with an active set fixed, and room for their system.
+
+    Attributes:
+        stacked: (m + k, n) the soft rows and the pushing elastic ones.
+        right: (m + k,) what they are to be.
+        compliance: (m + k,) their inverse weights.
+        multiplier: (m + k,) becomes weight times residual of each.
+        gradient: (n,) becomes the derivative of the objective by x.
+        reached: (k,) values of the elastic rows at x.
+        scaled, table, inverse, trial: room; (m + k, n), (m + k)^2, (n,) and (n,).
+    """
+
+    stacked: Array
+    right: Array
+    compliance: Array
+    multiplier: Array
+    gradient: Array
+    reached: Array
+    scaled: Array
+    table: Array
+    inverse: Array
+    trial: Array
+
+
+@compiled()
+def work_size(variables: int, soft: int, elastic: int) -> int:
+    """Floats that `face` needs for a program of so many variables, soft rows and elastic rows."""
+    rows = soft + elastic
+    return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
+
+
+@compiled(inner=True)
+def face(work: Array, n: int, m: int, k: int) -> Face:
+    """Room for the faces of a program with n variables, m soft and k elastic rows, within `work` (see `work_size`)."""
+    most = m + k
+    first, second, third = most * n, 2 * most * n, 2 * most * n + most * most
+    fourth = third + 3 * most
+    last = fourth + k
+    return Face(
+        work[:first].reshape((most, n)),
+        work[third:][:most],
+        work[third + most :][:most],
+        work[third + 2 * most :][:most],
+        work[last + n :][:n],
+        work[fourth:last],
+        work[first:second].reshape((most, n)),
+        work[second:third],
+        work[last:][:n],
+        work[last + 2 * n :][:n],
+    )
 
 
 @compiled(error_model="numpy")
 def solve_growing(
-    diagonal: Array,
-    linear: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
+    program: QuadraticProgram,
     key: Indices,
     known: Indices,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    chosen: Mask,
-    limits: Array,
-    work: Array,
-    places: Indices,
+    active: ActiveSet,
+    limits: Corrections,
+    room: Room,
     x: Array,
 ) -> int:
     """Solve a program from the active set of the one before, with the elastic rows that matter; see `WorkingSet`.
 
-    The first ten arguments are the program. `key` (k,) names its elastic rows, `known` the rows that pushed in the
-    program before, in ascending order. `at_lower` and `at_upper` (n,) are the bounds that held x then; they become
-    those that hold it now. `pushing` and `chosen` (k,), `work` (see `work_size`) and `places` (2 k,) are room; x (n,)
-    becomes the minimiser. `limits` are the violation below which a row is left out, rounds, corrections, corrections of
-    everything at once, and the tolerances of bounds and of rows.
+    Args:
+        program: what to solve.
+        key: (k,) names of its elastic rows.
+        known: names of the rows that pushed in the program before, in ascending order.
+        active: the bounds that held x then, and room for rows; it becomes the active set of the answer.
+        limits: of the corrections.
+        room: for this program.
+        x: (n,) becomes the minimiser.
 
     Returns:
         How often rows were added, or -1 where the active set of a round did not settle.
     """
-    k = len(least)
+    k, chosen, places = len(program.least), room.chosen, room.places
     for j in range(k):
-        pushing[j] = _contains(known, key[j])
-        chosen[j] = least[j] > -limits[0] or pushing[j]
-    rounds = int(limits[1])
-    for attempt in range(rounds + 1):
+        active.elastic[j] = _contains(known, key[j])
+        chosen[j] = program.least[j] > limits.near or active.elastic[j]
+    for attempt in range(limits.rounds + 1):
         count = 0
         for j in range(k):
-            if chosen[j] or attempt == rounds:
+            if chosen[j] or attempt == limits.rounds:
                 chosen[j] = True
                 places[count] = j
                 count += 1
-        settled = primal_dual_active_set(
-            diagonal, linear, rows, target, weight, elastic, least, elastic_weight, lower, upper, places[:count],
-            at_lower, at_upper, pushing, int(limits[2]), int(limits[3]), limits[4], limits[5], work, places[k:], x,
-        )  # fmt: skip
-        if not settled:
+        if not primal_dual_active_set(program, places[:count], active, limits.most, limits, room, x):
             return -1
         missed = False
         for j in range(k):
-            if not chosen[j] and dot(elastic[j], x) < least[j] - 1e-9:
+            if not chosen[j] and dot(program.elastic[j], x) < program.least[j] - 1e-9:
                 chosen[j] = missed = True
         if not missed:
             return attempt
-    return rounds
+    return limits.rounds
 
 
 @compiled(inner=True)
@@ -81,202 +121,245 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
     return low < len(sorted_keys) and sorted_keys[low] == key
 
 
-@compiled()
-def work_size(variables: int, soft: int, elastic: int) -> int:
-    """Floats that `primal_dual_active_set` needs for a program of so many variables, soft rows and elastic rows."""
-    rows = soft + elastic
-    return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
-
-
-@compiled(inner=True)
-def _views(
-    work: Array, n: int, m: int, k: int
-) -> tuple[Array, Array, Array, Array, Array, Array, Array, Array, Array, Array]:
-    """Parts of `work` (see `work_size`) for n variables, m soft and k elastic rows.
-
-    They are the rows (m + k, n), room of the same size and of (m + k)^2; what rows are to be, their inverse weights and
-    multipliers (m + k,); room (k,) and three times (n,).
-    """
-    most = m + k
-    first, second, third = most * n, 2 * most * n, 2 * most * n + most * most
-    fourth = third + 3 * most
-    last = fourth + k
-    return (
-        work[:first].reshape((most, n)),
-        work[first:second].reshape((most, n)),
-        work[second:third],
-        work[third:][:most],
-        work[third + most :][:most],
-        work[third + 2 * most :][:most],
-        work[fourth:last],
-        work[last:][:n],
-        work[last + n :][:n],
-        work[last + 2 * n :][:n],
-    )
-
-
 @compiled(error_model="numpy")
 def primal_dual_active_set(
-    diagonal: Array,
-    linear: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    places: Indices,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    corrections: int,
-    full_corrections: int,
-    bound_tolerance: float,
-    row_tolerance: float,
-    work: Array,
-    active: Indices,
-    x: Array,
+    program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:
     """Correct an active set, in place, until it is right; x (n,) becomes the minimiser.
 
-    The first ten arguments are the program, of which the elastic rows `places` (c,) count. `at_lower` and `at_upper`
-    (n,) say which bounds hold x, `pushing` (k,) which elastic rows push. Of at most `corrections` sets the first
-    `full_corrections` put right all that is wrong, the others only the worst entry. An x may be out of its bounds by
-    `bound_tolerance`, a row violated by `row_tolerance`. `work` (see `work_size`) and `active` (c,) are room.
+    Args:
+        program: what to solve.
+        places: (c,) the elastic rows that count.
+        active: where to begin.
+        most: corrections; the first ones put right all that is wrong, the others only the worst entry.
+        limits: of the corrections.
+        room: of which the second half of `places` is used.
+        x: (n,).
 
     Returns:
         Whether it is right: false after so many corrections, and where a set has no finite minimiser.
     """
-    n, m, k = len(diagonal), len(target), len(places)
-    stacked, scaled, table, right, compliance, multiplier, reached, inverse, gradient, trial = _views(work, n, m, k)
-    for r in range(m):
-        compliance[r] = 1.0 / weight[r]
-        right[r] = target[r]
-        for i in range(n):
-            stacked[r, i] = rows[r, i]
-    for attempt in range(corrections):
-        count = 0
+    n, m, k = len(program.diagonal), len(program.target), len(places)
+    own, pushes = face(room.work, n, m, k), room.places[len(room.places) // 2 :]
+    stack_soft(program, own)
+    for attempt in range(most):
+        size = m
         for c in range(k):
-            j = places[c]
-            if pushing[j]:
-                active[count] = c
-                for i in range(n):
-                    stacked[m + count, i] = elastic[j, i]
-                right[m + count] = least[j]
-                compliance[m + count] = 1.0 / elastic_weight[j]
-                count += 1
-        size = m + count
-        if not minimise_on_face(
-            diagonal, linear, lower, upper, at_lower, at_upper, stacked, right, compliance, size, row_tolerance, scaled,
-            table, inverse, trial, multiplier, gradient, x,
-        ):  # fmt: skip
+            if active.elastic[places[c]]:
+                pushes[size - m] = places[c]
+                size += 1
+        stack_elastic(program, pushes[: size - m], own)
+        if not minimise_on_face(program, active, own, size, limits.tolerance, x):
             return False
-        same = True
-        for i in range(n):
-            if at_lower[i]:
-                same = same and gradient[i] >= 0.0
-            elif at_upper[i]:
-                same = same and gradient[i] <= 0.0
-            else:
-                same = same and lower[i] - bound_tolerance <= x[i] <= upper[i] + bound_tolerance
         for c in range(k):
-            j = places[c]
-            reached[c] = dot(elastic[j], x)
-            same = same and (pushing[j] or reached[c] >= least[j] - row_tolerance)
-        for a in range(count):
-            same = same and multiplier[m + a] <= 0.0
-        if same:
+            own.reached[c] = dot(program.elastic[places[c]], x)
+        if _is_right(program, places, active, own, limits.tolerance, x):
             for i in range(n):
-                x[i] = min(max(x[i], lower[i]), upper[i])
+                x[i] = min(max(x[i], program.lower[i]), program.upper[i])
             return True
-        if attempt < full_corrections:
-            for i in range(n):
-                held_low, held_high = at_lower[i], at_upper[i]
-                at_lower[i] = gradient[i] >= 0.0 if held_low else x[i] < lower[i] - bound_tolerance
-                at_upper[i] = gradient[i] <= 0.0 if held_high else x[i] > upper[i] + bound_tolerance
-            following = 0
-            for c in range(k):
-                j = places[c]
-                if pushing[j]:
-                    pushing[j] = multiplier[m + following] <= 0.0
-                    following += 1
-                else:
-                    pushing[j] = reached[c] < least[j] - row_tolerance
-            continue
-        # only the entry that is most wrong, in units of x
-        worst, kind, place = -np.inf, 0, 0
-        for i in range(n):
-            pull = abs(gradient[i]) / diagonal[i]
-            next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - bound_tolerance
-            next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + bound_tolerance
-            if next_lower != at_lower[i]:
-                wrong = pull if at_lower[i] else lower[i] - x[i]
-                if wrong > worst:
-                    worst, kind, place = wrong, 0, i
-            if next_upper != at_upper[i]:
-                wrong = pull if at_upper[i] else x[i] - upper[i]
-                if wrong > worst:
-                    worst, kind, place = wrong, 1, i
-        following = 0
-        for c in range(k):
-            j = places[c]
-            violated = least[j] - reached[c]
-            flips = violated > row_tolerance
-            if pushing[j]:
-                flips = not multiplier[m + following] <= 0.0
-                norm = 0.0
-                for i in range(n):
-                    norm += elastic[j, i] * elastic[j, i] / diagonal[i]
-                violated = multiplier[m + following] * norm
-                following += 1
-            if flips and violated > worst:
-                worst, kind, place = violated, 2, j
-        mask = at_lower if kind == 0 else (at_upper if kind == 1 else pushing)
-        mask[place] = not mask[place]
+        if attempt < limits.at_once:
+            _correct_all(program, places, active, own, limits.tolerance, x)
+        else:
+            _correct_worst(program, places, active, own, limits.tolerance, x)
     return False
 
 
 @compiled(error_model="numpy")
-def minimise_without_gradient(
-    diagonal: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    at_lower: Mask,
-    at_upper: Mask,
-    pushing: Mask,
-    row_tolerance: float,
-    work: Array,
-    x: Array,
-) -> bool:
-    """Minimiser x (n,) of a program with g = 0 and its active set fixed, clipped to the bounds.
+def minimise_with(program: QuadraticProgram, active: ActiveSet, limits: Corrections, work: Array, x: Array) -> bool:
+    """Minimiser x (n,) of a program with its active set fixed, clipped to the bounds; whether it is finite.
 
-    `work` (see `work_size`) is room; the others are as for `primal_dual_active_set`.
+    `work` is room; see `work_size`.
+    """
+    own = face(work, len(program.diagonal), len(program.target), len(program.least))
+    stack_soft(program, own)
+    pushes = active.elastic.nonzero()[0]
+    stack_elastic(program, pushes, own)
+    finite = minimise_on_face(program, active, own, len(program.target) + len(pushes), limits.tolerance, x)
+    for i in range(len(x)):
+        x[i] = min(max(x[i], program.lower[i]), program.upper[i])
+    return finite
+
+
+@compiled(inner=True, error_model="numpy")
+def stack_soft(program: QuadraticProgram, own: Face) -> None:
+    """Let the soft rows be the first of a face."""
+    for r in range(len(program.target)):
+        own.compliance[r] = 1.0 / program.weight[r]
+        own.right[r] = program.target[r]
+        for i in range(program.rows.shape[1]):
+            own.stacked[r, i] = program.rows[r, i]
+
+
+@compiled(inner=True, error_model="numpy")
+def stack_elastic(program: QuadraticProgram, pushes: Indices, own: Face) -> None:
+    """Let these elastic rows follow."""
+    first = len(program.target)
+    for count in range(len(pushes)):
+        j = pushes[count]
+        for i in range(program.elastic.shape[1]):
+            own.stacked[first + count, i] = program.elastic[j, i]
+        own.right[first + count] = program.least[j]
+        own.compliance[first + count] = 1.0 / program.elastic_weight[j]
+
+
+@compiled(inner=True, error_model="numpy")
+def _is_right(
+    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
+) -> bool:
+    """Whether an active set is that of its minimiser x (n,)."""
+    for i in range(len(x)):
+        if active.lower[i]:
+            right = own.gradient[i] >= 0.0
+        elif active.upper[i]:
+            right = own.gradient[i] <= 0.0
+        else:
+            right = program.lower[i] - tolerance <= x[i] <= program.upper[i] + tolerance
+        if not right:
+            return False
+    following = len(program.target)
+    for c in range(len(places)):
+        j = places[c]
+        if active.elastic[j]:
+            right = own.multiplier[following] <= 0.0
+            following += 1
+        else:
+            right = own.reached[c] >= program.least[j] - tolerance
+        if not right:
+            return False
+    return True
+
+
+@compiled(inner=True, error_model="numpy")
+def _correct_all(
+    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
+) -> None:
+    """Put right everything that is wrong in an active set with the minimiser x (n,)."""
+    for i in range(len(x)):
+        held_low, held_high = active.lower[i], active.upper[i]
+        active.lower[i] = own.gradient[i] >= 0.0 if held_low else x[i] < program.lower[i] - tolerance
+        active.upper[i] = own.gradient[i] <= 0.0 if held_high else x[i] > program.upper[i] + tolerance
+    following = len(program.target)
+    for c in range(len(places)):
+        j = places[c]
+        if active.elastic[j]:
+            active.elastic[j] = own.multiplier[following] <= 0.0
+            following += 1
+        else:
+            active.elastic[j] = own.reached[c] < program.least[j] - tolerance
+
+
+@compiled(inner=True, error_model="numpy")
+def _correct_worst(
+    program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
+) -> None:
+    """Put right the entry that is most wrong, in units of x."""
+    worst, mask, place = -np.inf, active.lower, 0
+    for i in range(len(x)):
+        pull = abs(own.gradient[i]) / program.diagonal[i]
+        next_lower = own.gradient[i] >= 0.0 if active.lower[i] else x[i] < program.lower[i] - tolerance
+        next_upper = own.gradient[i] <= 0.0 if active.upper[i] else x[i] > program.upper[i] + tolerance
+        wrong = pull if active.lower[i] else program.lower[i] - x[i]
+        if next_lower != active.lower[i] and wrong > worst:
+            worst, mask, place = wrong, active.lower, i
+        wrong = pull if active.upper[i] else x[i] - program.upper[i]
+        if next_upper != active.upper[i] and wrong > worst:
+            worst, mask, place = wrong, active.upper, i
+    following = len(program.target)
+    for c in range(len(places)):
+        j = places[c]
+        wrong = program.least[j] - own.reached[c]
+        flips = wrong > tolerance
+        if active.elastic[j]:
+            flips = not own.multiplier[following] <= 0.0
+            norm = 0.0
+            for i in range(len(x)):
+                norm += program.elastic[j, i] * program.elastic[j, i] / program.diagonal[i]
+            wrong = own.multiplier[following] * norm
+            following += 1
+        if flips and wrong > worst:
+            worst, mask, place = wrong, active.elastic, j
+    mask[place] = not mask[place]
+
+
+@compiled(error_model="numpy")
+def minimise_on_face(
+    program: QuadraticProgram, active: ActiveSet, own: Face, size: int, tolerance: float, x: Array
+) -> bool:
+    """Minimiser x (n,) with the bounds of an active set held and the first `size` rows of a face counted.
+
+    It may be out of the other bounds. Residuals off by more than the tolerance are computed by the other system.
 
     Returns:
-        Whether it is finite.
+        Whether x is finite.
     """
-    n, m, k = len(diagonal), len(target), len(least)
-    stacked, scaled, table, right, compliance, multiplier, _, inverse, gradient, trial = _views(work, n, m, k)
-    size = 0
-    for r in range(m):
-        stacked[size], right[size], compliance[size] = rows[r], target[r], 1.0 / weight[r]
-        size += 1
-    for j in range(k):
-        if pushing[j]:
-            stacked[size], right[size], compliance[size] = elastic[j], least[j], 1.0 / elastic_weight[j]
-            size += 1
-    finite = minimise_on_face(
-        diagonal, np.zeros(n), lower, upper, at_lower, at_upper, stacked, right, compliance, size, row_tolerance,
-        scaled, table, inverse, trial, multiplier, gradient, x,
-    )  # fmt: skip
+    n = len(x)
+    linear, gradient, inverse, trial = program.linear, own.gradient, own.inverse, own.trial
     for i in range(n):
-        x[i] = min(max(x[i], lower[i]), upper[i])
+        held = active.lower[i] or active.upper[i]
+        x[i] = program.lower[i] if active.lower[i] else (program.upper[i] if active.upper[i] else 0.0)
+        inverse[i] = 0.0 if held else 1.0 / program.diagonal[i]
+        gradient[i] = linear[i]
+    in_columns = size > n
+    if 0 < size <= n:
+        system = own.table[: size * size].reshape((size, size))
+        for r in range(size):
+            for i in range(n):
+                own.scaled[r, i] = own.stacked[r, i] * inverse[i]
+            own.multiplier[r] = dot(own.stacked[r], x) - dot(own.scaled[r], linear) - own.right[r]
+        gram(own.scaled, own.stacked, size, system)
+        for r in range(size):
+            system[r, r] += own.compliance[r]
+        in_columns = not solve(system, own.multiplier[:size])
+        if not in_columns:
+            for i in range(n):
+                trial[i] = linear[i]
+            for r in range(size):
+                add(own.multiplier[r], own.stacked[r], trial)
+            for i in range(n):
+                trial[i] = x[i] - inverse[i] * trial[i]
+            for r in range(size):
+                left = abs(dot(own.stacked[r], trial) - own.right[r] - own.compliance[r] * own.multiplier[r])
+                in_columns = in_columns or not left <= tolerance
+    if in_columns:
+        _minimise_in_columns(program, own, size, x)
+    for r in range(size):
+        add(own.multiplier[r], own.stacked[r], gradient)
+    finite = True
+    for i in range(n):
+        if not in_columns:
+            x[i] -= inverse[i] * gradient[i]
+        gradient[i] += program.diagonal[i] * x[i]
+        finite = finite and np.isfinite(x[i])
     return finite
+
+
+@compiled(inner=True, error_model="numpy")
+def _minimise_in_columns(program: QuadraticProgram, own: Face, size: int, x: Array) -> None:
+    """Minimiser on a face with more rows than variables, by Householder's QR of the weighted rows.
+
+    The free entries of x minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their
+    weights: heavy rows lose no digits to light ones, nor light ones to heavy.
+    """
+    free = own.inverse.nonzero()[0]
+    columns, order = len(free), np.empty(size, dtype=np.intp)
+    sort(own.compliance, order)
+    table, part = np.zeros((size + columns, columns + 1)), np.empty(columns)
+    for place in range(size):
+        r = order[place]
+        root = 1.0 / np.sqrt(own.compliance[r])
+        total = own.right[r]
+        for i in range(len(x)):
+            if own.inverse[i] == 0.0:
+                total -= own.stacked[r, i] * x[i]
+        for c in range(columns):
+            table[place, c] = root * own.stacked[r, free[c]]
+        table[place, columns] = root * total
+    for c in range(columns):
+        root = np.sqrt(program.diagonal[free[c]])
+        table[size + c, c] = root
+        table[size + c, columns] = -program.linear[free[c]] / root
+    least_squares(table, size, part)
+    for c in range(columns):
+        x[free[c]] = part[c]
+    for r in range(size):
+        own.multiplier[r] = (dot(own.stacked[r], x) - own.right[r]) / own.compliance[r]

@@ -12,7 +12,6 @@ Its positive part joins the program as soft rows. A dozen programs lead to a sta
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import lru_cache
 from typing import Any
 
@@ -27,8 +26,9 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
+from wholebody.methods.qp.rows import Rows
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Rows, Subproblem
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Lineariser
@@ -99,7 +99,7 @@ class CurvedReach:
             lower, upper = program.lower.copy(), program.upper.copy()
             if not within:  # where nothing is in the way, and a translation bends nothing
                 lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
-            program = replace(
+            program = with_values(
                 program,
                 lower=lower,
                 upper=upper,

@@ -26,9 +26,10 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.rows import Violation
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import stalls
-from wholebody.methods.qp.subproblem import BOX, Subproblem, Violation
+from wholebody.methods.qp.subproblem import BOX, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry

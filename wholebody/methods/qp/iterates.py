@@ -9,8 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.qp.funnel import PredictedReduction
-from wholebody.methods.qp.multipliers import Multipliers
-from wholebody.methods.qp.subproblem import Rows, Violation
+from wholebody.methods.qp.rows import Multipliers, Rows, Violation
 from wholebody.methods.qp.tangential import Parts
 from wholebody.terms.linearisation import Linearisation
 

@@ -11,20 +11,20 @@ gives way last.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.records import with_values
 
 MOST = 1e30
 """Sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite."""
 
 
-@dataclass(frozen=True)
-class QuadraticProgram:
-    """Data of one program in n variables.
+class QuadraticProgram(NamedTuple):
+    """Data of one program in n variables; compiled loops take it as it is.
 
     Attributes:
         diagonal: (n,) D, positive.
@@ -49,17 +49,23 @@ class QuadraticProgram:
     lower: Array
     upper: Array
 
-    def check_shapes(self, active: ActiveSet) -> None:
-        """Raise ValueError where sizes do not fit together: compiled loops do not look, and read beyond an end."""
+    def packed(self, active: ActiveSet | None = None) -> QuadraticProgram:
+        """The program in arrays without gaps, for compiled loops, which look at no sizes.
+
+        Raises:
+            ValueError: its sizes and those of an active set do not fit together.
+        """
         n, m, k = len(self.diagonal), len(self.target), len(self.least)
         if not (
-            len(self.linear) == len(self.lower) == len(self.upper) == len(active.lower) == len(active.upper) == n
+            len(self.linear) == len(self.lower) == len(self.upper) == n
             and self.rows.shape == (m, n)
             and len(self.weight) == m
             and self.elastic.shape == (k, n)
-            and len(self.elastic_weight) == len(active.elastic) == k
+            and len(self.elastic_weight) == k
+            and (active is None or tuple(map(len, active)) == (n, n, k))
         ):
             raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of other sizes")
+        return QuadraticProgram(*map(np.ascontiguousarray, self))
 
     @property
     def is_computable(self) -> bool:
@@ -83,10 +89,9 @@ class QuadraticProgram:
 
     def with_elastic(self, chosen: Mask) -> QuadraticProgram:
         """The program with the chosen ones of its elastic rows, (k,) of bool."""
-        return QuadraticProgram(
-            self.diagonal, self.linear, self.rows, self.target, self.weight, self.elastic[chosen],
-            self.least[chosen], self.elastic_weight[chosen], self.lower, self.upper,
-        )  # fmt: skip
+        return with_values(
+            self, elastic=self.elastic[chosen], least=self.least[chosen], elastic_weight=self.elastic_weight[chosen]
+        )
 
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
@@ -138,6 +143,40 @@ class ActiveSet(NamedTuple):
         )
 
 
+class Corrections(NamedTuple):
+    """How active sets are corrected: the numbers of the algorithm.
+
+    Attributes:
+        near: violation at x = 0, metres, above which a row is in the first round. More: larger programs; less: rounds.
+        rounds: most times that violated rows are added before all rows are in.
+        most: corrections of one set before another solver is asked.
+        of_guess: corrections of a set that was guessed from an approximate answer.
+        at_once: how many of them put right all that is wrong; as that may cycle, later ones change the worst entry.
+        tolerance: by which x may be out of its box and a row violated, radians and metres.
+    """
+
+    near: float = -0.03
+    rounds: int = 8
+    most: int = 120
+    of_guess: int = 12
+    at_once: int = 8
+    tolerance: float = 1e-11
+
+
+class Room(NamedTuple):
+    """Room of the compiled loops for a program with k elastic rows.
+
+    Attributes:
+        work: see `active_set_kernel.work_size`.
+        places: (2 k or more,).
+        chosen: (k or more,).
+    """
+
+    work: Array
+    places: Indices
+    chosen: Mask
+
+
 class QPSolution(NamedTuple):
     """Answer to a program.
 
@@ -155,3 +194,59 @@ class QPSolution(NamedTuple):
     exact: bool
     iterations: int
     by: str = ""
+
+
+class Scaling(NamedTuple):
+    """How solvers get a program.
+
+    Attributes:
+        x: what it is multiplied by, so that its entries are as large as the residuals.
+        heaviest: scale of a row at most, squared; larger = heavy rows closer, light ones later.
+        inactive: least value of slots without a row: never active, and no other kind of row than those in use.
+        infinite: what a solver takes for infinite.
+    """
+
+    x: float = 100.0
+    heaviest: float = 1e5
+    inactive: float = -1e3
+    infinite: float = 1e30
+
+
+class SplitForm(NamedTuple):
+    """Objective and rows over z of size n + m + k.
+
+    Attributes:
+        diagonal: (n + m + k,) diagonal Hessian.
+        linear: (n + m + k,).
+        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I], dense.
+        lower, upper: (m + k,) bounds of the rows.
+        box_lower, box_upper: (n + m + k,) bounds of z; infinite for r and s.
+    """
+
+    diagonal: Array
+    linear: Array
+    matrix: Array
+    lower: Array
+    upper: Array
+    box_lower: Array
+    box_upper: Array
+
+
+class SparseForm(NamedTuple):
+    """The same over a fixed pattern of A = [I 0 0; T -I 0; C 0 I], column by column, with the box among its rows.
+
+    Attributes:
+        hessian, gradient: (n + m + slots,) diagonal of P, and q.
+        values: entries of A.
+        lower, upper: (n + m + slots,) bounds of its rows.
+        starts: (n + 1,) where each column begins in `places`.
+        places: rows of the pattern of T.
+    """
+
+    hessian: Array
+    gradient: Array
+    values: Array
+    lower: Array
+    upper: Array
+    starts: NDArray[np.int64]
+    places: NDArray[np.int64]

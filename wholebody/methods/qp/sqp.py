@@ -22,10 +22,9 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
-from wholebody.methods.qp.multipliers import multipliers_of
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
+from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem, lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.solution import TraceEntry
@@ -181,7 +180,7 @@ class SQP:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat, multipliers = answer.x, None, False, None
         if self._measures and here.violation.total <= WIDTH:
-            parts = parts_of(program, answer, self._shift, self._working_set)
+            parts = parts_of(program, answer, self._shift)
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
@@ -306,7 +305,7 @@ class SQP:
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
         """Judge a step from here to there; near the goals the Lagrangian stands for the measures."""
         measures = [
-            one.at.measure if step.multipliers is None else step.multipliers.lagrangian(one.at.measure, one.rows)
+            one.at.measure if step.multipliers is None else lagrangian(step.multipliers, one.at.measure, one.rows)
             for one in (here, there)
         ]
         return self._funnel.judge(

@@ -21,8 +21,8 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.acceleration import STRETCH, Anderson
+from wholebody.methods.qp.active_set import without_gradient
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.working_set import WorkingSet
 
 ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
 ROOM = 1e-3  # rad, m: a bound that is nearer holds the normal part too
@@ -36,7 +36,7 @@ class Parts(NamedTuple):
     tangential: Array
 
 
-def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, working_set: WorkingSet) -> Parts | None:
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Parts | None:
     """The parts of the answer of a program; None where its face has no normal part.
 
     Where the answer went to a bound that was some way off, it is the measures that pull there. The way to that bound
@@ -46,7 +46,6 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, workin
         program: of a step.
         answer: its answer.
         shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
-        working_set: that found the answer.
     """
     target = program.target.copy()
     target[: len(shift)] += shift
@@ -54,11 +53,11 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, workin
     lower, upper = active.lower & (program.lower >= -ROOM), active.upper & (program.upper <= ROOM)
     left = (active.lower & ~lower) | (active.upper & ~upper)
     if left.any():
-        normal = working_set.without_gradient(program, with_values(active, lower=lower, upper=upper), target)
+        normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target)
         if normal is not None and not ((program.lower < normal) & (normal < program.upper))[left].all():
             normal = None
     if normal is None:
-        normal = working_set.without_gradient(program, active, target)
+        normal = without_gradient(program, active, target)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 

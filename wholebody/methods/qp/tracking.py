@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -22,7 +21,7 @@ from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.steps import FrameStep, QPStep
-from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
+from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
@@ -88,7 +87,6 @@ class QPTracker(NotCopyable):
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
-        self._turning = Turning(self.workspace)
         self._left: Array | None = None
         self._set_up()
 
@@ -232,7 +230,7 @@ class QPTracker(NotCopyable):
         if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
             bent = 0.0
             if curved > least_unseen(answer.asked):
-                bent = self._turning.linearisation_error(at, program.rows(at), displacement)
+                bent = program.turning.linearisation_error(at, program.rows, displacement)
             if bent > 0.0:
                 displacement, share, following = self._corrected(at, displacement, share, bent > MIDWAY)
         self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
@@ -277,7 +275,7 @@ class QPTracker(NotCopyable):
         """
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
-        rows, groups = self._program.rows(at), None
+        rows, groups = self._program.rows, None
         for _ in range(CORRECTIONS):
             short, q = self._shortfall(
                 at, displacement, np.maximum(began, foreseen(rows, asked, displacement)), began, midway
@@ -286,10 +284,10 @@ class QPTracker(NotCopyable):
                 return displacement, share, q
             groups = np.zeros(rows.contacts) if groups is None else groups
             groups[rows.contacts - len(short) :] += short
-            program = self._program.program()
-            again = self._working_set.solve(replace(program, least=program.least + groups[rows.contact]), rows.key)
+            program = self._program.program
+            again = self._working_set.solve(with_values(program, least=program.least + groups[rows.contact]), rows.key)
             self.workspace.state.update(at.q)  # where motion begins
-            motion, _ = self._program.motion(at, again.x)
+            motion, _ = self._program.turning.motion(at, again.x)
             share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
         for _ in range(CUTS):

@@ -13,9 +13,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.subproblem import Rows
+from wholebody.methods.qp.rows import Bodies, Rows, Seen, room_for_rows
 from wholebody.scene.workspace import Workspace
-from wholebody.terms.linearisation import PackedLinearisation
+from wholebody.terms.linearisation import NO_CONTACTS, PackedLinearisation
 
 ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
 OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
@@ -25,20 +25,32 @@ INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's acc
 
 
 class Turning:
-    """Bounds what the steps of one run turn nearer."""
+    """How the pieces of one run move in a step, and a bound on what it turns nearer."""
 
     def __init__(self, workspace: Workspace) -> None:
         """Take the pieces of a workspace, whose state is where the steps begin."""
-        self._workspace, table = workspace, workspace.table
+        state, self._workspace, table = workspace.state, workspace, workspace.table
         self._kernel = compiled_kernel()
         points = [swept.points for swept in table.swept]
-        self._reach = np.array(
-            [np.linalg.norm(own, axis=1).max() if len(own) else reach
-             for own, reach in zip(points, table.reach, strict=True)]
-        ).reshape(-1)  # fmt: skip
-        self._point = np.array([len(own) == 1 for own in points], dtype=bool)
+        reach = [np.linalg.norm(own, axis=1).max() if len(own) else reach
+                 for own, reach in zip(points, table.reach, strict=True)]  # fmt: skip
+        point = np.array([len(own) == 1 for own in points], dtype=bool)
+        self._seen = Seen(np.array(reach).reshape(-1), point, ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN)
+        self._place = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
         self._twists = np.empty((3, workspace.model.njoints, 6))
-        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
+
+    def bodies(self, at: PackedLinearisation) -> Bodies:
+        """What moves in a step from a posture, at which the workspace's state is."""
+        state, table = self._workspace.state, self._workspace.table
+        return Bodies(
+            state.columns, self._place, state.column_joint, state.parents, table.joint, at.contacts.placements,
+            table.reach, self._twists,
+        )  # fmt: skip
+
+    def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
+        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
+        way, turn = self._kernel.motion(displacement, self.bodies(at))
+        return way, turn
 
     def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
@@ -51,14 +63,10 @@ class Turning:
         Returns:
             0 where every pair keeps its distance to that, and more than 1 where one may not.
         """
-        state, contacts = self._workspace.state, at.contacts
-        count = len(contacts.distance)
+        bodies = self.bodies(at)
         share: float = self._kernel.linearisation_error(
-            state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
-            self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
-            at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
-            rows.contacts - count, self._lengths, self._twists,
-        )  # fmt: skip
+            displacement, bodies, self._seen, at.contacts, at.clearance, rows
+        )
         return share
 
 
@@ -67,13 +75,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import turning_kernel
 
-    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
-    turning_kernel.linearisation_error(
-        np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
-        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
-        np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
-        np.zeros((3, 1, 6)),
-    )  # fmt: skip
+    none, index, one = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
+    bodies = Bodies(np.zeros((6, 1)).T, one, one, one, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6)))
+    seen = Seen(none, np.zeros(0, dtype=bool), ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN)
+    turning_kernel.motion(np.zeros(1), bodies)
+    turning_kernel.linearisation_error(np.zeros(1), bodies, seen, NO_CONTACTS, none, room_for_rows(1, 0, 0, 0, 0))
     return turning_kernel
 
 

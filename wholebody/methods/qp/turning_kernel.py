@@ -1,35 +1,47 @@
-"""Whether a step turns some pair nearer than its rows foresee, as compiled loops: see `turning`."""
+"""How the pieces of a step move, and whether it turns some pair nearer than its rows foresee: see `turning`."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import dot
+from wholebody.geometry.proximity import Contacts
+from wholebody.methods.qp.dense_kernel import add, dot
+from wholebody.methods.qp.rows import Bodies, Rows, Seen
+
+
+@compiled()
+def motion(displacement: Array, bodies: Bodies) -> tuple[float, float]:
+    """Longest way of any point of any piece [m], and largest turn [rad], to first order in a displacement (nv,)."""
+    columns, parents, twist = bodies.columns, bodies.parents, bodies.twists[0]
+    twist[:] = 0.0
+    for k in range(len(columns)):
+        add(displacement[bodies.place[k]], columns[k], twist[bodies.column_joint[k]])
+    for j in range(1, len(parents)):
+        add(1.0, twist[parents[j]], twist[j])
+    longest, most = 0.0, 0.0
+    for p in range(len(bodies.joint)):
+        if bodies.joint[p] == 0:
+            continue
+        own, place = twist[bodies.joint[p]], bodies.placement[p, 3]
+        shift, turn = 0.0, 0.0
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            speed = own[i] + own[3 + j] * place[k] - own[3 + k] * place[j]
+            shift += speed * speed
+            turn += own[3 + i] * own[3 + i]
+        turn = np.sqrt(turn)
+        most = max(most, turn)
+        longest = max(longest, np.sqrt(shift) + (turn * bodies.reach[p] if turn > 0.0 else 0.0))
+    return longest, most
 
 
 @compiled()
 def linearisation_error(
-    displacement: Array,
-    columns: Array,
-    column_joint: Indices,
-    parents: Indices,
-    joint: Indices,
-    reach: Array,
-    point: Mask,
-    placement: Array,
-    pair: Indices,
-    distance: Array,
-    normal: Array,
-    asked: Array,
-    step: Array,
-    elastic: Array,
-    violation: Array,
-    contact: Indices,
-    first: int,
-    lengths: Array,
-    twists: Array,
+    displacement: Array, bodies: Bodies, seen: Seen, contacts: Contacts, asked: Array, rows: Rows
 ) -> float:
     """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
 
@@ -41,95 +53,87 @@ def linearisation_error(
     points at the plane brings it nearer, and what lies along it as far as the plane turns meanwhile.
 
     Args:
-        displacement: (n,) spread over the columns.
-        columns: (n, 6) of the joint Jacobian at the world's origin.
-        column_joint: (n,) the joint of each column.
-        parents: (njoints,) of the joints.
-        joint: (pieces,) that carries each piece.
-        reach: (pieces,) of the swept points of each piece about its place; infinite for a half-space.
-        point: (pieces,) whether a piece has a single swept point, so that its turn does not matter.
-        placement: (pieces, 4, 3) see `Contacts.placements`.
-        pair: (k, 2) pieces of the contacts.
-        distance: (k,) of the contacts.
-        normal: (k, 3) from the first piece of each to the second.
-        asked: (k,) clearances.
-        step: (nv,) the displacement.
-        elastic: (r, nv) elastic rows.
-        violation: (r,) what they are violated by before it.
-        contact: (r,) label of the contact of each row.
-        first: label of the first contact.
-        lengths: room within which a pair counts, in times of what it may be nearer by; how much farther than the
-            witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
-            by how many radians its normal may be off; least and largest that is unseen.
-        twists: (3, njoints, 6) room.
+        displacement: (nv,) of the step.
+        bodies: where it begins.
+        seen: of their pieces.
+        contacts: there.
+        asked: (k or more,) their clearances.
+        rows: whose last contacts they are.
     """
-    joints = len(parents)
-    twists[:] = 0.0
-    twist, change, own = twists[0], twists[1], twists[2]
-    for c in range(len(columns)):
-        for i in range(6):
-            own[column_joint[c], i] += columns[c, i] * displacement[c]
-    for j in range(1, joints):
-        # the axes of a joint move with the body that carries it
-        v, s = twist[parents[j]], own[j]
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            moved = v[3 + a] * s[b] - v[3 + b] * s[a] + v[a] * s[3 + b] - v[b] * s[3 + a]
-            change[j, i] = change[parents[j], i] + moved
-            change[j, 3 + i] = change[parents[j], 3 + i] + v[3 + a] * s[3 + b] - v[3 + b] * s[3 + a]
-        for i in range(6):
-            twist[j, i] = v[i] + s[i]
-    room = np.empty(len(distance))
+    count = len(contacts.distance)
+    _second_order(displacement, bodies)
+    twist, change, first = bodies.twists[0], bodies.twists[1], rows.contacts - count
+    room = np.empty(count)
     room[:] = np.inf
-    for r in range(len(violation)):
-        c = contact[r] - first
+    for r in range(len(rows.elastic_violation)):
+        c = rows.contact[r] - first
         if c >= 0:
-            room[c] = min(room[c], dot(elastic[r], step) - violation[r])
+            room[c] = min(room[c], dot(rows.elastic[r], displacement) - rows.elastic_violation[r])
     worst, vectors = 0.0, np.empty((5, 3))
-    for c in range(len(distance)):
-        nearer, way = np.inf, np.inf
-        round_piece = point[pair[c, 0]] or point[pair[c, 1]]
+    for c in range(count):
+        nearer, way, pair = np.inf, np.inf, contacts.pair[c]
+        round_piece = seen.point[pair[0]] or seen.point[pair[1]]
         for side in range(2):
             # a plane that moves with one piece, and the points of the other one; a single point has no plane
-            p, carrier = pair[c, side], joint[pair[c, 1 - side]]
-            if round_piece and not point[p]:
+            p, own, carrier = pair[side], bodies.joint[pair[side]], bodies.joint[pair[1 - side]]
+            if round_piece and not seen.point[p]:
                 continue
+            piece = Moved(bodies.placement[p, 3], seen.reach[p], twist[own], change[own])
             gone, bend = _seen_from(
-                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier],
-                normal[c], 1.0 - 2.0 * side, lengths[3], vectors,
-            )  # fmt: skip
+                piece, twist[carrier], change[carrier], contacts.normal[c], 1.0 - 2.0 * side, seen.off, vectors
+            )
             if bend < nearer:
                 nearer, way = bend, gone
-        nearer += lengths[3] * way
-        unseen = min(max(asked[c], lengths[4]), lengths[5])
+        nearer += seen.off * way
+        unseen = min(max(asked[c], seen.least), seen.most)
         if nearer <= unseen:
             continue
-        spare = distance[c] - asked[c]
-        beyond = lengths[1] if spare <= lengths[2] else 0.0
-        if room[c] < lengths[0] * nearer or (not round_piece and spare + beyond < way):
+        spare = contacts.distance[c] - asked[c]
+        beyond = seen.band if spare <= seen.lever else 0.0
+        if room[c] < seen.room * nearer or (not round_piece and spare + beyond < way):
             worst = max(worst, nearer / unseen)
     return worst
 
 
 @compiled(inner=True)
+def _second_order(displacement: Array, bodies: Bodies) -> None:
+    """Write the twist of every joint, and its change at constant joint speeds, into the room of the bodies."""
+    bodies.twists[:] = 0.0
+    twist, change, own = bodies.twists[0], bodies.twists[1], bodies.twists[2]
+    for c in range(len(bodies.columns)):
+        add(displacement[bodies.place[c]], bodies.columns[c], own[bodies.column_joint[c]])
+    for j in range(1, len(bodies.parents)):
+        # the axes of a joint move with the body that carries it
+        parent = bodies.parents[j]
+        v, s = twist[parent], own[j]
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            moved = v[3 + a] * s[b] - v[3 + b] * s[a] + v[a] * s[3 + b] - v[b] * s[3 + a]
+            change[j, i] = change[parent, i] + moved
+            change[j, 3 + i] = change[parent, 3 + i] + v[3 + a] * s[3 + b] - v[3 + b] * s[3 + a]
+        for i in range(6):
+            twist[j, i] = v[i] + s[i]
+
+
+class Moved(NamedTuple):
+    """A piece that moves: its place (3,), its points' distance from there, its twist (6,) and how that changes (6,)."""
+
+    place: Array
+    reach: float
+    twist: Array
+    change: Array
+
+
+@compiled(inner=True)
 def _seen_from(
-    place: Array,
-    reach: float,
-    own: Array,
-    own_change: Array,
-    carrier: Array,
-    carrier_change: Array,
-    normal: Array,
-    sign: float,
-    off: float,
-    vectors: Array,
+    piece: Moved, carrier: Array, carrier_change: Array, normal: Array, sign: float, off: float, vectors: Array
 ) -> tuple[float, float]:
     """Longest way of the points of a piece as seen from another body, and by how much it can bow towards it.
 
-    `place` (3,) is the piece's and `reach` its points' distance from there; twists (6,) at the world's origin and their
-    changes are those of the piece's body and of the body from which it is seen. `normal` (3,) times `sign` points from
-    the piece to that body and may be `off` by so many radians. `vectors` (5, 3) is room.
+    `carrier` (6,) is the twist of that body, `normal` (3,) times `sign` points to it and may be `off` by so many
+    radians. `vectors` (5, 3) is room.
     """
+    place, reach, own, own_change = piece.place, piece.reach, piece.twist, piece.change
     speed, bow, spin, own_speed, carrier_speed = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0
     towards, own_square, carrier_square = 0.0, 0.0, 0.0

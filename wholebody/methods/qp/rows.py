@@ -1,0 +1,365 @@
+"""What the programs of a descent and of a tracker are made of: rows, their weights, and how far a step may go.
+
+These are records, which compiled loops take as they are.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.methods.qp.quadratic_program import ActiveSet, Corrections, QuadraticProgram, Room
+
+PROXIMAL_SHARE = 0.01  # share of the curvature left where measures do not count: they still say which joints move
+GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
+GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
+HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
+ELASTIC_WEIGHT = 1e10  # and so do contacts
+HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
+ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
+SAME = 0.99  # cosine of the angle between two rows from which on they count as one
+LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
+LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
+
+
+class Weights(NamedTuple):
+    """Weights of the rows, 1/m^2 or 1/rad^2, in the order in which they give way.
+
+    Attributes:
+        force: 1/m: what all goals together pull with, however far they are.
+        least, most: of a goal's row with the largest weight.
+        hold: of equalities.
+        elastic: of contacts and inequalities.
+    """
+
+    force: float = GOAL_FORCE
+    least: float = GOAL_WEIGHTS[0]
+    most: float = GOAL_WEIGHTS[1]
+    hold: float = HOLD_WEIGHT
+    elastic: float = ELASTIC_WEIGHT
+
+
+WEIGHTS = Weights()
+
+
+class StepSize(NamedTuple):
+    """What a program says of the step beside its rows.
+
+    Attributes:
+        scale: of the measures.
+        radius: about the largest entry of the step, radians and metres.
+        pull: largest error of a goal that is asked for, metres and radians; 0 asks for all of them.
+        damping: how much of the goals' neglected second derivative is added.
+        gain: share of the way to the least measures that the step is to go.
+        measures: whether they count.
+        box: half width of the box, radians and metres.
+        overlap: largest violation of an elastic row that is asked for.
+        least_curvature, proximal, lever: see `LEAST_CURVATURE`, `PROXIMAL_SHARE` and `LEVER`.
+    """
+
+    scale: float
+    radius: float
+    pull: float
+    damping: float
+    gain: float
+    measures: bool
+    box: float
+    overlap: float
+    least_curvature: float = LEAST_CURVATURE
+    proximal: float = PROXIMAL_SHARE
+    lever: float = LEVER
+
+
+class Terms(NamedTuple):
+    """What a problem says of the rows of its terms.
+
+    Attributes:
+        kind: (c,) of each constraint's value: whether it is an equality (0), has a lower bound (1), an upper bound (2),
+            both (3) or none (-1).
+        bound: (2, c) lower and upper bounds of the values.
+        share: (g,) weights of the goals' rows, as shares of the largest.
+    """
+
+    kind: Indices
+    bound: Array
+    share: Array
+
+
+class TermRows(NamedTuple):
+    """Rows of the terms at a posture; see `Linearisation`."""
+
+    error: Array
+    error_jacobian: Array
+    value: Array
+    value_jacobian: Array
+
+
+class ContactRows(NamedTuple):
+    """Rows of the contacts there, and the number (contacts,) of each contact's pair."""
+
+    gap: Array
+    jacobian: Array
+    contact: Indices
+    clearance: Array
+    number: Indices
+
+
+class Violation(NamedTuple):
+    """How far a posture is from what is asked: metres and radians.
+
+    Attributes:
+        goal: norm of the goal errors, each times the root of its weight's share of the largest.
+        hold: norm of the equality constraints' errors.
+        elastic: sum of the violations of clearances and inequalities.
+        left: norm of the goal errors, without weights.
+    """
+
+    goal: float
+    hold: float
+    elastic: float
+    left: float
+
+    @property
+    def total(self) -> float:
+        """One figure, in which overlap counts most."""
+        return self.goal + HOLD_SHARE * self.hold + ELASTIC_SHARE * self.elastic
+
+    @property
+    def worst(self) -> float:
+        """What is compared with the tolerance."""
+        return max(self.left, self.hold, self.elastic)
+
+
+class Rows(NamedTuple):
+    """A linearisation sorted into soft rows (goals, then equalities) and elastic ones (inequalities, then gaps).
+
+    Attributes:
+        soft: (m, nv) goals' and equalities' rows.
+        soft_error: (m,) their errors.
+        soft_weight: (m,) their weights.
+        goals: how many of them are goals'.
+        elastic: (k, nv) rows of inequalities and gaps.
+        elastic_violation: (k,) by how much they are violated; negative where they hold with room to spare.
+        contact: (k,) rows of one contact share its number; the worst of them counts.
+        contacts: how many numbers there are.
+        key: (k,) names a row from one linearisation to the next.
+        elastic_weight: (k,) their weights.
+    """
+
+    soft: Array
+    soft_error: Array
+    soft_weight: Array
+    goals: int
+    elastic: Array
+    elastic_violation: Array
+    contact: Indices
+    contacts: int
+    key: Indices
+    elastic_weight: Array
+
+
+class Multipliers(NamedTuple):
+    """Multipliers of a program's rows, in units of the measures for each metre or radian; see `multipliers`.
+
+    Attributes:
+        soft: (m,) y, of goals and equalities.
+        elastic: (k,) z, of inequalities and gaps: positive where they push, else 0.
+        key: (k,) names of the elastic rows.
+    """
+
+    soft: Array
+    elastic: Array
+    key: Indices
+
+    def net(self, rows: Rows) -> Array:
+        """(m,) y without what elastic rows of the same direction take back: a gap of zero that must not be negative."""
+        pushing = np.flatnonzero(self.elastic > 0.0)
+        long = np.linalg.norm(rows.soft, axis=1), np.linalg.norm(rows.elastic[pushing], axis=1)
+        along = (rows.soft @ rows.elastic[pushing].T) / np.maximum(np.outer(*long), 1e-12)
+        return np.asarray(self.soft - (along > SAME) @ self.elastic[pushing])
+
+    def change(self, program: QuadraticProgram, x: Array) -> float:
+        """What errors and violations add to L, to first order, with the displacement x (n,): y' A x - z' C x."""
+        soft = program.rows[: len(self.soft)] @ x
+        return float(self.soft @ soft - self.elastic @ (program.elastic @ x))
+
+
+def room_for_rows(nv: int, goals: int, soft: int, elastic: int, contacts: int) -> Rows:
+    """Rows whose arrays are still to be filled."""
+    return Rows(
+        np.empty((soft, nv)), np.empty(soft), np.empty(soft), goals, np.empty((elastic, nv)), np.empty(elastic),
+        np.empty(elastic, dtype=np.intp), contacts, np.empty(elastic, dtype=np.intp), np.empty(elastic),
+    )  # fmt: skip
+
+
+class Bodies(NamedTuple):
+    """The joints of a figure and the pieces that they carry, at a posture.
+
+    Attributes:
+        columns: (c, 6) of the joint Jacobian at the world's origin.
+        place: (c,) entry of the tangent that each column belongs to.
+        column_joint: (c,) its joint.
+        parents: (njoints,) of the joints.
+        joint: (p,) that carries each piece.
+        placement: (p, 4, 3) see `Contacts.placements`.
+        reach: (p,) farthest point of each piece from there, metres.
+        twists: (3, njoints, 6) room.
+    """
+
+    columns: Array
+    place: Indices
+    column_joint: Indices
+    parents: Indices
+    joint: Indices
+    placement: Array
+    reach: Array
+    twists: Array
+
+
+class Seen(NamedTuple):
+    """What bounds how much nearer a pair gets by turning.
+
+    Attributes:
+        reach: (p,) of the swept points of each piece about its place, metres; infinite for a half-space.
+        point: (p,) whether a piece has a single swept point, so that its turn does not matter.
+        room: times what a pair may be nearer by within which it counts.
+        band: how much farther than the witness point the points without rows are, metres.
+        lever: how far beyond its clearance a pair is at most for this to hold, metres.
+        off: by how many radians its normal may be off.
+        least, most: what is unseen, metres.
+    """
+
+    reach: Array
+    point: Mask
+    room: float
+    band: float
+    lever: float
+    off: float
+    least: float
+    most: float
+
+
+class Past(NamedTuple):
+    """Where the last step of a tracker ended, and where this one does.
+
+    Attributes:
+        before: (nq + m + 2,) the posture, the errors of its soft rows there to first order, what it left of the goals,
+            and 1 where there was such a step.
+        after: (nq + m + 2,) the same of this step.
+    """
+
+    before: Array
+    after: Array
+
+
+class Guess(NamedTuple):
+    """What held the last program's answer: bounds (2, n), and the keys of the rows that pushed, in ascending order."""
+
+    held: Mask
+    pushed: Indices
+
+
+class StepRequest(NamedTuple):
+    """What is asked of the program of one step.
+
+    Attributes:
+        measures: whether they count.
+        hot: whether to solve it, not only to build it.
+        least_damping: of goals, where the last step does not ask for more.
+    """
+
+    measures: bool
+    hot: bool
+    least_damping: float
+
+
+class StepNumbers(NamedTuple):
+    """The numbers of a tracker's programs; see `step_program`.
+
+    Attributes:
+        size: of a step; what is asked of one step replaces its damping and whether measures count.
+        weights: of the rows.
+        limits: of active sets.
+        damping: of the pull of goals out of reach.
+        resting: error below which a goal rests, metres and radians.
+        curved: how far what is held is run ahead of at most, metres and radians.
+    """
+
+    size: StepSize
+    weights: Weights
+    limits: Corrections
+    damping: float
+    resting: float
+    curved: float
+
+
+class StepRoom(NamedTuple):
+    """Room for the program of a step; `tracking_kernel.parts` lays it out."""
+
+    floats: Array
+    integers: Indices
+    masks: Mask
+
+
+class StepParts(NamedTuple):
+    """The program of a step, in room that the next one overwrites.
+
+    Attributes:
+        x: (n,) its answer.
+        shift: (m,) what is added to the errors of the soft rows.
+        rows: it is made of.
+        program: the program.
+        active: active set of the answer.
+        pushing: (k,) first the keys of the rows that push, in ascending order.
+        room: of the active sets.
+    """
+
+    x: Array
+    shift: Array
+    rows: Rows
+    program: QuadraticProgram
+    active: ActiveSet
+    pushing: Indices
+    room: Room
+
+
+class Chain(NamedTuple):
+    """A model of joints of one degree of freedom each, with room for one descent.
+
+    Attributes:
+        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
+        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
+        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
+        slides: (n, 3) axis that it slides along; zero for one that turns.
+        lower, upper: (n,) least and greatest values of the joints.
+        joints: (n + 1, 4, 3) become the placements of the joints; the first is the world's.
+        columns: (n, 6) become the columns of the joint Jacobian.
+        free: (n,) room.
+    """
+
+    parents: Indices
+    places: Array
+    turns: Array
+    slides: Array
+    lower: Array
+    upper: Array
+    joints: Array
+    columns: Array
+    free: Mask
+
+
+class Goals(NamedTuple):
+    """Goals of the joints of a chain, as `terms.entries.RESIDUAL` has them.
+
+    Attributes:
+        tables: (e, 36) their floats.
+        entries: (e, 7) their integers.
+        support: (n + 1, n) 1 where a column moves a joint.
+    """
+
+    tables: Array
+    entries: NDArray[np.int64]
+    support: NDArray[np.int8]
