@@ -28,7 +28,6 @@ from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.rows import Violation
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.sqp import stalls
 from wholebody.methods.qp.subproblem import BOX, Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
@@ -45,6 +44,11 @@ DIRECTIONS_LATER = 2.5e-3  # share of their weight that directions have while pl
 PLACED = 0.01  # m: places nearer than this are reached, and directions count
 WIDE = 5.0  # rad: range from which a joint may be taken from one limit to the other
 AT_LIMIT = 1e-6  # rad
+SLOW = (
+    0.1  # share of the violation that must go in PATIENCE iterations, or as much as PROGRESS, else nothing leads nearer
+)
+PATIENCE = 6
+PROGRESS = 0.1  # m, rad
 
 
 @dataclass
@@ -198,3 +202,11 @@ def _merit(violation: Violation, goal: float) -> float:
 
 def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:
     return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+
+
+def stalls(history: list[float], tolerance: float) -> bool:
+    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
+    if len(history) <= PATIENCE or history[-1] <= 100.0 * tolerance:
+        return False
+    before = min(history[:-PATIENCE])
+    return min(history[-PATIENCE:]) > before - min(SLOW * before, PROGRESS)

@@ -43,9 +43,6 @@ REACH_TRIALS_FEW = 16  # most descents for them
 FEWEST_DESCENTS = 12  # fewest ends before their minima count as all; after 7, one that a fifth lead to may be unseen
 AGREE = 1.1  # times the least violation up to which they count as equally near
 COMING_NEAR = 40  # most programs from there to the nearest posture among things
-PUSHED_OUT = 2  # of the nearest ends of such descents, how many are pushed out of things
-STATIONARY = 0.01  # share of the error that they may still gain: they end where little more is foreseen
-PUSHING_OUT = 6  # most programs of each
 INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
 STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
 FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
@@ -94,7 +91,7 @@ class Search:
 
     def _try_ways(self, begin: Array | None) -> None:
         start = self.problem.scene.figure.clamp(self.problem.start)
-        first = self._descend(start if begin is None else begin, full_step=not self.settings.measures, early_exit=True)
+        first = self._descend(start if begin is None else begin, full_step=not self.settings.measures, restored=False)
         if self._accept(first, "directly") or self.control.over:
             return
         self.contradictions = contradictions(self.problem, self.lineariser.workspace)
@@ -220,7 +217,7 @@ class Search:
         if self.control.over:
             return
         if self._out_of_reach:
-            self._come_near()
+            self._approach(self.best.q)
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
         if not self._out_of_reach and self.best.violation.worst > tolerance:
@@ -288,18 +285,6 @@ class Search:
         self._accept(nearest, self.how)
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
 
-    def _come_near(self) -> None:
-        """Where the goals are out of reach, come as near as goes without passing through anything.
-
-        Ends of descents without contacts are left out where the best posture is nearer than they are already: among
-        things it goes no nearer from there.
-        """
-        self._approach(self.best.q)
-        for local in self._nearest[:PUSHED_OUT]:
-            nearer = (1.0 - STATIONARY) * local.violation.goal < self.best.violation.goal
-            if not self.control.over and (nearer or not held(self.best, self.settings.tolerance)):
-                self._approach(self._pushed_out(local.q))
-
     def _approach(self, begin: Array) -> None:
         """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
         tolerance = self.settings.tolerance
@@ -308,12 +293,6 @@ class Search:
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
         self._accept(local, self.how)
-
-    def _pushed_out(self, q: Array) -> Array:
-        """Where leaving what a posture (nq,) is inside of ends, with the goals' errors to stay as they are."""
-        local = self._descent(self._at_most(PUSHING_OUT), self._goal_errors(q), "nearest", measures=False).run(q)
-        self.spent += local.iterations
-        return local.q
 
     def _at_most(self, programs: int) -> int:
         """So many programs, or what one descent may have where that is less."""
@@ -352,16 +331,19 @@ class Search:
         measures: bool = True,
         most: int | None = None,
         full_step: bool = False,
-        early_exit: bool = False,
+        restored: bool = True,
     ) -> LocalSolution:
         """Descend from a start; where that ends with something that must hold not holding, restore it."""
         iterations = self.settings.iterations if most is None else min(most, self.settings.iterations)
-        descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step, early_exit=early_exit)
+        descent = self._descent(iterations, offset, note, measures=measures, full_step=full_step)
         local = descent.run(start)
         self.spent += local.iterations
-        if early_exit:
-            return local
-        if not held(local, self.settings.tolerance) and offset is None and (most is None or local.iterations < most):
+        if (
+            restored
+            and not held(local, self.settings.tolerance)
+            and offset is None
+            and (most is None or local.iterations < most)
+        ):
             stayed = self._stay(local)
             local = stayed if better(stayed, local, self.settings.tolerance) else local
         return local
@@ -373,12 +355,11 @@ class Search:
         note: str,
         *,
         measures: bool = True,
-        early_exit: bool = False,
         full_step: bool = False,
     ) -> SQP:
         return SQP(
             self.subproblem, self.lineariser, self.solver, self.settings.tolerance, iterations, offset,
-            self.trace, note, measures and self.settings.measures, early_exit, full_step, self.control,
+            self.trace, note, measures and self.settings.measures, full_step, self.control,
         )  # fmt: skip
 
     def _accept(self, local: LocalSolution, how: str) -> bool:

@@ -38,11 +38,6 @@ FULL_STEP_GAIN = 0.05  # share of the violation that a step must take away, or f
 LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
 MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
 WITHIN_STEP = 1.0  # m per rad of the last step: nor farther than this; more rows, or more that is met unseen
-SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
-PATIENCE = 6
-PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
-UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the measure: then it ends
-RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
 LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
@@ -63,7 +58,6 @@ class SQP:
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
             posture that fits is the end.
-        early_exit: whether to end where the violation hardly lessens for a while although measures do not count.
         full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
             steps are rejected or gain little; else for a piece of it.
         control: what may end it.
@@ -78,18 +72,16 @@ class SQP:
     trace: list[TraceEntry] = field(default_factory=list)
     note: str = ""
     measures: bool = True
-    early_exit: bool = False
     full_step: bool = False
     control: Control = field(default_factory=lambda: Control(np.inf))
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
-        self._radius, self._measures, self._full_step = FIRST_RADIUS, self.measures, self.full_step
+        self._radius, self._full_step = FIRST_RADIUS, self.full_step
         self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._ahead = Extrapolation()
-        self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
-        self._unimproved = 0
+        self._kept: Iterate | None = None  # best posture that fits
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
@@ -99,8 +91,7 @@ class SQP:
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
         self._keep(here)  # a start that fits is an answer, should the descent end early
-        history: list[float] = []
-        count, converged, renewals = 0, False, RENEWALS
+        count, converged = 0, False
         while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = True
@@ -113,33 +104,17 @@ class SQP:
                 None if self._full_step else self._pull,
                 self._damping,
                 self._shift,
-                self._measures,
+                self.measures,
             )
             answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
             if self._settled(here, step):
-                if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
-                    renewals -= 1
-                    self._radius, self._damping, self._full_step = FIRST_RADIUS, 0.0, False
-                    continue
-                converged = True
-                break
-            if self._unimproved >= UNIMPROVED:
                 converged = True
                 break
             there = self._advance(here, program, step)
             if there is not None:
                 here = there
                 self._keep(here)
-                history.append(here.violation.total)
-                if stalls(history, self.tolerance):
-                    if self.early_exit and not self._measures:
-                        break
-                    if self._measures:
-                        self._measures, history = False, []
-                        self._ahead.reset()
-                elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
-                    self._measures = True
             elif self._radius < LEAST_RADIUS:
                 converged = True
                 break
@@ -149,11 +124,6 @@ class SQP:
 
     def _keep(self, here: Iterate) -> None:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
-        if here.violation.worst > self.tolerance or not self._measures:
-            return
-        worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
-        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
-        self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
 
@@ -167,7 +137,7 @@ class SQP:
         The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
         """
         planes = here.at.planes
-        if planes is None or self._tension is None or not len(planes.bend) or not self._measures:
+        if planes is None or self._tension is None or not len(planes.bend) or not self.measures:
             return here.at
         pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
@@ -179,7 +149,7 @@ class SQP:
     def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat, multipliers = answer.x, None, False, None
-        if self._measures and here.violation.total <= WIDTH:
+        if self.measures and here.violation.total <= WIDTH:
             parts = parts_of(program, answer, self._shift)
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
@@ -204,11 +174,11 @@ class SQP:
         held = max(violation.hold, violation.elastic) <= self.tolerance
         worth = max(
             0.05 * self.tolerance,
-            (LEAST_GAIN if self._measures else LEAST_GAIN_ALONE) * violation.total if held else 0.0,
+            (LEAST_GAIN if self.measures else LEAST_GAIN_ALONE) * violation.total if held else 0.0,
         )
         if violation.worst > self.tolerance and predicted.violation > worth:
             return False
-        if not self._measures or step.flat:
+        if not self.measures or step.flat:
             return True
         still = float(np.abs(step.dq).max(initial=0.0)) <= 10.0 * self.tolerance
         return still or predicted.measure <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
@@ -309,7 +279,7 @@ class SQP:
             for one in (here, there)
         ]
         return self._funnel.judge(
-            (here.violation.total, measures[0]), (there.violation.total, measures[1]), step.predicted, self._measures
+            (here.violation.total, measures[0]), (there.violation.total, measures[1]), step.predicted, self.measures
         )
 
     def _record(self, there: Iterate, what: str) -> None:
@@ -325,11 +295,3 @@ class SQP:
             )
         )
         self.control.tell(self.trace[-1])
-
-
-def stalls(history: list[float], tolerance: float) -> bool:
-    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
-    if len(history) <= PATIENCE or history[-1] <= 100.0 * tolerance:
-        return False
-    before = min(history[:-PATIENCE])
-    return min(history[-PATIENCE:]) > before - min(SLOW * before, PROGRESS)
