@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.methods.qp.active_set import CORRECTIONS
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import CORRECTIONS
 
 
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:

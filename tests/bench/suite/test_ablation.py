@@ -14,6 +14,7 @@ from wholebody.bench.suite.ablation import Constant, Row, report
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
+from wholebody.methods.qp import settings, sqp
 from wholebody.motion import per_frame
 
 CHANGES = ("free", "deepest_mm", "deviation", "jerk", "sliding_mm", "programs")
@@ -62,6 +63,16 @@ def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.Monk
     with ablation.replaced(places, 7.0):
         assert all(getattr(owner, name) == 7.0 for owner, name in places)
     assert all(getattr(owner, name) == constant.value for owner, name in places)
+
+
+def test_a_field_of_a_record_is_changed_in_every_module_that_reads_it() -> None:
+    constant = Constant("wholebody.methods.qp.settings", "DESCENT.first_radius", settings.DESCENT.first_radius)
+    assert constant in ablation.constants("qp")[0]
+    before = sqp.DESCENT
+    with ablation.changed(constant, 7.0):
+        assert sqp.DESCENT.first_radius == settings.DESCENT.first_radius == 7.0
+        assert sqp.DESCENT.largest_radius == before.largest_radius
+    assert sqp.DESCENT is settings.DESCENT is before
 
 
 def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:

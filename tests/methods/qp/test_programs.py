@@ -10,9 +10,10 @@ import pytest
 from tests.reference import active_set as reference
 from wholebody import UnknownNameError
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import CORRECTIONS, guess_active_set, solve_from
+from wholebody.methods.qp.active_set import guess_active_set, solve_from
 from wholebody.methods.qp.active_set_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
 

@@ -8,8 +8,9 @@ import pytest
 from tests.reference import active_set as reference
 from wholebody.base.records import with_values
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.tangential import ALONG, ROOM, Extrapolation, Parts, parts_of
+from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
 
 NO_SHIFT = np.zeros(0)
 
@@ -34,7 +35,9 @@ def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_
         program = random_program(rng, int(rng.integers(4, 40)), int(rng.integers(1, 9)), int(rng.integers(0, 20)))
         split, answer = parts(program)
         plain, held = with_values(program, linear=np.zeros(program.size)), answer.active
-        near = held._replace(lower=held.lower & (program.lower >= -ROOM), upper=held.upper & (program.upper <= ROOM))
+        near = held._replace(
+            lower=held.lower & (program.lower >= -DESCENT.room), upper=held.upper & (program.upper <= DESCENT.room)
+        )
         left = (held.lower | held.upper) & ~(near.lower | near.upper)
         expected = np.clip(reference.minimise_on_face(plain, near).x, program.lower, program.upper)
         free = ((program.lower < expected) & (expected < program.upper))[left].all()
@@ -103,7 +106,7 @@ def test_steps_that_grow_are_followed_and_not_turned_back():
     ahead = Extrapolation()
     gone(ahead, [0.1, 0.13])
     split = Parts(np.zeros(2), np.array([0.169, 0.0]))
-    assert ahead.propose(split, free_program(2)) == pytest.approx([ALONG * 0.169, 0.0])
+    assert ahead.propose(split, free_program(2)) == pytest.approx([DESCENT.along * 0.169, 0.0])
 
 
 def test_a_refused_proposal_shortens_the_next_ones():

@@ -23,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.records import as_dict, with_values
 from wholebody.bench.report import render
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.stability.case import Posed
@@ -41,7 +42,7 @@ SEED = 5
 
 @dataclass(frozen=True)
 class Constant:
-    """A number, or several, that a module gives a name in capitals."""
+    """A number, or several, that a module gives a name in capitals, or a field of a record with one: "NAME.field"."""
 
     module: str
     name: str
@@ -118,7 +119,7 @@ def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
             if missing.name is not None and missing.name.startswith("wholebody"):
                 raise
             continue  # of an optional package that is not installed
-        mine = [Constant(name, each, getattr(module, each)) for each in _assigned(module)]
+        mine = [one for each in _assigned(module) for one in _constants(name, each, getattr(module, each))]
         mine = [each for each in mine if _is_number(each.value)]
         if mine and any(hasattr(value, "signatures") for value in vars(module).values()):  # loops of numba
             compiled.append(name)
@@ -208,7 +209,6 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
-        "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
         "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
         "arms without contacts first": (qp, "unobstructed", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
@@ -242,6 +242,13 @@ def _assigned(module: ModuleType) -> list[str]:
     return [name for names, _ in _assignments(module) for name in names if name.isupper()]
 
 
+def _constants(module: str, name: str, value: Any) -> list[Constant]:
+    """What a module gives a name: a constant, or those of a record."""
+    if hasattr(value, "_fields"):
+        return [Constant(module, f"{name}.{field}", each) for field, each in as_dict(value).items()]
+    return [Constant(module, name, value)]
+
+
 def _is_number(value: Any) -> bool:
     parts = value if isinstance(value, tuple) else (value,)
     return bool(parts) and all(
@@ -250,38 +257,31 @@ def _is_number(value: Any) -> bool:
 
 
 def places(constant: Constant) -> list[tuple[Any, str]]:
-    """The module of a constant, and those that import it by its name."""
-    owner = sys.modules[constant.module]
+    """The module of a constant or of its record, and those that import it by its name."""
+    owner, name = sys.modules[constant.module], constant.name.partition(".")[0]
+    value = getattr(owner, name)
     others = [
         module
-        for name, module in sys.modules.items()
-        if name.startswith("wholebody.") and module is not owner and constant.name in vars(module)
-        and vars(module)[constant.name] is constant.value and constant.name not in _assigned(module)
+        for known, module in sys.modules.items()
+        if known.startswith("wholebody.") and module is not owner and vars(module).get(name) is value
+        and name not in _assigned(module)
     ]  # fmt: skip
-    return [(module, constant.name) for module in (owner, *others)]
+    return [(module, name) for module in (owner, *others)]
 
 
 @contextmanager
 def changed(constant: Constant, value: Value) -> Iterator[None]:
-    """Give a constant another value for a while, and what its module made of it when it was imported.
-
-    Compiled loops get constants in arrays that modules make of them; these are made anew.
-    """
-    owner = sys.modules[constant.module]
+    """Give a constant another value for a while, wherever it was imported, and what its module made of it at import."""
+    owner, (name, _, field) = sys.modules[constant.module], constant.name.partition(".")
+    given = with_values(getattr(owner, name), **{field: value}) if field else value
     with ExitStack() as stack:
-        stack.enter_context(replaced(places(constant), value))
-        anew = {constant.name}
+        stack.enter_context(replaced(places(constant), given))
+        anew = {name}
         for names, expression in _assignments(owner):
             used = {node.id for node in ast.walk(expression) if isinstance(node, ast.Name)}
             if used & anew and len(names) == 1:
                 made = eval(compile(ast.Expression(expression), str(owner.__file__), "eval"), vars(owner))
-                old = getattr(owner, names[0])
-                holders = [
-                    module
-                    for name, module in sys.modules.items()
-                    if name.startswith("wholebody.") and vars(module).get(names[0]) is old
-                ]
-                stack.enter_context(replaced([(module, names[0]) for module in holders], made))
+                stack.enter_context(replaced(places(Constant(constant.module, names[0], made)), made))
                 anew.add(names[0])
         yield
 

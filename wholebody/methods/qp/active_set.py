@@ -26,9 +26,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.quadratic_program import ActiveSet, Corrections, QPSolution, QuadraticProgram, Room
-
-CORRECTIONS = Corrections()
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room
+from wholebody.methods.qp.settings import CORRECTIONS
 
 SEMISMOOTH = "semismooth newton"
 """What `QPSolution.by` says of answers that `last_resort` found."""

@@ -9,7 +9,8 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import add, dot, gram, least_squares, solve, sort
-from wholebody.methods.qp.quadratic_program import ActiveSet, Corrections, QuadraticProgram, Room
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
+from wholebody.methods.qp.settings import Corrections
 
 
 class Face(NamedTuple):

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-WIDTH = 0.02  # violation that is allowed while the measures improve, at first
-SWITCH = 10.0  # the measures lead once they gain more than this times the squared violation
-WORTH = 0.05  # share of what was foreseen that a step must bring
-GOOD, POOR = 0.5, 0.25  # shares above which the next step may be longer, and below which it must be shorter
+from wholebody.methods.qp.settings import DESCENT
 
 
 class StepAcceptance(NamedTuple):
@@ -42,7 +39,7 @@ class Funnel:
 
     def __init__(self, violation: float) -> None:
         """Begin wide enough for the violation at hand."""
-        self.width = max(WIDTH, violation)
+        self.width = max(DESCENT.width, violation)
 
     def judge(
         self, before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, measures: bool
@@ -55,18 +52,26 @@ class Funnel:
             predicted: what was foreseen.
             measures: whether the measures count.
         """
-        lead = measures and predicted.measure > SWITCH * before[0] ** 2 and before[0] <= self.width
+        lead = measures and predicted.measure > DESCENT.switch * before[0] ** 2 and before[0] <= self.width
         saved = before[1] - after[1]
-        if lead and after[0] <= self.width and saved >= WORTH * predicted.measure:
-            return StepAcceptance(True, saved >= GOOD * predicted.measure, saved < POOR * predicted.measure, "measure")
-        gained = before[0] - after[0]
-        if predicted.violation > 0.0 and gained >= WORTH * predicted.violation:
+        if lead and after[0] <= self.width and saved >= DESCENT.worth * predicted.measure:
             return StepAcceptance(
-                True, gained >= GOOD * predicted.violation, gained < POOR * predicted.violation, "goal"
+                True,
+                saved >= DESCENT.good * predicted.measure,
+                saved < DESCENT.poor * predicted.measure,
+                "measure",
+            )
+        gained = before[0] - after[0]
+        if predicted.violation > 0.0 and gained >= DESCENT.worth * predicted.violation:
+            return StepAcceptance(
+                True,
+                gained >= DESCENT.good * predicted.violation,
+                gained < DESCENT.poor * predicted.violation,
+                "goal",
             )
         return StepAcceptance(False, False, False, "rejected measure" if lead else "rejected")
 
     def narrow(self, before: float, after: float) -> None:
         """After a step that lessened the violation from `before` to `after`."""
         narrower = max(0.9 * self.width, after + 0.5 * (before - after))
-        self.width = max(min(narrower, WIDTH), after)
+        self.width = max(min(narrower, DESCENT.width), after)

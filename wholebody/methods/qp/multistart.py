@@ -17,7 +17,8 @@ from wholebody.methods.qp.comparison import better, held
 from wholebody.methods.qp.curved_reach import CurvedReach
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution
-from wholebody.methods.qp.screening import SCREENED, Settings, least_measures
+from wholebody.methods.qp.screening import Settings, least_measures
+from wholebody.methods.qp.settings import SEARCH
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP
 from wholebody.methods.qp.subproblem import Subproblem
@@ -26,26 +27,6 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Lineariser
-
-PROBE_PROGRAMS = 40  # most programs of a probe; more = surer on curved ways, fewer starts within the budget
-RELAXATION_DEPTH = 0.15  # m: by which a relaxed probe may be inside of things; two limbs that cross need as much
-NO_NEARER = 20  # probes in a row that came no nearer: the goals are out of reach
-REACHED = 10.0  # tolerances: relaxed probes that end farther from the goals are given up
-NEARER = 0.02  # share of what is left by which a probe is nearer
-REACH_TRIALS = 10  # most descents without contacts that tell whether goals are out of reach
-REACH_TRIAL_PROGRAMS = 60  # most programs of each
-FAR = (1.0, 0.6)  # shares of the joints' ranges that their starts may be away by
-HELD = 1e-2  # share of what is left of the goals by which constraints may be missed where such a descent ends
-AGREEING = 3  # of them that have to come to rest equally near
-FEW = 12  # degrees of freedom that move the goals; fewer: minima lie apart, starts are all over the limits, and cheap
-AGREEING_FEW = 8  # the same for them
-REACH_TRIALS_FEW = 16  # most descents for them
-FEWEST_DESCENTS = 12  # fewest ends before their minima count as all; after 7, one that a fifth lead to may be unseen
-AGREE = 1.1  # times the least violation up to which they count as equally near
-COMING_NEAR = 40  # most programs from there to the nearest posture among things
-INSIDE_PROBES = 5  # seeded starts for goals inside of things, which only look for the nearest posture
-STAYING = 40  # most programs that improve the measures at the nearest posture to goals that are not met
-FOR_WAYS = 0.5  # share of the time limit that ways after the first may take: to come nearest takes its time too
 
 
 class Search:
@@ -104,7 +85,7 @@ class Search:
             return
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, self.lineariser.state, start))]
         ends = ((self._feasibility_first(q), "from hooked hands") for q in hooked)
-        near = self.best.violation.left <= RELAXATION_DEPTH  # as far as limbs in the way keep goals off
+        near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         again = self._relaxed_probes(iter([start] if near else []))
         if any(self._accept(*found) for found in chain(self._relaxed_probes(iter(hooked)), ends, again)):
             return
@@ -115,12 +96,15 @@ class Search:
             return
         self._leave_cancelling()
         rng = np.random.default_rng(self.settings.seed)
-        count = min(self.settings.restarts, INSIDE_PROBES) if least else self.settings.restarts
-        if few := self._moving() < FEW:
-            self._minima, self._relaxed_minima = Minima(FEWEST_DESCENTS), Minima(FEWEST_DESCENTS)
+        count = min(self.settings.restarts, SEARCH.inside_probes) if least else self.settings.restarts
+        if few := self._moving() < SEARCH.few:
+            self._minima, self._relaxed_minima = (
+                Minima(SEARCH.fewest_descents),
+                Minima(SEARCH.fewest_descents),
+            )
         others = (throughout if few else restarts)(self.problem, self.lineariser.state, start, rng, count)
         for local, how in self._relaxed_probes(chain([] if near else [start], self._through, others)):
-            if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > FOR_WAYS:
+            if self._accept(local, how) or self._proven() or self._left <= 0 or self.control.spent > SEARCH.for_ways:
                 return
 
     def _from_before_contact(self) -> Iterator[tuple[LocalSolution, str]]:
@@ -130,7 +114,7 @@ class Search:
         ):
             self.spent += local.iterations
             yield self._feasibility_first(local.q), "from before contact"
-            if self.control.spent > FOR_WAYS:
+            if self.control.spent > SEARCH.for_ways:
                 return
 
     def _restart_for_measure(self) -> None:
@@ -140,8 +124,8 @@ class Search:
             return
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng([self.settings.seed, count])
-        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, SCREENED * count - 1))
-        most = self._at_most(PROBE_PROGRAMS)
+        starts = chain([start], restarts(self.problem, self.lineariser.state, start, rng, SEARCH.screened * count - 1))
+        most = self._at_most(SEARCH.probe_programs)
 
         def probe(q: Array) -> LocalSolution:
             return self._feasibility(self.lineariser, most, "for measure").once(q)
@@ -175,12 +159,17 @@ class Search:
         """
         for q in self.lineariser.defined(starts):
             complete = self._minima.complete or self._relaxed_minima.complete
-            if complete or self._without_gain >= NO_NEARER or self._left <= 0 or self.control.spent > FOR_WAYS:
+            if (
+                complete
+                or self._without_gain >= SEARCH.no_nearer
+                or self._left <= 0
+                or self.control.spent > SEARCH.for_ways
+            ):
                 return
-            relaxed = self._probe(q, RELAXATION_DEPTH)
-            nearer = relaxed.violation.left < (1.0 - NEARER) * self.best.violation.left
+            relaxed = self._probe(q, SEARCH.relaxation_depth)
+            nearer = relaxed.violation.left < (1.0 - SEARCH.nearer) * self.best.violation.left
             self._without_gain = 0 if nearer else self._without_gain + 1
-            if relaxed.violation.worst > REACHED * self.settings.tolerance:
+            if relaxed.violation.worst > SEARCH.reached * self.settings.tolerance:
                 self._relaxed_minima.add(relaxed.violation.total, relaxed.converged)
                 continue
             probe = self._probe(relaxed.q, 0.0)
@@ -198,7 +187,7 @@ class Search:
             start: (nq,).
             depth: by which pieces may be inside of each other, metres.
         """
-        most = max(min(self._left, PROBE_PROGRAMS), 1)
+        most = max(min(self._left, SEARCH.probe_programs), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
         local = self._feasibility(lineariser, most, "probe").once(start)
         self.spent += local.iterations
@@ -247,26 +236,34 @@ class Search:
         start = self.problem.scene.figure.clamp(self.problem.start)
         rng = np.random.default_rng(self.settings.seed)
         self._out_of_reach = False
-        if self._moving() < FEW:
-            agreeing, others = AGREEING_FEW, throughout(self.problem, state, start, rng, REACH_TRIALS_FEW - 1)
+        if self._moving() < SEARCH.few:
+            agreeing, others = (
+                SEARCH.agreeing_few,
+                throughout(self.problem, state, start, rng, SEARCH.reach_trials_few - 1),
+            )
         else:
-            agreeing, others = AGREEING, restarts(self.problem, state, start, rng, REACH_TRIALS - 1, FAR)
+            agreeing, others = (
+                SEARCH.agreeing,
+                restarts(self.problem, state, start, rng, SEARCH.reach_trials - 1, SEARCH.far),
+            )
         for begin in chain([q], self.lineariser.defined(others)):
-            local = reach.through_everything(begin, REACHED * tolerance, self._at_most(REACH_TRIAL_PROGRAMS))
+            local = reach.through_everything(
+                begin, SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
+            )
             self.spent += local.iterations
-            if local.violation.worst <= REACHED * tolerance and begin is not q:
+            if local.violation.worst <= SEARCH.reached * tolerance and begin is not q:
                 self._through = [local.q]
-            if local.violation.worst <= REACHED * tolerance or self.control.over:
+            if local.violation.worst <= SEARCH.reached * tolerance or self.control.over:
                 return False
-            if local.violation.hold > HELD * local.violation.left:
+            if local.violation.hold > SEARCH.held * local.violation.left:
                 continue  # from there the constraints alone are too far
             self._nearest.append(local)
             self._nearest.sort(key=lambda local: local.violation.total)
-            most = AGREE * self._nearest[0].violation.total + tolerance
+            most = SEARCH.agree * self._nearest[0].violation.total + tolerance
             if sum(local.violation.total <= most for local in self._nearest) == agreeing:
                 self._out_of_reach = True
                 return True
-        near = (1.0 - NEARER) * self.best.violation.left
+        near = (1.0 - SEARCH.nearer) * self.best.violation.left
         self._without_gain = sum(local.violation.left >= near for local in self._nearest)  # as relaxed probes count
         return False
 
@@ -277,7 +274,7 @@ class Search:
 
     def _near_best(self) -> None:
         """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
-        nearest = self._curved().among_things(self.best.q, self.settings.tolerance, self._at_most(COMING_NEAR))
+        nearest = self._curved().among_things(self.best.q, self.settings.tolerance, self._at_most(SEARCH.coming_near))
         self.spent += nearest.iterations
         if not nearest.converged:
             self._accept(nearest, self.how)
@@ -288,10 +285,10 @@ class Search:
     def _approach(self, begin: Array) -> None:
         """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
         tolerance = self.settings.tolerance
-        local = self._curved().among_things(begin, tolerance, self._at_most(COMING_NEAR))
+        local = self._curved().among_things(begin, tolerance, self._at_most(SEARCH.coming_near))
         self.spent += local.iterations
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
-            local = self._descend(local.q, note="nearest", measures=False, most=COMING_NEAR)
+            local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
         self._accept(local, self.how)
 
     def _at_most(self, programs: int) -> int:
@@ -304,7 +301,7 @@ class Search:
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
-        most = self._at_most(STAYING) if held(local, self.settings.tolerance) else self.settings.iterations
+        most = self._at_most(SEARCH.staying) if held(local, self.settings.tolerance) else self.settings.iterations
         stayed = self._descent(most, nearest, "nearest").run(local.q)
         self.spent += stayed.iterations
         left = float(np.linalg.norm(self._goal_errors(stayed.q)))

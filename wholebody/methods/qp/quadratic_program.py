@@ -143,26 +143,6 @@ class ActiveSet(NamedTuple):
         )
 
 
-class Corrections(NamedTuple):
-    """How active sets are corrected: the numbers of the algorithm.
-
-    Attributes:
-        near: violation at x = 0, metres, above which a row is in the first round. More: larger programs; less: rounds.
-        rounds: most times that violated rows are added before all rows are in.
-        most: corrections of one set before another solver is asked.
-        of_guess: corrections of a set that was guessed from an approximate answer.
-        at_once: how many of them put right all that is wrong; as that may cycle, later ones change the worst entry.
-        tolerance: by which x may be out of its box and a row violated, radians and metres.
-    """
-
-    near: float = -0.03
-    rounds: int = 8
-    most: int = 120
-    of_guess: int = 12
-    at_once: int = 8
-    tolerance: float = 1e-11
-
-
 class Room(NamedTuple):
     """Room of the compiled loops for a program with k elastic rows.
 

@@ -11,38 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.methods.qp.quadratic_program import ActiveSet, Corrections, QuadraticProgram, Room
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
+from wholebody.methods.qp.settings import PROGRAM, Corrections, Weights
 
-PROXIMAL_SHARE = 0.01  # share of the curvature left where measures do not count: they still say which joints move
-GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
-GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
-HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
-ELASTIC_WEIGHT = 1e10  # and so do contacts
-HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
-ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
-LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
-LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
-
-
-class Weights(NamedTuple):
-    """Weights of the rows, 1/m^2 or 1/rad^2, in the order in which they give way.
-
-    Attributes:
-        force: 1/m: what all goals together pull with, however far they are.
-        least, most: of a goal's row with the largest weight.
-        hold: of equalities.
-        elastic: of contacts and inequalities.
-    """
-
-    force: float = GOAL_FORCE
-    least: float = GOAL_WEIGHTS[0]
-    most: float = GOAL_WEIGHTS[1]
-    hold: float = HOLD_WEIGHT
-    elastic: float = ELASTIC_WEIGHT
-
-
-WEIGHTS = Weights()
 
 
 class StepSize(NamedTuple):
@@ -57,7 +29,7 @@ class StepSize(NamedTuple):
         measures: whether they count.
         box: half width of the box, radians and metres.
         overlap: largest violation of an elastic row that is asked for.
-        least_curvature, proximal, lever: see `LEAST_CURVATURE`, `PROXIMAL_SHARE` and `LEVER`.
+        least_curvature, proximal, lever: see `settings.ProgramNumbers`.
     """
 
     scale: float
@@ -68,9 +40,18 @@ class StepSize(NamedTuple):
     measures: bool
     box: float
     overlap: float
-    least_curvature: float = LEAST_CURVATURE
-    proximal: float = PROXIMAL_SHARE
-    lever: float = LEVER
+    least_curvature: float
+    proximal: float
+    lever: float
+
+
+def step_size(scale: float, radius: float, pull: float, damping: float, gain: float, measures: bool) -> StepSize:
+    """What a program says of a step, with the numbers of the method."""
+    box, overlap = PROGRAM.box * radius, PROGRAM.error_clamp * radius
+    return StepSize(
+        scale, radius, pull, damping, gain, measures, box, overlap, PROGRAM.least_curvature, PROGRAM.proximal_share,
+        PROGRAM.lever,
+    )  # fmt: skip
 
 
 class Terms(NamedTuple):
@@ -125,7 +106,7 @@ class Violation(NamedTuple):
     @property
     def total(self) -> float:
         """One figure, in which overlap counts most."""
-        return self.goal + HOLD_SHARE * self.hold + ELASTIC_SHARE * self.elastic
+        return self.goal + PROGRAM.hold_share * self.hold + PROGRAM.elastic_share * self.elastic
 
     @property
     def worst(self) -> float:

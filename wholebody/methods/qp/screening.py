@@ -1,7 +1,7 @@
 """What a search is bounded by, and which of many starts are worth a descent for the measures.
 
 A posture that fits costs a few programs, and its measure tells which minimum it is near; a descent costs many. So of
-`SCREENED` times as many postures that fit, those with the least measures are descended from.
+`SEARCH.screened` times as many postures that fit, those with the least measures are descended from.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import LocalSolution
-
-SCREENED = 4  # feasible postures that are looked for, for each that is descended from; more = lower measures, slower
 
 
 class Settings(NamedTuple):

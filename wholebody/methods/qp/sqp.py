@@ -20,27 +20,19 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
-from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
+from wholebody.methods.qp.funnel import Funnel, PredictedReduction, StepAcceptance
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem, lagrangian, multipliers_of
+from wholebody.methods.qp.subproblem import Subproblem, lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
 
-FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
-LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
-FULL_STEP_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after a rejected step, none after two
-FULL_STEP_GAIN = 0.05  # share of the violation that a step must take away, or full steps end
-LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
-MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
-WITHIN_STEP = 1.0  # m per rad of the last step: nor farther than this; more rows, or more that is met unseen
-LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
-NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
 @dataclass
@@ -77,8 +69,8 @@ class SQP:
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
-        self._radius, self._full_step = FIRST_RADIUS, self.full_step
-        self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
+        self._radius, self._full_step = DESCENT.first_radius, self.full_step
+        self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits
@@ -144,12 +136,12 @@ class SQP:
 
     @property
     def _pull(self) -> float:
-        return ERROR_CLAMP * self._radius * self._stretch
+        return PROGRAM.error_clamp * self._radius * self._stretch
 
     def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat, multipliers = answer.x, None, False, None
-        if self.measures and here.violation.total <= WIDTH:
+        if self.measures and here.violation.total <= DESCENT.width:
             parts = parts_of(program, answer, self._shift)
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
@@ -174,7 +166,7 @@ class SQP:
         held = max(violation.hold, violation.elastic) <= self.tolerance
         worth = max(
             0.05 * self.tolerance,
-            (LEAST_GAIN if self.measures else LEAST_GAIN_ALONE) * violation.total if held else 0.0,
+            (DESCENT.least_gain if self.measures else DESCENT.least_gain_alone) * violation.total if held else 0.0,
         )
         if violation.worst > self.tolerance and predicted.violation > worth:
             return False
@@ -214,8 +206,8 @@ class SQP:
     def _reject(self, longest: float, by: str) -> None:
         """Ask for less after a step whose longest entry is this was rejected."""
         if self._full_step:
-            self._full_step = self._damping < FULL_STEP_DAMPING[1]
-            self._damping = FULL_STEP_DAMPING[1] if self._full_step else 0.0
+            self._full_step = self._damping < DESCENT.full_step_damping[1]
+            self._damping = DESCENT.full_step_damping[1] if self._full_step else 0.0
             return
         self._stretch = 1.0
         self._radius = 0.3 * min(longest, self._radius)
@@ -232,7 +224,7 @@ class SQP:
         What would be left of the rows' violation after the program's own answer, because the measures pull, is asked
         for in the next one (method of multipliers).
         """
-        if self._full_step and there.violation.total > (1.0 - FULL_STEP_GAIN) * here.violation.total:
+        if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
             self._full_step, self._damping = False, 0.0
         if acceptance.by == "goal":
             self._funnel.narrow(here.violation.total, there.violation.total)
@@ -241,15 +233,15 @@ class SQP:
         if acceptance.good:
             if not self._full_step:
                 self._damping *= 0.3
-            if there.longest > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
-                self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
+            if there.longest > 0.5 * self._radius or here.violation.left > PROGRAM.error_clamp * self._radius:
+                self._radius = min(2.0 * self._radius, DESCENT.largest_radius)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
         if step.parts is not None and not step.flat:
             self._ahead.record(step.parts, way, way is not step.dq)
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
-        self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
+        self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
         return there
 
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
@@ -265,7 +257,14 @@ class SQP:
             return None
 
     def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
-        within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
+        within = max(
+            DESCENT.least_within,
+            min(
+                PROGRAM.error_clamp * self._radius,
+                DESCENT.within_step * longest,
+                DESCENT.most_within,
+            ),
+        )
         at = self.lineariser.at(q, within, planes=self.offset is None)
         rows = self.subproblem.rows(at)
         if self.offset is not None:

@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.methods.qp.active_set import CORRECTIONS
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.rows import (
-    WEIGHTS,
     Bodies,
     Guess,
     Past,
@@ -29,11 +27,12 @@ from wholebody.methods.qp.rows import (
     StepParts,
     StepRequest,
     StepRoom,
-    StepSize,
     Terms,
+    step_size,
 )
+from wholebody.methods.qp.settings import CORRECTIONS, PROGRAM, STEP, WEIGHTS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET
-from wholebody.methods.qp.subproblem import BOX, ERROR_CLAMP, Subproblem
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.turning import Turning
 from wholebody.methods.qp.turning import compiled_kernel as compiled_turning
 from wholebody.methods.qp.working_set import WorkingSet
@@ -42,22 +41,6 @@ from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint
 from wholebody.terms.constraint_values import ConstraintValues
 from wholebody.terms.linearisation import NO_CONTACTS, PackedLinearisation
-
-RADIUS = 0.1  # rad, m: what a goal that jumps may ask of one step, before velocity bounds
-DAMPING = 2.0
-"""Of the pull of goals out of reach. Larger is calmer, and more steps end up to 0.08 mm short of a clearance. Reaches
-into a block at four places: accelerations of 0.58 to 0.63 rad/s^2 with 2, and 1 step of 800 short by more than 1e-3
-mm; 0.54 to 0.60 and 3 steps with 2.5; 0.53 to 0.57 and 3 steps with 3. At one of them 0.80 with 1, 0.71 with 1.5."""
-
-SETTLING = 1.0  # s: measures lessen by 1/e in it: longer = slower to settle, shorter = jolts at bounds, then swinging
-RESTING = 1e-5  # m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached
-CURVED = 1e-4  # m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps
-LITTLE = 0.01  # damping that makes no difference to how a step looks
-WORSE = 2.0  # times the damping of a program that its answer may ask for before it is solved again with that
-BENT = 5e-5  # m rad: change of motion times turn above which it is looked at how a step curves what is held
-STRAIGHT = 1.5e-6  # m, rad: by which what is held may be curved other than as foreseen without another program
-TRADED = 0.5  # see `StepProgram.solve`: greater = weights count in more steps, and light goals wait in more
-AGAIN = 2  # times that a program is solved again at most; with 1 a goal that is just blocked makes limbs jump
 
 
 class Answer(NamedTuple):
@@ -126,7 +109,7 @@ class StepProgram:
     def take(self, seconds: float) -> None:
         """Make the next steps take so long, for what measures do meanwhile."""
         # without goals the measures are the task
-        gain = min(1.0, seconds / SETTLING) if self.goals else 1.0
+        gain = min(1.0, seconds / STEP.settling) if self.goals else 1.0
         self._numbers = numbers_of(self._subproblem.scale, gain)
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
@@ -154,7 +137,7 @@ class StepProgram:
             given = self._given
             answer, damping = self._damped(at, measures, given)
         bend, self._bend = self._bend, answer.motion * answer.turn
-        if len(self._held) and (self._curving or abs(self._bend - bend) > BENT):
+        if len(self._held) and (self._curving or abs(self._bend - bend) > STEP.bent):
             self._curving = self._foresee(at, answer.x)
             if self._curving:
                 answer, _, _ = self._once(at, given, StepRequest(measures, self._working_set.hot, damping))
@@ -202,8 +185,8 @@ class StepProgram:
         """An answer with as much damping as it asks for itself, and the damping."""
         hot = self._working_set.hot
         answer, damping, asked = self._once(at, given, StepRequest(measures, hot, 0.0))
-        for _ in range(AGAIN):
-            if asked <= WORSE * max(damping, LITTLE):
+        for _ in range(STEP.again):
+            if asked <= STEP.worse * max(damping, STEP.little):
                 break
             answer, damping, asked = self._once(at, given, StepRequest(measures, self._working_set.hot, asked))
         return answer, damping
@@ -217,8 +200,8 @@ class StepProgram:
         error = rows.soft_error[: self.goals]
         after = error + rows.soft[: self.goals] @ x
         shares = (self._even.share, self._given.share)
-        even, weighted = (sqrt(by @ after**2) / max(sqrt(by @ error**2), RESTING) for by in shares)
-        return 1.0 - weighted < TRADED * (1.0 - even)
+        even, weighted = (sqrt(by @ after**2) / max(sqrt(by @ error**2), STEP.resting) for by in shares)
+        return 1.0 - weighted < STEP.traded * (1.0 - even)
 
     def _once(self, at: PackedLinearisation, given: Terms, request: StepRequest) -> tuple[Answer, float, float]:
         """An answer, the damping of its program, and what it asks for.
@@ -248,7 +231,7 @@ class StepProgram:
         missed = float((rows.elastic_violation - rows.elastic @ answer.x).max(initial=0.0))
         remains = (rows.soft @ answer.x - program.target)[: self.goals]
         left, error = sqrt(remains @ remains), sqrt(at.value[: self.goals] @ at.value[: self.goals])
-        asked = DAMPING * min(1.0, left / max(error, 1e-12)) if left > RESTING else 0.0
+        asked = STEP.damping * min(1.0, left / max(error, 1e-12)) if left > STEP.resting else 0.0
         answered = (answer.exact, answer.iterations, answer.by)
         return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
@@ -261,7 +244,9 @@ class StepProgram:
         state, rows = self._there.update(pin.integrate(self._there.model, at.q, displacement)), self._parts.rows
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
-        other: bool = self._kernel.run_ahead(curved, rows, at.q, 2.0 * RESTING, CURVED, STRAIGHT, self._past.before)
+        other: bool = self._kernel.run_ahead(
+            curved, rows, at.q, 2.0 * STEP.resting, STEP.curved, STEP.straight, self._past.before
+        )
         return other
 
     @property
@@ -294,8 +279,8 @@ def numbers_of(scale: float, gain: float) -> StepNumbers:
         scale: of the measures.
         gain: share of the way to the least measures that a step is to go.
     """
-    size = StepSize(scale, RADIUS, ERROR_CLAMP * RADIUS, 0.0, gain, True, BOX * RADIUS, ERROR_CLAMP * RADIUS)
-    return StepNumbers(size, WEIGHTS, CORRECTIONS, DAMPING, RESTING, CURVED)
+    size = step_size(scale, STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, gain, True)
+    return StepNumbers(size, WEIGHTS, CORRECTIONS, STEP.damping, STEP.resting, STEP.curved)
 
 
 @lru_cache(maxsize=1)

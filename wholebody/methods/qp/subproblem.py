@@ -19,25 +19,20 @@ from wholebody.figures.state import State
 from wholebody.methods.qp.active_set import smallest
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.rows import (
-    HOLD_WEIGHT,
-    WEIGHTS,
     ContactRows,
     Multipliers,
     Rows,
-    StepSize,
     TermRows,
     Terms,
     Violation,
     room_for_rows,
+    step_size,
 )
+from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation
 from wholebody.terms.planes import TermPlanes
 
-ERROR_CLAMP = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
-BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
-LEAST_SHARE = 1e-3  # of the largest goal weight: goals that weigh less count as this much, or they would not be met
-HEAVIEST_CURVATURE = 5e3  # 1/rad^2: heavier measures are scaled to this; above it they would hold goals back
 PLANE_KEYS = -(1 << 40)  # keys of supporting planes are below this, out of the way of all others
 
 _NONE = np.zeros(0)
@@ -49,7 +44,7 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     The gap itself counts, and is violated wherever a plane is.
     """
     count = len(planes.value)
-    weights = np.append(rows.soft_weight[: rows.goals], HOLD_WEIGHT)
+    weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
     return with_values(
         rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
@@ -89,12 +84,12 @@ class Subproblem:
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
         self._upper = np.concatenate(upper) if upper else np.zeros(0)
         goal_weight = np.concatenate(weight) if weight else np.zeros(0)
-        share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), LEAST_SHARE)
+        share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), PROGRAM.least_share)
         self.scale = 1.0
         """What measures are multiplied by, so that heavy ones do not outweigh goals."""
         heaviest = sum((m.weight * m.curvature(state) for m in problem.measures), np.zeros(state.model.nv))
-        if heaviest.max(initial=0.0) > HEAVIEST_CURVATURE:
-            self.scale = HEAVIEST_CURVATURE / float(heaviest.max())
+        if heaviest.max(initial=0.0) > PROGRAM.heaviest_curvature:
+            self.scale = PROGRAM.heaviest_curvature / float(heaviest.max())
         self._equal = np.flatnonzero(self._lower == self._upper)
         self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
         """How many rows of each constraint are equalities."""
@@ -183,10 +178,7 @@ class Subproblem:
         """
         squares = at.squares if measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature
-        step = StepSize(
-            self.scale, radius, 0.0 if pull is None else pull, damping, gain, measures, BOX * radius,
-            ERROR_CLAMP * radius,
-        )  # fmt: skip
+        step = step_size(self.scale, radius, 0.0 if pull is None else pull, damping, gain, measures)
         target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
         diagonal, linear, lower, upper = np.empty((4, len(at.gradient)))
         program = QuadraticProgram(
@@ -240,7 +232,7 @@ def compiled_kernel() -> Any:
     rows, found = room_for_rows(1, 0, 0, 0, 0), Multipliers(none, none, index)
     terms, contacts = TermRows(none, matrix, none, matrix), ContactRows(none, matrix, index, none, index)
     program, active = smallest()
-    step = StepSize(1.0, 1.0, 1.0, 1.0, 1.0, True, 1.0, 1.0)
+    step = step_size(1.0, 1.0, 1.0, 1.0, 1.0, True)
     subproblem_kernel.sort_rows(terms, contacts, Terms(index, np.zeros((2, 0)), none), WEIGHTS, rows)
     subproblem_kernel.violation(rows, none, none)
     subproblem_kernel.fill_program(one, one, np.ones((2, 1)), rows, none, step, program)

@@ -8,7 +8,8 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import copy, dot, sort
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.rows import ContactRows, Multipliers, Rows, StepSize, TermRows, Terms, Weights
+from wholebody.methods.qp.rows import ContactRows, Multipliers, Rows, StepSize, TermRows, Terms
+from wholebody.methods.qp.settings import Weights
 
 MOST_ROWS = 4096  # more than one contact ever has
 

@@ -23,9 +23,8 @@ from wholebody.base.records import with_values
 from wholebody.methods.acceleration import STRETCH, Anderson
 from wholebody.methods.qp.active_set import without_gradient
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import DESCENT
 
-ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
-ROOM = 1e-3  # rad, m: a bound that is nearer holds the normal part too
 SHORTER, LONGER = 1.0 / 3.0, 2.0  # factors of the longest extrapolation after one was rejected, and taken
 
 
@@ -50,7 +49,10 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Par
     target = program.target.copy()
     target[: len(shift)] += shift
     active, normal = answer.active, None
-    lower, upper = active.lower & (program.lower >= -ROOM), active.upper & (program.upper <= ROOM)
+    lower, upper = (
+        active.lower & (program.lower >= -DESCENT.room),
+        active.upper & (program.upper <= DESCENT.room),
+    )
     left = (active.lower & ~lower) | (active.upper & ~upper)
     if left.any():
         normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target)
@@ -83,7 +85,7 @@ class Extrapolation:
             if self._longest <= 1.0:  # not looked at twice
                 self._as_plain = True
                 return None
-            fast = min(ALONG, self._longest) * plain
+            fast = min(DESCENT.along, self._longest) * plain
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
     def record(self, parts: Parts, way: Array, extrapolated: bool) -> None:

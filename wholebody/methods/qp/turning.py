@@ -14,14 +14,9 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
 from wholebody.methods.qp.rows import Bodies, Rows, Seen, room_for_rows
+from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import NO_CONTACTS, PackedLinearisation
-
-ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
-OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
-
-UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
-INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
 
 
 class Turning:
@@ -35,7 +30,16 @@ class Turning:
         reach = [np.linalg.norm(own, axis=1).max() if len(own) else reach
                  for own, reach in zip(points, table.reach, strict=True)]  # fmt: skip
         point = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._seen = Seen(np.array(reach).reshape(-1), point, ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN)
+        self._seen = Seen(
+            np.array(reach).reshape(-1),
+            point,
+            TRACKING.room,
+            BAND,
+            LEVER_DISTANCE,
+            TRACKING.off,
+            TRACKING.inside,
+            TRACKING.unseen,
+        )
         self._place = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
         self._twists = np.empty((3, workspace.model.njoints, 6))
 
@@ -77,7 +81,16 @@ def compiled_kernel() -> Any:
 
     none, index, one = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros(1, dtype=np.intp)
     bodies = Bodies(np.zeros((6, 1)).T, one, one, one, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6)))
-    seen = Seen(none, np.zeros(0, dtype=bool), ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN)
+    seen = Seen(
+        none,
+        np.zeros(0, dtype=bool),
+        TRACKING.room,
+        BAND,
+        LEVER_DISTANCE,
+        TRACKING.off,
+        TRACKING.inside,
+        TRACKING.unseen,
+    )
     turning_kernel.motion(np.zeros(1), bodies)
     turning_kernel.linearisation_error(np.zeros(1), bodies, seen, NO_CONTACTS, none, room_for_rows(1, 0, 0, 0, 0))
     return turning_kernel
@@ -85,12 +98,12 @@ def compiled_kernel() -> Any:
 
 def least_unseen(asked: float) -> float:
     """The least of `unseen_by_rows` where at least this distance is asked of all contacts."""
-    return min(max(asked, INSIDE), UNSEEN)
+    return min(max(asked, TRACKING.inside), TRACKING.unseen)
 
 
 def unseen_by_rows(asked: Array) -> Array:
     """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
-    unseen: Array = np.minimum(np.maximum(asked, INSIDE), UNSEEN)
+    unseen: Array = np.minimum(np.maximum(asked, TRACKING.inside), TRACKING.unseen)
     return unseen
 
 

@@ -7,8 +7,9 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import CORRECTIONS, compiled_kernel, room_for
+from wholebody.methods.qp.active_set import compiled_kernel, room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 
 

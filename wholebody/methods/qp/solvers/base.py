@@ -10,7 +10,6 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.qp.active_set import (
-    CORRECTIONS,
     NOT_EXACT,
     SEMISMOOTH,
     last_resort,
@@ -18,6 +17,7 @@ from wholebody.methods.qp.active_set import (
     violated_set,
 )
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import CORRECTIONS
 
 ACTIVE_SET = "active set"
 """What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""

@@ -9,8 +9,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import CORRECTIONS, last_resort, solve_from
+from wholebody.methods.qp.active_set import last_resort, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram, SplitForm
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.split_form import (
     SCALING,

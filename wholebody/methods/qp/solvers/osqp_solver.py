@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import CORRECTIONS, last_resort, solve_from, violated_set
+from wholebody.methods.qp.active_set import last_resort, solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, SparseForm
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active, slots_for
 

@@ -8,8 +8,9 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import CORRECTIONS, guess_active_set, last_resort, solve_from
+from wholebody.methods.qp.active_set import guess_active_set, last_resort, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.split_form import split
 
