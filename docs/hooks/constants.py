@@ -22,7 +22,7 @@ def table(record: ast.ClassDef, source: str) -> str:
     texts: dict[str, str] = {}
     for part in re.split(r"\n(?=    \S)", "\n" + attributes)[1:]:
         names, _, text = " ".join(part.split()).partition(": ")
-        texts |= {name: text for name in names.split(", ")}
+        texts |= dict.fromkeys(names.split(", "), text)
     lines = ["", f"### {title.rstrip('.')}", "", "| setting | value | what it trades |", "|---|---|---|"]
     for node in record.body:
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name) and node.value is not None:

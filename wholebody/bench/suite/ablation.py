@@ -201,7 +201,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent = multistart.Search, sqp.SQP
+    search, descent = multistart.Multistart, sqp.SQP
     return {
         "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
@@ -216,8 +216,8 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
-        "leaving contacts that cancel": (search, "_leave_cancelling", lambda self: None),
-        "relaxed probes": (search, "_relaxed_probes", lambda self, starts: iter(())),
+        "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
+        "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
         "closest posture to goals that are not met": (search, "_come_nearest", lambda self: None),
         "closest posture among things": (search, "_near_best", lambda self: None),

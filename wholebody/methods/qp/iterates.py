@@ -60,3 +60,28 @@ class Step(NamedTuple):
     answer: Array
     predicted: PredictedReduction
     multipliers: Multipliers | None
+
+
+def held(local: LocalSolution, tolerance: float) -> bool:
+    """Whether what must hold does where a descent ended."""
+    return broken(local) <= tolerance
+
+
+def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
+    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
+    met = one.violation.worst <= tolerance
+    if met != (other.violation.worst <= tolerance):
+        return met
+    for left, right, alike in (
+        (broken(one), broken(other), 0.05 * tolerance),
+        (one.violation.goal, other.violation.goal, tolerance),
+    ):
+        left, right = max(left, tolerance), max(right, tolerance)
+        if abs(left - right) > max(alike, 1e-5 * min(left, right)):
+            return left < right
+    return one.measure < other.measure
+
+
+def broken(local: LocalSolution) -> float:
+    """By how much what must hold is missed where a descent ended [m, rad]."""
+    return max(local.violation.hold, local.violation.elastic)
