@@ -197,13 +197,12 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp import multistart, sqp
     from wholebody.methods.qp.feasibility import Feasibility
-    from wholebody.methods.qp.funnel import Funnel
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
     search, descent = multistart.Multistart, sqp.SQP
     return {
-        "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
+        "watchdog": (descent, "_is_worth_watching", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),

@@ -64,10 +64,11 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     Raises:
         ValueError: the sizes of the program or of the guess do not fit together.
     """
-    packed, x = program.packed(guess), np.empty(program.size)
-    active = ActiveSet(*(mask.copy() for mask in guess))
+    program.check_shapes(guess)
+    x = np.empty(program.size)
+    active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
     settled = compiled_kernel().primal_dual_active_set(
-        packed, np.arange(len(program.least)), active, corrections, CORRECTIONS, room_for(program), x
+        program.packed(), np.arange(len(program.least)), active, corrections, CORRECTIONS, room_for(program), x
     )
     return QPSolution(x, active, True, 0) if settled else None
 
@@ -84,7 +85,8 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
         (n,) the minimiser, clipped to the box; None where it is not finite.
     """
     x = np.empty(program.size)
-    free = with_values(program, linear=np.zeros(program.size), target=target).packed(active)
+    program.check_shapes(active)
+    free = program._replace(linear=np.zeros(program.size), target=target).packed()
     return x if compiled_kernel().minimise_with(free, active, CORRECTIONS, room_for(program).work, x) else None
 
 
@@ -104,7 +106,8 @@ def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[
     """
     x = np.array(start, dtype=float)
     active = ActiveSet(*(np.zeros(size, dtype=bool) for size in (program.size, program.size, len(program.least))))
-    used = semismooth_kernel().minimise(program.packed(active), iterations, CORRECTIONS.tolerance, active, x)
+    program.check_shapes(active)
+    used = semismooth_kernel().minimise(program.packed(), iterations, CORRECTIONS.tolerance, active, x)
     return x, active, used
 
 

@@ -90,10 +90,12 @@ def solve_growing(
     Returns:
         How often rows were added, or -1 where the active set of a round did not settle.
     """
-    k, chosen, places = len(program.least), room.chosen, room.places
+    elastic, least = program.elastic, program.least
+    pushing = active.elastic
+    k, chosen, places = len(least), room.chosen, room.places
     for j in range(k):
-        active.elastic[j] = _contains(known, key[j])
-        chosen[j] = program.least[j] > limits.near or active.elastic[j]
+        pushing[j] = _contains(known, key[j])
+        chosen[j] = least[j] > limits.near or pushing[j]
     for attempt in range(limits.rounds + 1):
         count = 0
         for j in range(k):
@@ -105,7 +107,7 @@ def solve_growing(
             return -1
         missed = False
         for j in range(k):
-            if not chosen[j] and dot(program.elastic[j], x) < program.least[j] - 1e-9:
+            if not chosen[j] and dot(elastic[j], x) < least[j] - 1e-9:
                 chosen[j] = missed = True
         if not missed:
             return attempt
@@ -140,23 +142,26 @@ def primal_dual_active_set(
     Returns:
         Whether it is right: false after so many corrections, and where a set has no finite minimiser.
     """
+    elastic, lower, upper = program.elastic, program.lower, program.upper
+    pushing = active.elastic
     n, m, k = len(program.diagonal), len(program.target), len(places)
     own, pushes = face(room.work, n, m, k), room.places[len(room.places) // 2 :]
+    reached = own.reached
     stack_soft(program, own)
     for attempt in range(most):
         size = m
         for c in range(k):
-            if active.elastic[places[c]]:
+            if pushing[places[c]]:
                 pushes[size - m] = places[c]
                 size += 1
         stack_elastic(program, pushes[: size - m], own)
         if not minimise_on_face(program, active, own, size, limits.tolerance, x):
             return False
         for c in range(k):
-            own.reached[c] = dot(program.elastic[places[c]], x)
+            reached[c] = dot(elastic[places[c]], x)
         if _is_right(program, places, active, own, limits.tolerance, x):
             for i in range(n):
-                x[i] = min(max(x[i], program.lower[i]), program.upper[i])
+                x[i] = min(max(x[i], lower[i]), upper[i])
             return True
         if attempt < limits.at_once:
             _correct_all(program, places, active, own, limits.tolerance, x)
@@ -181,108 +186,122 @@ def minimise_with(program: QuadraticProgram, active: ActiveSet, limits: Correcti
     return finite
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def stack_soft(program: QuadraticProgram, own: Face) -> None:
     """Let the soft rows be the first of a face."""
-    for r in range(len(program.target)):
-        own.compliance[r] = 1.0 / program.weight[r]
-        own.right[r] = program.target[r]
-        for i in range(program.rows.shape[1]):
-            own.stacked[r, i] = program.rows[r, i]
+    rows, target, weight = program.rows, program.target, program.weight
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    for r in range(len(target)):
+        compliance[r] = 1.0 / weight[r]
+        right[r] = target[r]
+        for i in range(rows.shape[1]):
+            stacked[r, i] = rows[r, i]
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def stack_elastic(program: QuadraticProgram, pushes: Indices, own: Face) -> None:
     """Let these elastic rows follow."""
-    first = len(program.target)
+    target, elastic, least, elastic_weight = program.target, program.elastic, program.least, program.elastic_weight
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    first = len(target)
     for count in range(len(pushes)):
         j = pushes[count]
-        for i in range(program.elastic.shape[1]):
-            own.stacked[first + count, i] = program.elastic[j, i]
-        own.right[first + count] = program.least[j]
-        own.compliance[first + count] = 1.0 / program.elastic_weight[j]
+        for i in range(elastic.shape[1]):
+            stacked[first + count, i] = elastic[j, i]
+        right[first + count] = least[j]
+        compliance[first + count] = 1.0 / elastic_weight[j]
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def _is_right(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
 ) -> bool:
     """Whether an active set is that of its minimiser x (n,)."""
+    target, least, lower, upper = program.target, program.least, program.lower, program.upper
+    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
+    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
     for i in range(len(x)):
-        if active.lower[i]:
-            right = own.gradient[i] >= 0.0
-        elif active.upper[i]:
-            right = own.gradient[i] <= 0.0
+        if at_lower[i]:
+            right = gradient[i] >= 0.0
+        elif at_upper[i]:
+            right = gradient[i] <= 0.0
         else:
-            right = program.lower[i] - tolerance <= x[i] <= program.upper[i] + tolerance
+            right = lower[i] - tolerance <= x[i] <= upper[i] + tolerance
         if not right:
             return False
-    following = len(program.target)
+    following = len(target)
     for c in range(len(places)):
         j = places[c]
-        if active.elastic[j]:
-            right = own.multiplier[following] <= 0.0
+        if pushing[j]:
+            right = multiplier[following] <= 0.0
             following += 1
         else:
-            right = own.reached[c] >= program.least[j] - tolerance
+            right = reached[c] >= least[j] - tolerance
         if not right:
             return False
     return True
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_all(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
 ) -> None:
     """Put right everything that is wrong in an active set with the minimiser x (n,)."""
+    target, least, lower, upper = program.target, program.least, program.lower, program.upper
+    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
+    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
     for i in range(len(x)):
-        held_low, held_high = active.lower[i], active.upper[i]
-        active.lower[i] = own.gradient[i] >= 0.0 if held_low else x[i] < program.lower[i] - tolerance
-        active.upper[i] = own.gradient[i] <= 0.0 if held_high else x[i] > program.upper[i] + tolerance
-    following = len(program.target)
+        held_low, held_high = at_lower[i], at_upper[i]
+        at_lower[i] = gradient[i] >= 0.0 if held_low else x[i] < lower[i] - tolerance
+        at_upper[i] = gradient[i] <= 0.0 if held_high else x[i] > upper[i] + tolerance
+    following = len(target)
     for c in range(len(places)):
         j = places[c]
-        if active.elastic[j]:
-            active.elastic[j] = own.multiplier[following] <= 0.0
+        if pushing[j]:
+            pushing[j] = multiplier[following] <= 0.0
             following += 1
         else:
-            active.elastic[j] = own.reached[c] < program.least[j] - tolerance
+            pushing[j] = reached[c] < least[j] - tolerance
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def _correct_worst(
     program: QuadraticProgram, places: Indices, active: ActiveSet, own: Face, tolerance: float, x: Array
 ) -> None:
     """Put right the entry that is most wrong, in units of x."""
-    worst, mask, place = -np.inf, active.lower, 0
+    diagonal, target, elastic = program.diagonal, program.target, program.elastic
+    least, lower, upper = program.least, program.lower, program.upper
+    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
+    multiplier, gradient, reached = own.multiplier, own.gradient, own.reached
+    worst, mask, place = -np.inf, at_lower, 0
     for i in range(len(x)):
-        pull = abs(own.gradient[i]) / program.diagonal[i]
-        next_lower = own.gradient[i] >= 0.0 if active.lower[i] else x[i] < program.lower[i] - tolerance
-        next_upper = own.gradient[i] <= 0.0 if active.upper[i] else x[i] > program.upper[i] + tolerance
-        wrong = pull if active.lower[i] else program.lower[i] - x[i]
-        if next_lower != active.lower[i] and wrong > worst:
-            worst, mask, place = wrong, active.lower, i
-        wrong = pull if active.upper[i] else x[i] - program.upper[i]
-        if next_upper != active.upper[i] and wrong > worst:
-            worst, mask, place = wrong, active.upper, i
-    following = len(program.target)
+        pull = abs(gradient[i]) / diagonal[i]
+        next_lower = gradient[i] >= 0.0 if at_lower[i] else x[i] < lower[i] - tolerance
+        next_upper = gradient[i] <= 0.0 if at_upper[i] else x[i] > upper[i] + tolerance
+        wrong = pull if at_lower[i] else lower[i] - x[i]
+        if next_lower != at_lower[i] and wrong > worst:
+            worst, mask, place = wrong, at_lower, i
+        wrong = pull if at_upper[i] else x[i] - upper[i]
+        if next_upper != at_upper[i] and wrong > worst:
+            worst, mask, place = wrong, at_upper, i
+    following = len(target)
     for c in range(len(places)):
         j = places[c]
-        wrong = program.least[j] - own.reached[c]
+        wrong = least[j] - reached[c]
         flips = wrong > tolerance
-        if active.elastic[j]:
-            flips = not own.multiplier[following] <= 0.0
+        if pushing[j]:
+            flips = not multiplier[following] <= 0.0
             norm = 0.0
             for i in range(len(x)):
-                norm += program.elastic[j, i] * program.elastic[j, i] / program.diagonal[i]
-            wrong = own.multiplier[following] * norm
+                norm += elastic[j, i] * elastic[j, i] / diagonal[i]
+            wrong = multiplier[following] * norm
             following += 1
         if flips and wrong > worst:
-            worst, mask, place = wrong, active.elastic, j
+            worst, mask, place = wrong, pushing, j
     mask[place] = not mask[place]
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", forceinline=True)
 def minimise_on_face(
     program: QuadraticProgram, active: ActiveSet, own: Face, size: int, tolerance: float, x: Array
 ) -> bool:
@@ -293,43 +312,48 @@ def minimise_on_face(
     Returns:
         Whether x is finite.
     """
+    diagonal, lower, upper = program.diagonal, program.lower, program.upper
+    at_lower, at_upper = active.lower, active.upper
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    multiplier, gradient, scaled = own.multiplier, own.gradient, own.scaled
+    table, inverse, trial = own.table, own.inverse, own.trial
     n = len(x)
-    linear, gradient, inverse, trial = program.linear, own.gradient, own.inverse, own.trial
+    linear = program.linear
     for i in range(n):
-        held = active.lower[i] or active.upper[i]
-        x[i] = program.lower[i] if active.lower[i] else (program.upper[i] if active.upper[i] else 0.0)
-        inverse[i] = 0.0 if held else 1.0 / program.diagonal[i]
+        held = at_lower[i] or at_upper[i]
+        x[i] = lower[i] if at_lower[i] else (upper[i] if at_upper[i] else 0.0)
+        inverse[i] = 0.0 if held else 1.0 / diagonal[i]
         gradient[i] = linear[i]
     in_columns = size > n
     if 0 < size <= n:
-        system = own.table[: size * size].reshape((size, size))
+        system = table[: size * size].reshape((size, size))
         for r in range(size):
             for i in range(n):
-                own.scaled[r, i] = own.stacked[r, i] * inverse[i]
-            own.multiplier[r] = dot(own.stacked[r], x) - dot(own.scaled[r], linear) - own.right[r]
-        gram(own.scaled, own.stacked, size, system)
+                scaled[r, i] = stacked[r, i] * inverse[i]
+            multiplier[r] = dot(stacked[r], x) - dot(scaled[r], linear) - right[r]
+        gram(scaled, stacked, size, system)
         for r in range(size):
-            system[r, r] += own.compliance[r]
-        in_columns = not solve(system, own.multiplier[:size])
+            system[r, r] += compliance[r]
+        in_columns = not solve(system, multiplier[:size])
         if not in_columns:
             for i in range(n):
                 trial[i] = linear[i]
             for r in range(size):
-                add(own.multiplier[r], own.stacked[r], trial)
+                add(multiplier[r], stacked[r], trial)
             for i in range(n):
                 trial[i] = x[i] - inverse[i] * trial[i]
             for r in range(size):
-                left = abs(dot(own.stacked[r], trial) - own.right[r] - own.compliance[r] * own.multiplier[r])
+                left = abs(dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
                 in_columns = in_columns or not left <= tolerance
     if in_columns:
         _minimise_in_columns(program, own, size, x)
     for r in range(size):
-        add(own.multiplier[r], own.stacked[r], gradient)
+        add(multiplier[r], stacked[r], gradient)
     finite = True
     for i in range(n):
         if not in_columns:
             x[i] -= inverse[i] * gradient[i]
-        gradient[i] += program.diagonal[i] * x[i]
+        gradient[i] += diagonal[i] * x[i]
         finite = finite and np.isfinite(x[i])
     return finite
 
@@ -341,26 +365,29 @@ def _minimise_in_columns(program: QuadraticProgram, own: Face, size: int, x: Arr
     The free entries of x minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their
     weights: heavy rows lose no digits to light ones, nor light ones to heavy.
     """
-    free = own.inverse.nonzero()[0]
+    diagonal, linear = program.diagonal, program.linear
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    multiplier, inverse = own.multiplier, own.inverse
+    free = inverse.nonzero()[0]
     columns, order = len(free), np.empty(size, dtype=np.intp)
-    sort(own.compliance, order)
+    sort(compliance, order)
     table, part = np.zeros((size + columns, columns + 1)), np.empty(columns)
     for place in range(size):
         r = order[place]
-        root = 1.0 / np.sqrt(own.compliance[r])
-        total = own.right[r]
+        root = 1.0 / np.sqrt(compliance[r])
+        total = right[r]
         for i in range(len(x)):
-            if own.inverse[i] == 0.0:
-                total -= own.stacked[r, i] * x[i]
+            if inverse[i] == 0.0:
+                total -= stacked[r, i] * x[i]
         for c in range(columns):
-            table[place, c] = root * own.stacked[r, free[c]]
+            table[place, c] = root * stacked[r, free[c]]
         table[place, columns] = root * total
     for c in range(columns):
-        root = np.sqrt(program.diagonal[free[c]])
+        root = np.sqrt(diagonal[free[c]])
         table[size + c, c] = root
-        table[size + c, columns] = -program.linear[free[c]] / root
+        table[size + c, columns] = -linear[free[c]] / root
     least_squares(table, size, part)
     for c in range(columns):
         x[free[c]] = part[c]
     for r in range(size):
-        own.multiplier[r] = (dot(own.stacked[r], x) - own.right[r]) / own.compliance[r]
+        multiplier[r] = (dot(stacked[r], x) - right[r]) / compliance[r]

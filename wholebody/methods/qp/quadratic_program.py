@@ -49,23 +49,21 @@ class QuadraticProgram(NamedTuple):
     lower: Array
     upper: Array
 
-    def packed(self, active: ActiveSet | None = None) -> QuadraticProgram:
-        """The program in arrays without gaps, for compiled loops, which look at no sizes.
-
-        Raises:
-            ValueError: its sizes and those of an active set do not fit together.
-        """
+    def check_shapes(self, active: ActiveSet) -> None:
+        """Raise ValueError where sizes do not fit together: compiled loops do not look, and read beyond an end."""
         n, m, k = len(self.diagonal), len(self.target), len(self.least)
         if not (
-            len(self.linear) == len(self.lower) == len(self.upper) == n
+            len(self.linear) == len(self.lower) == len(self.upper) == len(active.lower) == len(active.upper) == n
             and self.rows.shape == (m, n)
             and len(self.weight) == m
             and self.elastic.shape == (k, n)
-            and len(self.elastic_weight) == k
-            and (active is None or tuple(map(len, active)) == (n, n, k))
+            and len(self.elastic_weight) == len(active.elastic) == k
         ):
             raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of other sizes")
-        return QuadraticProgram(*map(np.ascontiguousarray, self))
+
+    def packed(self) -> QuadraticProgram:
+        """The program in arrays without gaps, as compiled loops take it."""
+        return self if all(part.flags.c_contiguous for part in self) else type(self)(*map(np.ascontiguousarray, self))
 
     @property
     def is_computable(self) -> bool:

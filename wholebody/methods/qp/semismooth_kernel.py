@@ -20,74 +20,81 @@ def minimise(program: QuadraticProgram, iterations: int, tolerance: float, activ
 
     `tolerance` is that of rows, metres. `active` becomes the active set at x.
     """
-    n, m, k = len(program.diagonal), len(program.target), len(program.least)
+    diagonal, lower, upper = program.diagonal, program.lower, program.upper
+    at_lower, at_upper, pushing = active.lower, active.upper, active.elastic
+    n, m, k = len(diagonal), len(program.target), len(program.least)
     own = face(np.empty(work_size(n, m, k)), n, m, k)
+    gradient = own.gradient
     way, end, violated, speed = np.empty(n), np.empty(n), np.empty(k), np.empty(k)
     stack_soft(program, own)
     for i in range(n):
-        x[i] = min(max(x[i], program.lower[i]), program.upper[i])
+        x[i] = min(max(x[i], lower[i]), upper[i])
     _look(program, x, violated, active)
-    _differentiate(program, violated, x, own.gradient)
+    _differentiate(program, violated, x, gradient)
     for i in range(n):
-        active.lower[i] = x[i] <= program.lower[i] and own.gradient[i] >= 0.0
-        active.upper[i] = x[i] >= program.upper[i] and own.gradient[i] <= 0.0 and not active.lower[i]
+        at_lower[i] = x[i] <= lower[i] and gradient[i] >= 0.0
+        at_upper[i] = x[i] >= upper[i] and gradient[i] <= 0.0 and not at_lower[i]
     for used in range(1, iterations + 1):
-        pushes = active.elastic.nonzero()[0]
+        pushes = pushing.nonzero()[0]
         stack_elastic(program, pushes, own)
         if not minimise_on_face(program, active, own, m + len(pushes), tolerance, end):
             return used
         longest, hit, largest = np.inf, -1, 0.0
         for i in range(n):
-            way[i] = 0.0 if active.lower[i] or active.upper[i] else end[i] - x[i]
+            way[i] = 0.0 if at_lower[i] or at_upper[i] else end[i] - x[i]
             largest = max(largest, abs(way[i]))
             if abs(way[i]) > STILL:
-                room = ((program.upper[i] if way[i] > 0.0 else program.lower[i]) - x[i]) / way[i]
+                room = ((upper[i] if way[i] > 0.0 else lower[i]) - x[i]) / way[i]
                 if room < longest:
                     longest, hit = room, i
         best = _line_minimum(program, x, way, violated, speed, longest)
         for i in range(n):
-            x[i] = min(max(x[i] + best * way[i], program.lower[i]), program.upper[i])
+            x[i] = min(max(x[i] + best * way[i], lower[i]), upper[i])
         changed = _look(program, x, violated, active)
         if best == longest and hit >= 0:  # a bound is in the way: it holds from now on
-            active.lower[hit], active.upper[hit] = way[hit] < 0.0, way[hit] > 0.0
+            at_lower[hit], at_upper[hit] = way[hit] < 0.0, way[hit] > 0.0
             continue
         if best * largest > STILL and not (best == 1.0 and not changed):
             continue
         # the minimum of the face: let the bound go that holds the most
-        _differentiate(program, violated, x, own.gradient)
+        _differentiate(program, violated, x, gradient)
         worst, place = STILL, -1
         for i in range(n):
-            pull = own.gradient[i] / program.diagonal[i]
-            wrong = -pull if active.lower[i] else (pull if active.upper[i] else 0.0)
+            pull = gradient[i] / diagonal[i]
+            wrong = -pull if at_lower[i] else (pull if at_upper[i] else 0.0)
             if wrong > worst:
                 worst, place = wrong, i
         if place < 0:
             return used
-        active.lower[place] = active.upper[place] = False
+        at_lower[place] = at_upper[place] = False
     return iterations
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def _look(program: QuadraticProgram, x: Array, violated: Array, active: ActiveSet) -> bool:
     """By how much each elastic row is violated at x (n,) and whether it pushes; whether that differs from before."""
+    elastic, least = program.elastic, program.least
+    pushing = active.elastic
     changed = False
     for j in range(len(violated)):
-        violated[j] = program.least[j] - dot(program.elastic[j], x)
-        changed = changed or active.elastic[j] != (violated[j] > 0.0)
-        active.elastic[j] = violated[j] > 0.0
+        violated[j] = least[j] - dot(elastic[j], x)
+        changed = changed or pushing[j] != (violated[j] > 0.0)
+        pushing[j] = violated[j] > 0.0
     return changed
 
 
-@compiled(inner=True, error_model="numpy")
+@compiled(inner=True, error_model="numpy", forceinline=True)
 def _differentiate(program: QuadraticProgram, violated: Array, x: Array, gradient: Array) -> None:
     """Fill in the derivative (n,) of the objective at x (n,), where elastic rows are violated by so much (k,)."""
+    diagonal, linear, rows, target = program.diagonal, program.linear, program.rows, program.target
+    weight, elastic, elastic_weight = program.weight, program.elastic, program.elastic_weight
     for i in range(len(x)):
-        gradient[i] = program.diagonal[i] * x[i] + program.linear[i]
-    for r in range(len(program.target)):
-        add(program.weight[r] * (dot(program.rows[r], x) - program.target[r]), program.rows[r], gradient)
+        gradient[i] = diagonal[i] * x[i] + linear[i]
+    for r in range(len(target)):
+        add(weight[r] * (dot(rows[r], x) - target[r]), rows[r], gradient)
     for j in range(len(violated)):
         if violated[j] > 0.0:
-            add(-program.elastic_weight[j] * violated[j], program.elastic[j], gradient)
+            add(-elastic_weight[j] * violated[j], elastic[j], gradient)
 
 
 @compiled(inner=True, error_model="numpy")
@@ -99,20 +106,22 @@ def _line_minimum(
     The derivative along the way is a(t) = base + rise t - sum over pushing rows of v_j s_j (l_j - c_j x - t s_j), with
     s_j = c_j way; rows begin or cease to push where l_j - c_j x = t s_j. `speed` (k,) is room for s.
     """
-    base, rise, weight = 0.0, 0.0, program.elastic_weight
+    diagonal, linear, rows = program.diagonal, program.linear, program.rows
+    target, weight, elastic = program.target, program.weight, program.elastic
+    base, rise, push = 0.0, 0.0, program.elastic_weight
     for i in range(len(x)):
-        base += (program.diagonal[i] * x[i] + program.linear[i]) * way[i]
-        rise += program.diagonal[i] * way[i] * way[i]
-    for r in range(len(program.target)):
-        slope = dot(program.rows[r], way)
-        base += program.weight[r] * slope * (dot(program.rows[r], x) - program.target[r])
-        rise += program.weight[r] * slope * slope
+        base += (diagonal[i] * x[i] + linear[i]) * way[i]
+        rise += diagonal[i] * way[i] * way[i]
+    for r in range(len(target)):
+        slope = dot(rows[r], way)
+        base += weight[r] * slope * (dot(rows[r], x) - target[r])
+        rise += weight[r] * slope * slope
     k = len(violated)
     for j in range(k):
-        speed[j] = dot(program.elastic[j], way)
+        speed[j] = dot(elastic[j], way)
         if violated[j] > 0.0:
-            base -= weight[j] * speed[j] * violated[j]
-            rise += weight[j] * speed[j] * speed[j]
+            base -= push[j] * speed[j] * violated[j]
+            rise += push[j] * speed[j] * speed[j]
     last, before = 0.0, k
     while True:
         place, following = np.inf, -1  # the next row that changes, those at one place in their order
@@ -125,8 +134,8 @@ def _line_minimum(
             break
         j, last, before = following, place, following
         sign = -1.0 if violated[j] > 0.0 else 1.0
-        base -= sign * weight[j] * speed[j] * violated[j]
-        rise += sign * weight[j] * speed[j] * speed[j]
+        base -= sign * push[j] * speed[j] * violated[j]
+        rise += sign * push[j] * speed[j] * speed[j]
     if rise <= 0.0:
         return 0.0
     best = min(max(-base / rise, 0.0), longest)

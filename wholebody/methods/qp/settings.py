@@ -92,6 +92,8 @@ class DescentNumbers(NamedTuple):
         least_gain: share of the violation that a step must be foreseen to gain. Smaller: slow to see that a goal is out
             of reach.
         least_gain_alone: least share of the violation to gain, with measures and without.
+        restorable: m, rad: violation of holds and contacts that the next step is trusted to repair. Larger: more steps
+            that are taken back.
         near_met: m, rad. Residuals below which multipliers act. Larger: they act on what has other causes.
         width: violation allowed while measures improve, at first. Wider: longer steps along constraints, more to
             restore.
@@ -114,6 +116,7 @@ class DescentNumbers(NamedTuple):
     within_step: float = 1.0
     least_gain: float = 1e-3
     least_gain_alone: float = 1e-7
+    restorable: float = 0.03
     near_met: float = 1e-4
     width: float = 0.02
     switch: float = 10.0

@@ -20,8 +20,7 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
-from wholebody.methods.qp.funnel import Funnel, PredictedReduction, StepAcceptance
-from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
+from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
@@ -72,6 +71,7 @@ class SQP:
         self._radius, self._full_step = DESCENT.first_radius, self.full_step
         self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
+        self._watched: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
@@ -79,7 +79,7 @@ class SQP:
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
         here = self._iterate_at(start)
-        self._funnel = Funnel(here.violation.total)
+        self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
         self._keep(here)  # a start that fits is an answer, should the descent end early
@@ -107,9 +107,12 @@ class SQP:
             if there is not None:
                 here = there
                 self._keep(here)
+            elif self._watched is not None:
+                here, self._watched = self._watched, None
             elif self._radius < LEAST_RADIUS:
                 converged = True
                 break
+        here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
@@ -195,9 +198,15 @@ class SQP:
             self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        if acceptance.accepted and self._jumps(here, there):
-            acceptance = StepAcceptance(False, False, False, "blocked")
-        self._record(there, acceptance.by)
+        watched = not acceptance.accepted and self._is_worth_watching(here, there)
+        if (acceptance.accepted or watched) and self._jumps(here, there):
+            acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
+        self._record(there, "tentative" if watched else acceptance.by)
+        if watched:
+            self._watched = here
+            self._ahead.reset()
+            self._shift = np.zeros_like(self._shift)
+            return there
         if not acceptance.accepted:
             self._reject(there.longest, acceptance.by)
             return None
@@ -226,8 +235,6 @@ class SQP:
         """
         if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
             self._full_step, self._damping = False, 0.0
-        if acceptance.by == "goal":
-            self._funnel.narrow(here.violation.total, there.violation.total)
         if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
@@ -237,6 +244,7 @@ class SQP:
                 self._radius = min(2.0 * self._radius, DESCENT.largest_radius)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
+        self._watched = None
         if step.parts is not None and not step.flat:
             self._ahead.record(step.parts, way, way is not step.dq)
         asked = len(self._shift)
@@ -271,15 +279,26 @@ class SQP:
             rows.soft_error[: rows.goals] -= self.offset
         return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
+    def _is_worth_watching(self, here: Iterate, there: Iterate) -> bool:
+        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
+        if self._watched is not None or not self.measures:
+            return False
+        broken = max(there.violation.elastic, there.violation.hold)
+        return there.violation.goal < here.violation.goal and broken < DESCENT.restorable
+
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
-        """Judge a step from here to there; near the goals the Lagrangian stands for the measures."""
+        """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
+        predicted, before = step.predicted, here
+        if self._watched is not None:
+            before = self._watched
+            least = max(0.1 * predicted.violation, 1e-3 * before.violation.total)
+            predicted = with_values(predicted, violation=least)
         measures = [
             one.at.measure if step.multipliers is None else lagrangian(step.multipliers, one.at.measure, one.rows)
-            for one in (here, there)
+            for one in (before, there)
         ]
-        return self._funnel.judge(
-            (here.violation.total, measures[0]), (there.violation.total, measures[1]), step.predicted, self.measures
-        )
+        values = (before.violation.total, measures[0]), (there.violation.total, measures[1])
+        return judge(*values, predicted, self._width if self.measures else None)
 
     def _record(self, there: Iterate, what: str) -> None:
         note = f"{self.note}: {what}" if self.note else what

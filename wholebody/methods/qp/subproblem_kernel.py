@@ -17,37 +17,39 @@ MOST_ROWS = 4096  # more than one contact ever has
 @compiled()
 def sort_rows(terms: TermRows, contacts: ContactRows, given: Terms, weights: Weights, rows: Rows) -> None:
     """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them, whose arrays are filled."""
+    soft, soft_error, soft_weight, elastic = rows.soft, rows.soft_error, rows.soft_weight, rows.elastic
+    violated, contact, key = rows.elastic_violation, rows.contact, rows.key
     goals, square = len(terms.error), 0.0
     for r in range(goals):
         square += (given.share[r] * terms.error[r]) ** 2
     pull = min(max(weights.force / max(np.sqrt(square), 1e-12), weights.least), weights.most)
     for r in range(goals):
-        rows.soft_error[r], rows.soft_weight[r] = terms.error[r], pull * given.share[r]
-        copy(terms.error_jacobian[r], rows.soft[r])
+        soft_error[r], soft_weight[r] = terms.error[r], pull * given.share[r]
+        copy(terms.error_jacobian[r], soft[r])
     row = goals
     for c in range(len(terms.value)):
         if given.kind[c] == 0:
-            rows.soft_error[row], rows.soft_weight[row] = terms.value[c] - given.bound[0, c], weights.hold
-            copy(terms.value_jacobian[c], rows.soft[row])
+            soft_error[row], soft_weight[row] = terms.value[c] - given.bound[0, c], weights.hold
+            copy(terms.value_jacobian[c], soft[row])
             row += 1
     row = 0
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
         for c in range(len(terms.value)):
             if given.kind[c] == 3 or given.kind[c] == side + 1:
-                rows.elastic_violation[row] = sign * (given.bound[side, c] - terms.value[c])
-                rows.contact[row], rows.key[row] = row, -1 - row
-                for i in range(rows.elastic.shape[1]):
-                    rows.elastic[row, i] = sign * terms.value_jacobian[c, i]
+                violated[row] = sign * (given.bound[side, c] - terms.value[c])
+                contact[row], key[row] = row, -1 - row
+                for i in range(elastic.shape[1]):
+                    elastic[row, i] = sign * terms.value_jacobian[c, i]
                 row += 1
     first, count, place = row, len(contacts.number), 0
     for r in range(len(contacts.gap)):
         c = contacts.contact[r]
         if r >= count:
             place = place + 1 if r > count and contacts.contact[r - 1] == c else 1
-        rows.elastic_violation[first + r] = contacts.clearance[r] - contacts.gap[r]
-        rows.contact[first + r], rows.key[first + r] = first + c, contacts.number[c] * MOST_ROWS + place
-        copy(contacts.jacobian[r], rows.elastic[first + r])
+        violated[first + r] = contacts.clearance[r] - contacts.gap[r]
+        contact[first + r], key[first + r] = first + c, contacts.number[c] * MOST_ROWS + place
+        copy(contacts.jacobian[r], elastic[first + r])
     rows.elastic_weight[:] = weights.elastic
 
 
@@ -57,23 +59,25 @@ def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, flo
 
     `share` (g,) are the goals' weights. Elastic rows of the contact -1 do not count.
     """
+    soft, soft_error, elastic = rows.soft, rows.soft_error, rows.elastic
+    violations, contact = rows.elastic_violation, rows.contact
     goals, moves = len(share), len(displacement) > 0
     goal, hold, left, total, worst = 0.0, 0.0, 0.0, 0.0, np.zeros(rows.contacts)
-    for r in range(len(rows.soft_error)):
-        error = rows.soft_error[r]
+    for r in range(len(soft_error)):
+        error = soft_error[r]
         if moves:
-            error += dot(rows.soft[r], displacement)
+            error += dot(soft[r], displacement)
         if r < goals:
             goal += share[r] * error * error
             left += error * error
         else:
             hold += error * error
-    for r in range(len(rows.elastic_violation)):
-        violated = rows.elastic_violation[r]
+    for r in range(len(violations)):
+        violated = violations[r]
         if moves:
-            violated -= dot(rows.elastic[r], displacement)
-        if rows.contact[r] >= 0:
-            worst[rows.contact[r]] = max(worst[rows.contact[r]], violated)
+            violated -= dot(elastic[r], displacement)
+        if contact[r] >= 0:
+            worst[contact[r]] = max(worst[contact[r]], violated)
     for c in range(len(worst)):
         total += worst[c]
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)
@@ -87,6 +91,9 @@ def fill_program(
 
     `gradient` and `curvature` (nv,) are those of the measures, `box` (2, nv) the bounds of the step.
     """
+    soft_error, soft_weight, violations = rows.soft_error, rows.soft_weight, rows.elastic_violation
+    diagonal, linear, target = program.diagonal, program.linear, program.target
+    lower, upper, least = program.lower, program.upper, program.least
     largest, square, farthest, heaviest_error = 0.0, 0.0, 0.0, 0.0
     for i in range(len(gradient)):
         largest = max(largest, step.scale * curvature[i])
@@ -94,32 +101,32 @@ def fill_program(
     if floor == 0.0:
         floor = 1.0
     for r in range(rows.goals):
-        farthest = max(farthest, abs(rows.soft_error[r]))
+        farthest = max(farthest, abs(soft_error[r]))
     factor = step.pull / farthest if 0.0 < step.pull < farthest else 1.0
-    for r in range(len(rows.soft_error)):
-        error = rows.soft_error[r]
+    for r in range(len(soft_error)):
+        error = soft_error[r]
         if r < rows.goals:
-            square += rows.soft_weight[r] * error * error
+            square += soft_weight[r] * error * error
             error *= factor
-            heaviest_error = max(heaviest_error, rows.soft_weight[r] * abs(error))
-        program.target[r] = -(error + shift[r])
+            heaviest_error = max(heaviest_error, soft_weight[r] * abs(error))
+        target[r] = -(error + shift[r])
     for i in range(len(gradient)):
         entry = max(step.scale * curvature[i], floor)
-        program.linear[i] = step.scale * gradient[i] if step.measures else 0.0
+        linear[i] = step.scale * gradient[i] if step.measures else 0.0
         entry = entry / step.gain if step.measures else step.proximal * entry
-        program.diagonal[i] = max(entry, abs(program.linear[i]) / step.radius)
-        program.lower[i] = min(max(box[0, i], -step.box), step.box)
-        program.upper[i] = min(max(box[1, i], -step.box), step.box)
+        diagonal[i] = max(entry, abs(linear[i]) / step.radius)
+        lower[i] = min(max(box[0, i], -step.box), step.box)
+        upper[i] = min(max(box[1, i], -step.box), step.box)
     if step.pull > 0.0:
         for i in range(len(gradient)):
-            program.diagonal[i] += step.damping * step.lever * heaviest_error
+            diagonal[i] += step.damping * step.lever * heaviest_error
     else:
         # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
-        middle = _middle(program.diagonal)
+        middle = _middle(diagonal)
         for i in range(len(gradient)):
-            program.diagonal[i] += step.damping * square * np.sqrt(program.diagonal[i] / middle)
-    for r in range(len(rows.elastic_violation)):
-        program.least[r] = min(rows.elastic_violation[r], step.overlap)
+            diagonal[i] += step.damping * square * np.sqrt(diagonal[i] / middle)
+    for r in range(len(violations)):
+        least[r] = min(violations[r], step.overlap)
 
 
 @compiled(inner=True)

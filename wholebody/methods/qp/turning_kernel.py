@@ -16,17 +16,19 @@ from wholebody.methods.qp.rows import Bodies, Rows, Seen
 @compiled()
 def motion(displacement: Array, bodies: Bodies) -> tuple[float, float]:
     """Longest way of any point of any piece [m], and largest turn [rad], to first order in a displacement (nv,)."""
+    places, column_joint, joint = bodies.place, bodies.column_joint, bodies.joint
+    placement, reach = bodies.placement, bodies.reach
     columns, parents, twist = bodies.columns, bodies.parents, bodies.twists[0]
     twist[:] = 0.0
     for k in range(len(columns)):
-        add(displacement[bodies.place[k]], columns[k], twist[bodies.column_joint[k]])
+        add(displacement[places[k]], columns[k], twist[column_joint[k]])
     for j in range(1, len(parents)):
         add(1.0, twist[parents[j]], twist[j])
     longest, most = 0.0, 0.0
-    for p in range(len(bodies.joint)):
-        if bodies.joint[p] == 0:
+    for p in range(len(joint)):
+        if joint[p] == 0:
             continue
-        own, place = twist[bodies.joint[p]], bodies.placement[p, 3]
+        own, place = twist[joint[p]], placement[p, 3]
         shift, turn = 0.0, 0.0
         for i in range(3):
             j, k = (i + 1) % 3, (i + 2) % 3
@@ -35,7 +37,7 @@ def motion(displacement: Array, bodies: Bodies) -> tuple[float, float]:
             turn += own[3 + i] * own[3 + i]
         turn = np.sqrt(turn)
         most = max(most, turn)
-        longest = max(longest, np.sqrt(shift) + (turn * bodies.reach[p] if turn > 0.0 else 0.0))
+        longest = max(longest, np.sqrt(shift) + (turn * reach[p] if turn > 0.0 else 0.0))
     return longest, most
 
 
@@ -98,13 +100,15 @@ def linearisation_error(
 @compiled(inner=True)
 def _second_order(displacement: Array, bodies: Bodies) -> None:
     """Write the twist of every joint, and its change at constant joint speeds, into the room of the bodies."""
-    bodies.twists[:] = 0.0
-    twist, change, own = bodies.twists[0], bodies.twists[1], bodies.twists[2]
-    for c in range(len(bodies.columns)):
-        add(displacement[bodies.place[c]], bodies.columns[c], own[bodies.column_joint[c]])
-    for j in range(1, len(bodies.parents)):
+    columns, place, column_joint = bodies.columns, bodies.place, bodies.column_joint
+    parents, twists = bodies.parents, bodies.twists
+    twists[:] = 0.0
+    twist, change, own = twists[0], twists[1], twists[2]
+    for c in range(len(columns)):
+        add(displacement[place[c]], columns[c], own[column_joint[c]])
+    for j in range(1, len(parents)):
         # the axes of a joint move with the body that carries it
-        parent = bodies.parents[j]
+        parent = parents[j]
         v, s = twist[parent], own[j]
         for i in range(3):
             a, b = (i + 1) % 3, (i + 2) % 3

@@ -62,9 +62,8 @@ class WorkingSet:
         x: Array = np.empty(program.size)
         assert self.held is not None
         active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
-        rounds = self._kernel.solve_growing(
-            program.packed(active), key, self.pushing, active, CORRECTIONS, self._room_for(program), x
-        )
+        program.check_shapes(active)
+        rounds = self._kernel.solve_growing(program, key, self.pushing, active, CORRECTIONS, self._room_for(program), x)
         if rounds < 0:
             return None
         self._remember(active, key)
