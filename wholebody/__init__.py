@@ -51,6 +51,7 @@ if TYPE_CHECKING:
     from wholebody.motion.retargeting import retarget
     from wholebody.problem import Problem
     from wholebody.scene.matter.body import Body
+    from wholebody.scene.mjcf_scene import read_scene
     from wholebody.scene.scene import Scene
     from wholebody.solution import Solution
     from wholebody.studies.accommodation import accommodation, people
@@ -170,6 +171,7 @@ __all__ = [
     "people",
     "reach_map",
     "read_clip",
+    "read_scene",
     "read_task",
     "retarget",
     "simplify",
@@ -200,6 +202,7 @@ _MODULES = {
     "wholebody.motion.retargeting": "retarget",
     "wholebody.problem": "Problem",
     "wholebody.scene.matter.body": "Body",
+    "wholebody.scene.mjcf_scene": "read_scene",
     "wholebody.scene.scene": "Scene",
     "wholebody.solution": "Solution",
     "wholebody.studies.accommodation": "accommodation people",

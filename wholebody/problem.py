@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError
+from wholebody.base.fields import Range
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.scene.scene import Scene
@@ -27,7 +28,7 @@ from wholebody.tasks.defaults import default_constraints, default_measures
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, make_plan
 
-LARGEST_CLEARANCE = 0.5  # m: more is refused as a wrong unit
+CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 
 _TermError = TypeVar("_TermError", bound=TermError)
 
@@ -284,11 +285,9 @@ class Problem(checks.FixedAttributes):
         asked, count = self.clearances, len(self.scene.built.table.pairs)
         if asked.shape != (count,):
             raise InputError(f"clearances have shape {asked.shape}; give one for each of the {count} pairs")
-        if count and not (np.minimum.reduce(asked) >= 0.0 and np.maximum.reduce(asked) <= LARGEST_CLEARANCE):
-            wrong = int(np.argmin((asked >= 0.0) & (asked <= LARGEST_CLEARANCE)))
-            raise InputError(
-                f"clearances[{wrong}] is {asked[wrong]}; give numbers between 0 and {LARGEST_CLEARANCE:g} m"
-            )
+        if count and not (np.minimum.reduce(asked) >= 0.0 and np.maximum.reduce(asked) <= CLEARANCE.high):
+            wrong = int(np.argmin((asked >= 0.0) & (asked <= CLEARANCE.high)))
+            raise InputError(f"clearances[{wrong}] is {asked[wrong]}; give numbers between {CLEARANCE}")
 
     def _check_frozen(self, state: State) -> None:
         """Raise InputError if a bound keeps a joint out of its limits."""
@@ -357,7 +356,7 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
 
 
 def _clearance(value: float) -> float:
-    return checks.number(value, "clearance", 0.0, LARGEST_CLEARANCE, "m")
+    return CLEARANCE(value, "clearance")
 
 
 def _checked(terms: Any, kinds: tuple[type, ...], what: str) -> Sequence[Any]:

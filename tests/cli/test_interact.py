@@ -80,7 +80,7 @@ def test_mistakes_are_said_in_one_sentence(
 
 def test_the_ghost_moves(tmp_path: Path) -> None:
     import wholebody as wb
-    from wholebody.view.style import GHOST_NODE
+    from wholebody.view.style import LOOK
 
     hand = wb.load("hand")
     scene = wb.Scene(hand)
@@ -90,6 +90,6 @@ def test_the_ghost_moves(tmp_path: Path) -> None:
     with wb.Viewer(scene) as viewer:
         viewer.play(shown, 0.1, ghost=ghost)
         tracks = viewer._graph.store.animation
-        assert GHOST_NODE in str(tracks)
+        assert LOOK.ghost_node in str(tracks)
         with pytest.raises(wb.InputError, match="the ghost has 2 postures and the motion 3"):
             viewer.play(shown, 0.1, ghost=ghost[:2])

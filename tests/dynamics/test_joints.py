@@ -175,7 +175,7 @@ def test_wrong_joints_are_one_sentence(hand: wb.Figure) -> None:
         RigidBodies(scene("beam"))
     with pytest.raises(InputError, match="'bag' has a joint to itself"):
         RigidBodies(scene("bag"))
-    with pytest.raises(InputError, match=r"Hinge axis is .*give a direction"):
+    with pytest.raises(InputError, match=r"Hinge: axis is .*give a vector"):
         wb.dynamics.Hinge(axis=(0.0, 0.0, 0.0))
-    with pytest.raises(InputError, match="Body joints"):
+    with pytest.raises(InputError, match="Body: joints"):
         wb.Body(joints=["hinge"])  # type: ignore[list-item]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.ergonomics.lifting import FREQUENCIES, MULTIPLIERS
+from wholebody.ergonomics.published import published
 
 INCH, POUND = 0.0254, 0.45359237
 
@@ -75,12 +75,13 @@ def test_beyond_the_limits_nothing_may_be_lifted(lift: wb.ergonomics.Lift) -> No
 
 
 def test_more_often_and_longer_is_never_more() -> None:
-    for low, high in MULTIPLIERS.values():
-        assert len(low) == len(high) == len(FREQUENCIES)
+    tables = {hours: (low, high) for hours, low, high in published("niosh")["multipliers"]}
+    for low, high in tables.values():
+        assert len(low) == len(high) == len(published("niosh")["frequencies"])
         assert (np.diff(low) <= 0).all()
         assert (np.array(high) >= np.array(low)).all()
-    for k in range(len(FREQUENCIES)):
-        assert MULTIPLIERS[1.0][1][k] >= MULTIPLIERS[2.0][1][k] >= MULTIPLIERS[8.0][1][k]
+    for short, longer in ((1.0, 2.0), (2.0, 8.0)):
+        assert (np.array(tables[short][1]) >= np.array(tables[longer][1])).all()
 
 
 def test_a_lift_is_measured_between_two_postures() -> None:

@@ -12,9 +12,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.cli.main import main
-from wholebody.ergonomics import owas_score as owas_module
-from wholebody.ergonomics import reba_score as reba_module
-from wholebody.ergonomics import rula_score as rula_module
+from wholebody.ergonomics.published import published
 
 
 @pytest.fixture(scope="module")
@@ -33,23 +31,23 @@ def flat(table: tuple) -> list[int]:
 
 
 def test_every_combination_of_a_table_has_an_entry() -> None:
-    assert len(flat(rula_module.TABLE_A)) == 6 * 3 * 4 * 2
-    assert len(flat(rula_module.TABLE_B)) == 6 * 6 * 2
-    assert len(flat(rula_module.TABLE_C)) == 8 * 7
-    assert len(flat(reba_module.TABLE_A)) == 60  # the 144 combinations of the paper: 60 of group A, 36 of group B
-    assert len(flat(reba_module.TABLE_B)) == 36
-    assert len(flat(reba_module.TABLE_C)) == 144
-    assert [len(row) for back in owas_module.CATEGORIES for row in back] == [21] * 12  # 252 of the paper
+    assert len(flat(published("rula")["A"])) == 6 * 3 * 4 * 2
+    assert len(flat(published("rula")["B"])) == 6 * 6 * 2
+    assert len(flat(published("rula")["C"])) == 8 * 7
+    assert len(flat(published("reba")["A"])) == 60  # the 144 combinations of the paper: 60 of group A, 36 of group B
+    assert len(flat(published("reba")["B"])) == 36
+    assert len(flat(published("reba")["C"])) == 144
+    assert [len(row) for back in published("owas")["categories"] for row in back] == [21] * 12  # 252 of the paper
 
 
 def test_worse_parts_never_lower_a_score() -> None:
     """Each table grows along each of its axes."""
     for table in (
-        rula_module.TABLE_A,
-        rula_module.TABLE_C,
-        reba_module.TABLE_A,
-        reba_module.TABLE_B,
-        reba_module.TABLE_C,
+        published("rula")["A"],
+        published("rula")["C"],
+        published("reba")["A"],
+        published("reba")["B"],
+        published("reba")["C"],
     ):
         values = np.array(table)
         for axis in range(values.ndim):
@@ -89,10 +87,8 @@ WORKSHEET_C = "1233455 2234455 3334456 3334566 4445677 4456677 5566777 5567777"
 
 def test_rula_tables_are_those_of_the_printed_worksheet() -> None:
     """Written down anew, as the worksheet of Cornell University lays them out."""
-    for table, sheet in (
-        (rula_module.TABLE_A, WORKSHEET_A), (rula_module.TABLE_B, WORKSHEET_B), (rula_module.TABLE_C, WORKSHEET_C),
-    ):  # fmt: skip
-        assert flat(table) == [int(digit) for digit in "".join(sheet.split())]
+    for name, sheet in (("A", WORKSHEET_A), ("B", WORKSHEET_B), ("C", WORKSHEET_C)):
+        assert flat(published("rula")[name]) == [int(digit) for digit in "".join(sheet.split())]
 
 
 REBA_SHEET_A = """
@@ -113,9 +109,9 @@ REBA_SHEET_C = """
 def test_reba_tables_are_those_of_the_printed_worksheet() -> None:
     """Written down anew, as the employee assessment worksheet lays them out: table A by trunk, not by neck."""
     by_trunk = np.array([[int(d) for d in word] for word in REBA_SHEET_A.split()]).reshape(5, 3, 4)
-    assert np.array_equal(np.array(reba_module.TABLE_A), by_trunk.transpose(1, 0, 2))
-    assert flat(reba_module.TABLE_B) == [int(digit) for digit in "".join(REBA_SHEET_B.split())]
-    assert flat(reba_module.TABLE_C) == [int(digit, 16) for digit in "".join(REBA_SHEET_C.split())]
+    assert np.array_equal(np.array(published("reba")["A"]), by_trunk.transpose(1, 0, 2))
+    assert flat(published("reba")["B"]) == [int(digit) for digit in "".join(REBA_SHEET_B.split())]
+    assert flat(published("reba")["C"]) == [int(digit, 16) for digit in "".join(REBA_SHEET_C.split())]
 
 
 def test_reba_by_the_example_of_a_public_package() -> None:

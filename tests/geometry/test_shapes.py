@@ -184,8 +184,8 @@ NAN, INF = float("nan"), float("inf")
 @pytest.mark.parametrize(
     ("make", "reason"),
     [
-        (lambda: Box((1, 1)), "three"),  # type: ignore[arg-type]
-        (lambda: Box("abc"), "three"),  # type: ignore[arg-type]
+        (lambda: Box((1, 1)), "give 3 numbers"),  # type: ignore[arg-type]
+        (lambda: Box("abc"), r"numbers of shape \(3,\)"),  # type: ignore[arg-type]
         (lambda: Box((1, NAN, 1)), "finite"),
         (lambda: Box((1, INF, 1)), "finite"),
         (lambda: Box((1, -1, 1)), "-1"),

@@ -51,11 +51,11 @@ def test_the_good_file_is_good(write: Callable[[str], Path]) -> None:
         ('detail = "spheres"', "age = 12", ["task.toml:5", "key age", "20 to 69"]),
         ('detail = "spheres"', "proportions = 0.9", ["task.toml:5", "key proportions", "table of dimensions"]),
         ('detail = "spheres"', "proportions = { siting_height = 0.9 }", ["sitting_height"]),
-        ('detail = "spheres"', "mass = 70000", ["key mass", "grams, write 70"]),
+        ('detail = "spheres"', "mass = 70000", ["key mass", "write 70 if it is in grams"]),
         (
             "left_elbow_flexion = 0.5",
             "left_elbow_flexion = 30",
-            ["task.toml:9", "joints.left_e", "degrees, write 0.52"],
+            ["task.toml:9", "joints.left_e", "write 0.523599 if it is in degrees"],
         ),
         (
             "left_elbow_flexion = 0.5",

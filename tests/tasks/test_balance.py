@@ -68,7 +68,7 @@ def test_one_foot_is_a_smaller_polygon(humanoid: Any) -> None:
     [
         (lambda: Balance("lfoot"), "not a list"),
         (lambda: Balance(()), "give a list of names"),
-        (lambda: Balance(("lfoot",), margin=-0.1), "margin is -0.1; give a number between 0 and 100 m"),
+        (lambda: Balance(("lfoot",), margin=-0.1), "margin is -0.1; give a number between 0 and 1 m"),
         (lambda: Balance(("lfoot",), margin=0.2), "leaves nothing of the support polygon"),
         (lambda: Balance(("head1_body",)), "has no pieces to stand on"),
     ],

@@ -10,9 +10,10 @@ import pytest
 from PIL import Image
 
 import wholebody as wb
-from wholebody.view import Viewer, style
+from wholebody.view import Viewer
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe
+from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedAssembly
 
 
@@ -35,7 +36,7 @@ def test_the_surface_follows_each_figures_own_joints(assembly: wb.Assembly) -> N
     for name, figure in assembly.figures.items():
         at = wb.Scene(figure).state(assembly.posture(name))
         for joint in ("left_elbow_pronation", "right_knee_flexion", "root_joint"):
-            shown = keyframe.transforms[f"{style.FIGURE_NODE}/{name}/{joint}"]
+            shown = keyframe.transforms[f"{LOOK.figure_node}/{name}/{joint}"]
             assert np.abs(shown - at.data.oMi[figure.model.getJointId(joint)].homogeneous).max() < 1e-9
 
 

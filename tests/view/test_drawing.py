@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
 from wholebody.base.errors import InputError
-from wholebody.view import drawing, style
+from wholebody.view import drawing
 from wholebody.view.scene_graph import quaternions
+from wholebody.view.style import LOOK
 
 directions = st.tuples(*[st.floats(-1, 1)] * 3).map(np.array).filter(lambda d: np.linalg.norm(d) > 1e-3)
 
@@ -77,13 +78,13 @@ def test_a_rod_joins_two_points_and_vanishes_between_equal_ones() -> None:
 def test_the_plate_of_a_half_space_has_its_upper_face_in_the_plane(normal: Any, offset: float) -> None:
     normal = normal / np.linalg.norm(normal)
     placement = drawing.plate_placement(normal, offset)
-    corners = np.array([[x, y, 0.5] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * style.PLATE
+    corners = np.array([[x, y, 0.5] for x in (-0.5, 0.5) for y in (-0.5, 0.5)]) * LOOK.plate
     np.testing.assert_allclose((corners @ placement[:3, :3].T + placement[:3, 3]) @ normal, offset, atol=1e-12)
 
 
 def test_a_geometry_that_cannot_be_drawn_is_named() -> None:
     with pytest.raises(InputError, match=r"spike.*Plane"):
-        drawing.piece(coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0), "spike", style.FIGURE)
+        drawing.piece(coal.Plane(np.array([0.0, 0.0, 1.0]), 0.0), "spike", LOOK.figure)
 
 
 def test_quaternions_are_those_of_pinocchio_without_jumps() -> None:

@@ -15,9 +15,10 @@ from PIL import Image
 
 import wholebody as wb
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
-from wholebody.view import Viewer, style
+from wholebody.view import Viewer
 from wholebody.view.browser import Browser, find_chromium
 from wholebody.view.movie import movie
+from wholebody.view.style import LOOK
 
 browser_needed = pytest.mark.browser
 
@@ -31,7 +32,7 @@ def test_pictures_and_movies(exhibit: Any, chromium: str, tmp_path: Path) -> Non
         picture = Image.open(path)
         assert picture.size == (401, 300)
         values = np.asarray(picture.convert("RGB")).astype(float)
-        tan = np.array(style.FIGURE[:3]) / np.linalg.norm(style.FIGURE[:3])
+        tan = np.array(LOOK.figure[:3]) / np.linalg.norm(LOOK.figure[:3])
         alike = (values @ tan) / np.linalg.norm(values, axis=2)
         figure = np.argwhere(alike > 0.999)
         assert len(figure) > 500

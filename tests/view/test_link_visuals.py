@@ -17,6 +17,7 @@ from wholebody.view import style
 from wholebody.view.bodies import Bodies
 from wholebody.view.link_visuals import FINE, MANY, LinkVisuals, mesh_parts
 from wholebody.view.scene_graph import Keyframe, SceneGraph
+from wholebody.view.style import LOOK
 
 TEXT = """<robot name="r">
   <link name="a"><visual><origin xyz="0 0 0.4"/><geometry><box size="0.3 0.3 0.3"/></geometry>
@@ -108,6 +109,6 @@ def test_a_link_in_contact_is_tinted(robot: wb.Figure) -> None:
     keyframe = Keyframe()
     bodies.pose(keyframe, scene.state(robot.neutral).data)
     assert keyframe.colors["/figure/universe/visual 0"] == pytest.approx((0.1, 0.2, 0.9, 1.0))
-    bodies.paint(keyframe, scene.piece_owner.index("a"), style.PENETRATION)
+    bodies.paint(keyframe, scene.piece_owner.index("a"), LOOK.penetration)
     tinted = keyframe.colors["/figure/universe/visual 0"]
-    assert tinted == pytest.approx(style.tinted((0.1, 0.2, 0.9, 1.0), style.PENETRATION, style.PAINT))
+    assert tinted == pytest.approx(style.tinted((0.1, 0.2, 0.9, 1.0), LOOK.penetration, LOOK.paint))

@@ -10,8 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.view import style
 from wholebody.view.bodies import Bodies
+from wholebody.view.style import LOOK
 
 TEXT = """<robot name="r">
   <material name="sky"><color rgba="0.1 0.2 0.9 1"/></material>
@@ -32,9 +32,9 @@ TEXT = """<robot name="r">
 COLORS = {
     "a": (0.1, 0.2, 0.9, 1.0),
     "b": (1.0, 0.0, 0.0, 0.5),
-    "c": style.FIGURE,
-    "d": style.FIGURE,
-    "e": style.FIGURE,
+    "c": LOOK.figure,
+    "d": LOOK.figure,
+    "e": LOOK.figure,
 }
 
 

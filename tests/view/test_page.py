@@ -16,8 +16,9 @@ from wholebody.base.errors import UnknownNameError
 from wholebody.figures import load
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Axis, CenterOfMass, Frame, Orientation, Point
-from wholebody.view import Viewer, style
+from wholebody.view import Viewer
 from wholebody.view.browser import Browser
+from wholebody.view.style import LOOK
 
 pytestmark = pytest.mark.browser
 
@@ -34,7 +35,7 @@ def project(place: Any, eye: Any, target: Any, width: int, height: int) -> tuple
     right /= np.linalg.norm(right)
     up = np.cross(right, forward)
     away = np.asarray(place) - eye
-    scale = height / 2 / np.tan(np.radians(style.FIELD_OF_VIEW) / 2) / (away @ forward)
+    scale = height / 2 / np.tan(np.radians(LOOK.field_of_view) / 2) / (away @ forward)
     return round(width / 2 + scale * (away @ right)), round(height / 2 - scale * (away @ up))
 
 
@@ -159,10 +160,8 @@ def test_pieces_take_the_colour_of_their_state(exhibit: Any, browser: Browser, p
     with Viewer(exhibit) as viewer:
         viewer.show(free)
         browser.open(viewer.url)
-        assert not [
-            entry for entry in piece_nodes(exhibit) if np.allclose(entry["color"], style.CONTACT[:3], atol=0.01)
-        ]
-        for q, color in ((near, style.CONTACT), (inside, style.PENETRATION)):
+        assert not [entry for entry in piece_nodes(exhibit) if np.allclose(entry["color"], LOOK.contact[:3], atol=0.01)]
+        for q, color in ((near, LOOK.contact), (inside, LOOK.penetration)):
             viewer.show(q)
             assert viewer.sync(10.0)
             contacts = exhibit.contacts(q, within=0.005)
@@ -181,13 +180,13 @@ def test_pieces_take_the_colour_of_their_state(exhibit: Any, browser: Browser, p
         assert text["text"] == f"{-1000 * exhibit.contacts(inside).distance[0]:.1f} mm"
         assert depth["seen"]
         assert not normal["seen"]
-        np.testing.assert_allclose(depth["matrix"][:3, 2], [0, 0, style.SHORTEST_DEPTH], atol=1e-5)  # out is up
+        np.testing.assert_allclose(depth["matrix"][:3, 2], [0, 0, LOOK.shortest_depth], atol=1e-5)  # out is up
         viewer.show(near)
         assert viewer.sync(10.0)
         depth, normal = nodes(["/contacts/0/depth", "/contacts/0/normal"])
         assert normal["seen"]
         assert not depth["seen"]
-        np.testing.assert_allclose(normal["matrix"][:3, 2] / style.NORMAL_LENGTH, [0, 0, -1], atol=1e-5)
+        np.testing.assert_allclose(normal["matrix"][:3, 2] / LOOK.normal_length, [0, 0, -1], atol=1e-5)
         viewer.show(free)
         assert viewer.sync(10.0)
         assert not any(entry["seen"] for entry in nodes(["/contacts/0/a", "/contacts/0/normal"]))
@@ -202,10 +201,10 @@ def test_colours_and_markers_change_in_the_course_of_a_motion(
     browser.open(viewer.save(tmp_path / "motion.html").as_uri())
     piece = int(exhibit.contacts(inside).pair[0, 0])
     for time, color, seen in (
-        (0.05, style.FIGURE, (False, False)),
-        (0.1, style.CONTACT, (True, False)),
-        (0.2, style.PENETRATION, (False, True)),
-        (0.3, style.FIGURE, (False, False)),
+        (0.05, LOOK.figure, (False, False)),
+        (0.1, LOOK.contact, (True, False)),
+        (0.2, LOOK.penetration, (False, True)),
+        (0.3, LOOK.figure, (False, False)),
     ):
         browser.evaluate(f"wholebody.seek({time} + 1e-6)")
         np.testing.assert_allclose(piece_nodes(exhibit)[piece]["color"], color[:3], atol=0.01)
@@ -224,7 +223,7 @@ def test_a_marker_that_comes_later_and_never_changes_is_where_it_belongs(
     point, normal = nodes(["/contacts/0/a", "/contacts/0/normal"])
     contacts = exhibit.contacts(near, within=0.005)
     np.testing.assert_allclose(point["matrix"][:3, 3], contacts.point_a[0], atol=1e-5)
-    np.testing.assert_allclose(normal["matrix"][:3, 2] / style.NORMAL_LENGTH, contacts.normal[0], atol=1e-5)
+    np.testing.assert_allclose(normal["matrix"][:3, 2] / LOOK.normal_length, contacts.normal[0], atol=1e-5)
 
 
 def test_goals_are_at_their_targets_with_what_is_left(exhibit: Any, browser: Browser, nodes: Any) -> None:
@@ -254,7 +253,7 @@ def test_goals_are_at_their_targets_with_what_is_left(exhibit: Any, browser: Bro
         np.testing.assert_allclose(line["matrix"] @ (0, 0, 0, 1), [*hand.translation, 1], atol=1e-5)
         assert words["text"] == "rarm_wrist2_joint  130.0 mm"
         axes = nodes([f"/goals/1/axes/{name}" for name in "xyz"])
-        found = np.column_stack([entry["matrix"][:3, 2] / style.AXES_LENGTH for entry in axes])
+        found = np.column_stack([entry["matrix"][:3, 2] / LOOK.axes_length for entry in axes])
         np.testing.assert_allclose(found, wish.rotation, atol=1e-5)
         assert nodes(["/goals/1/text"])[0]["text"] == "rarm_wrist2_joint  0.0 mm  28.6°"
         assert nodes(["/goals/2/text"])[0]["text"] == "head2_joint  0.0°"
@@ -278,8 +277,8 @@ def test_colours_at_projected_places(exhibit: Any, browser: Browser, tmp_path: P
     picture = pixels(browser)
     height, width = picture.shape[:2]
     column, row = project(target, eye, middle, width, height)
-    np.testing.assert_allclose(picture[row, column], np.array(style.TARGET) * 255, atol=2)  # unlit: exact
-    green = np.argwhere((np.abs(picture - np.array(style.TARGET) * 255) < 3).all(axis=2))
+    np.testing.assert_allclose(picture[row, column], np.array(LOOK.target) * 255, atol=2)  # unlit: exact
+    green = np.argwhere((np.abs(picture - np.array(LOOK.target) * 255) < 3).all(axis=2))
     near = green[np.abs(green - (row, column)).max(axis=1) < 6]
     np.testing.assert_allclose(near.mean(axis=0), (row, column), atol=1.5)
     table = exhibit.geometry.geometryObjects[exhibit.geometry.getGeometryId("table:0")].placement
@@ -326,7 +325,7 @@ def test_ghosts_are_transparent_throw_no_shadow_and_are_replaced(exhibit: Any, b
         path = "/ghosts/1/objects/hat/head2_joint/hat:0"
         (found,) = nodes([path])
         np.testing.assert_allclose(found["matrix"], (data.oMi[hat.parentJoint] * hat.placement).homogeneous, atol=1e-5)
-        assert found["opacity"] == pytest.approx(style.GHOST[3])
+        assert found["opacity"] == pytest.approx(LOOK.ghost[3])
         names = [*path.strip("/").split("/"), "<object>"]
         assert browser.evaluate(f"viewer.scene_tree.find({names}).object.castShadow") is False
         assert nodes(["/ghosts/1/objects/table"]) == [None]

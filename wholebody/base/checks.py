@@ -28,6 +28,9 @@ NUMERIC = "fiu"
 """Kinds of numpy arrays that hold real numbers: floating, signed and unsigned."""
 
 FAR = 1e15  # values beyond this get no hint at a wrong unit
+SLIPS = {"m": {"millimetres": 1e-3, "centimetres": 1e-2}, "rad": {"degrees": math.pi / 180.0}, "kg": {"grams": 1e-3}}
+"""Unit -> the units that people write by mistake, with their size in it."""
+
 TIME_STEP = (1e-6, 1e6)
 """Least and greatest time step, seconds: beyond them velocities have no significant digits."""
 TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
@@ -88,21 +91,20 @@ def instance(value: object, kind: type[_T] | tuple[type[_T], ...], what: str, co
     return value
 
 
-def number(value: object, what: str, low: float, high: float, unit: str = "") -> float:
-    """A finite number within a range, both ends included.
+def number(value: object, what: str, low: float, high: float, unit: str = "", wanted: str = "") -> float:
+    """A finite number within a range, both ends included; `wanted` replaces range and unit in the message.
 
     Raises:
         InputError: it is none.
     """
     found = _real(value)
     if found is None or not low <= found <= high:
-        if math.isinf(high):
-            wanted = f"a finite number of {low:g} or more" if math.isfinite(low) else "a finite number"
-        else:
-            odd = isinstance(value, float) and not math.isfinite(value)
-            wanted = f"a {'finite ' if odd else ''}number between {low:g} and {high:g}"
-        slip = unit_hint(found, low, high) if unit == "m" and found is not None else ""
-        raise InputError(f"{what} is {shown(value)}; give {wanted}{f' {unit}' if unit else ''}{slip}")
+        if not wanted:
+            finite = "finite " if math.isinf(high) or (isinstance(value, float) and not math.isfinite(value)) else ""
+            ends = f" between {low:g} and {high:g}" if math.isfinite(high) else f" of {low:g} or more"
+            wanted = f"a {finite}number{ends if math.isfinite(low) else ''}{f' {unit}' if unit else ''}"
+        slip = "" if found is None else unit_hint(found, low, high, unit)
+        raise InputError(f"{what} is {shown(value)}; give {wanted}{slip}")
     return found
 
 
@@ -114,11 +116,11 @@ def warn(told: str) -> None:
     warnings.warn(told, stacklevel=level)
 
 
-def unit_hint(value: float, low: float, high: float) -> str:
-    """A hint that a length out of a range [m] may be in millimetres or centimetres; empty if it is in neither."""
+def unit_hint(value: float, low: float, high: float, unit: str) -> str:
+    """A hint that a number out of a range may be in another unit that people write; empty if it fits in none."""
     fits = [
-        f"{value * factor:.6g} if it is in {unit}"
-        for factor, unit in ((1e-3, "millimetres"), (1e-2, "centimetres"))
+        f"{value * factor:.6g} if it is in {other}"
+        for other, factor in SLIPS.get(unit, {}).items()
         if abs(value) < FAR and low <= value * factor <= high  # a large int times a float overflows
     ]
     return f"; write {' or '.join(fits)}" if fits else ""

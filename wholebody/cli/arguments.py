@@ -1,26 +1,16 @@
-"""What the parsers of several commands share: the type of a group of commands, and the choice of a scene."""
+"""What the parsers of several commands share: the parser itself, the options of a person, the choice of a scene."""
 
 from __future__ import annotations
 
 import argparse
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, NoReturn, Protocol
+from typing import Any, NoReturn
 
 from wholebody.base.checks import is_number
 from wholebody.base.errors import InputError, UnknownNameError, nearest_names
-
-
-class Commands(Protocol):
-    """A group of commands, as `argparse` makes it by `add_subparsers`."""
-
-    def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
-        """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
-
-
-NUMBERS = re.compile(r"-[\d.][\d.,eE+-]*")
-"""A negative number, or numbers joined by commas of which the first is negative."""
+from wholebody.cli.command import Option, flag, option
 
 JOINED = "X,Y,Z"
 """How the help shows numbers that are joined by commas."""
@@ -35,7 +25,7 @@ class Parser(argparse.ArgumentParser):
     def __init__(self, *given: Any, **settings: Any) -> None:
         """As `argparse` does."""
         super().__init__(*given, **settings)
-        self._negative_number_matcher = NUMBERS
+        self._negative_number_matcher = re.compile(r"-[\d.][\d.,eE+-]*")  # or numbers joined by commas
 
     def parse_known_args(  # type: ignore[override]
         self, args: Sequence[str] | None = None, namespace: Any = None
@@ -101,37 +91,32 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
-def scene_parser(
-    commands: Commands, run: Callable[[argparse.Namespace], int], name: str, *, overlap: str, out: str, **texts: str
-) -> argparse.ArgumentParser:
-    """Add a command that runs scenes with a scripted tracker.
+def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
+    """Options of a command that runs scenes with a scripted tracker.
 
     Args:
-        commands: the group.
-        run: runs it.
-        name: of the command.
+        scene: help of its first argument.
         overlap: help of `--overlap`.
         out: folder where `--out` is left out.
-        texts: `help`, `description` and `epilog` of the command, and `scene`, the help of its first argument.
     """
-    scene = texts.pop("scene")
-    parser = commands.add_parser(name, formatter_class=argparse.RawDescriptionHelpFormatter, **texts)
-    parser.set_defaults(run=run)
-    parser.add_argument("scene", nargs="?", metavar="SCENE", help=scene)
-    parser.add_argument("--list", action="store_true", help="list the scenes")
-    parser.add_argument("--overlap", default="qp", metavar="METHOD", help=overlap)
-    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)")
-    parser.add_argument("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)")
-    add_folders(parser, out)
-    return parser
+    return (
+        option("scene", nargs="?", metavar="SCENE", help=scene),
+        flag("--list", "list the scenes"),
+        option("--overlap", default="qp", metavar="METHOD", help=overlap),
+        option("--frames", type=int, metavar="N", help="number of frames (default: the whole script, once)"),
+        option("--seed", type=int, default=0, metavar="N", help="seed of all random numbers (default: 0)"),
+        *folders(out),
+    )
 
 
-def add_folders(parser: argparse.ArgumentParser, out: str) -> None:
-    """Add `--out`, with a folder where it is left out, and `--update-docs`."""
-    parser.add_argument("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})")
-    parser.add_argument(
-        "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
-        help="write tables and charts into the documentation too (default folder: docs)",
+def folders(out: str) -> tuple[Option, Option]:
+    """`--out`, with a folder where it is left out, and `--update-docs`."""
+    return (
+        option("--out", type=Path, default=Path(out), metavar="DIR", help=f"folder (default: {out})"),
+        option(
+            "--update-docs", type=Path, nargs="?", const=Path("docs"), metavar="DOCS",
+            help="write tables and charts into the documentation too (default folder: docs)",
+        ),
     )  # fmt: skip
 
 

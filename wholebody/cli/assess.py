@@ -6,17 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, flag, option
 
-HELP = "judge a posture, and score its ergonomics"
-DESCRIPTION = """\
-Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
-print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it."""
-EPILOG = """\
-examples:
-  wholebody assess out/shelf/result.json --ergonomics
-  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json
-exit code: 1 if the posture violates a limit, a constraint or a clearance by more than 0.1 mm or mrad"""
 FLAGS = {
     "static": "the posture is held for minutes",
     "repeated": "the action is repeated more than four times a minute",
@@ -27,29 +18,31 @@ FLAGS = {
 }
 
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("assess", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("result", type=Path, metavar="RESULT.json", help="the result")
-    parser.add_argument("--ergonomics", action="store_true", help="score the ergonomics of a person")
-    parser.add_argument("--load", type=float, default=0.0, metavar="KG", help="mass in both hands (default: 0)")
-    parser.add_argument("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable")
-    for name, says in FLAGS.items():
-        parser.add_argument(f"--{name.replace('_', '-')}", action="store_true", help=says)
-    parser.add_argument(
+@command(
+    "assess",
+    "judge a posture, and score its ergonomics",
+    """\
+Judge the posture of a result.json that `wholebody pose` wrote: goals, overlaps, limits, constraints. With --ergonomics
+print RULA, REBA, OWAS and the torques against published strength too; --json prints all of it.""",
+    option("result", type=Path, metavar="RESULT.json", help="the result"),
+    option("--ergonomics", action="store_true", help="score the ergonomics of a person"),
+    option("--load", type=float, default=0.0, metavar="KG", help="mass in both hands (default: 0)"),
+    option("--coupling", default="good", metavar="WORD", help="grip: good, fair, poor, unacceptable"),
+    *(flag(f"--{name.replace('_', '-')}", says) for name, says in FLAGS.items()),
+    option(
         "--seated",
         choices=("yes", "no"),
         help="whether the person sits (default: told by what is below, or the posture)",
-    )
-    parser.add_argument("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)")
-    parser.add_argument(
-        "--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95 (default: 50)"
-    )
-    parser.add_argument("--json", action="store_true", help="print JSON instead of tables")
-    parser.set_defaults(run=run)
-
-
+    ),
+    option("--sex", default="male", metavar="SEX", help="of the strength: male or female (default: male)"),
+    option("--percentile", type=float, default=50.0, metavar="P", help="of the strength, 5 to 95 (default: 50)"),
+    option("--json", action="store_true", help="print JSON instead of tables"),
+    epilog="""\
+examples:
+  wholebody assess out/shelf/result.json --ergonomics
+  wholebody assess out/shelf/result.json --ergonomics --load 6 --repeated --json
+exit code: 1 if the posture violates a limit, a constraint or a clearance by more than 0.1 mm or mrad""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Judge and print; 1 if the posture violates something."""
     from wholebody.assessment.posture import assess
@@ -73,7 +66,8 @@ def run(arguments: argparse.Namespace) -> int:
         print(result.as_json(described), end="")
     else:
         _show(judged, scores)
-    return 0 if judged.holds(VIOLATION) else 1
+    # m, rad: of limits, constraints and clearances, beyond which a posture does not hold
+    return 0 if judged.holds(1e-4) else 1
 
 
 VIOLATION = 1e-4  # m, rad: of limits, constraints and clearances, beyond which a posture does not hold

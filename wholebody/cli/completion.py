@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, option
 
 SHELLS = ("bash", "zsh", "tcsh")
-HELP = "print the completion script of a shell"
-DESCRIPTION = """\
+
+
+@command(
+    "completion",
+    "print the completion script of a shell",
+    """\
 Print a script with which a shell completes the commands and options of wholebody. It needs shtab:
-pip install 'wholebody[completion]'. The script itself needs nothing and costs no time when the command starts."""
-EPILOG = """\
+pip install 'wholebody[completion]'. The script itself needs nothing and costs no time when the command starts.""",
+    option("shell", choices=SHELLS, help="the shell"),
+    epilog="""\
 examples:
   wholebody completion bash > ~/.local/share/bash-completion/completions/wholebody
-  wholebody completion zsh > ~/.zfunc/_wholebody"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("completion", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("shell", choices=SHELLS, help="the shell")
-    parser.set_defaults(run=run)
-
-
+  wholebody completion zsh > ~/.zfunc/_wholebody""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Print the script.
 

@@ -5,24 +5,19 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, option
 
-HELP = "pose a packaged task"
-DESCRIPTION = """\
+
+@command(
+    "demo",
+    "pose a packaged task",
+    """\
 Pose a packaged task (by default a person who reaches between the boards of a shelf), and print where the pictures are.
-You can copy and change the task file."""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("demo", help=HELP, description=DESCRIPTION, formatter_class=shape)
-    parser.add_argument("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)")
-    parser.add_argument("--list", action="store_true", help="list the tasks")
-    parser.add_argument("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)")
-    parser.set_defaults(run=run)
-
-
+You can copy and change the task file.""",
+    option("name", nargs="?", default="shelf", metavar="NAME", help="which task (default: shelf)"),
+    option("--list", action="store_true", help="list the tasks"),
+    option("--out", type=Path, default=Path("demo"), metavar="DIR", help="folder (default: demo)"),
+)
 def run(arguments: argparse.Namespace) -> int:
     """List the tasks, or pose one."""
     from wholebody.base.errors import UnknownNameError

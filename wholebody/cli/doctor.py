@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.arguments import Commands
-
-HELP = "check this installation: versions, methods, QP solvers, tools"
-DESCRIPTION = """\
-Print the versions of all packages, use every method and QP solver once, and name wrong combinations of versions and
-wrong search paths with their repairs. Print the folder and size of the cache of mesh pieces. The exit code is 1 if
-something is wrong; an absent optional package is no fault."""
+from wholebody.cli.command import command, option
 
 _MARKS = {"works": "[green]works[/]", "absent": "[dim]absent[/]", "broken": "[red]broken[/]"}
 
 
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("doctor", help=HELP, description=DESCRIPTION, formatter_class=shape)
-    parser.add_argument(
+@command(
+    "doctor",
+    "check this installation: versions, methods, QP solvers, tools",
+    """\
+Print the versions of all packages, use every method and QP solver once, and name wrong combinations of versions and
+wrong search paths with their repairs. Print the folder and size of the cache of mesh pieces. The exit code is 1 if
+something is wrong; an absent optional package is no fault.""",
+    option(
         "--clear-cache",
         action="store_true",
         help="empty the cache of mesh pieces, and end",
-    )
-    parser.set_defaults(run=run)
-
-
+    ),
+)
 def run(arguments: argparse.Namespace) -> int:
     """Examine and print; 1 if there are faults."""
     if arguments.clear_cache:

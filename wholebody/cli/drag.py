@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, option
 from wholebody.methods import METHODS
 
 if TYPE_CHECKING:
@@ -17,8 +17,17 @@ if TYPE_CHECKING:
     from wholebody.tracking.dragging import Dragged, DragJudgement
     from wholebody.tracking.live import LiveDrag
 
-HELP = "drag a goal of a task along a path, frame by frame"
-DESCRIPTION = """\
+
+def _path_or_live(parser: argparse.ArgumentParser) -> None:
+    either = parser.add_mutually_exclusive_group(required=True)
+    either.add_argument("--path", metavar="FILE|circle|line", help="path of the goal")
+    either.add_argument("--live", action="store_true", help="drag handles with the mouse in a browser (needs viser)")
+
+
+@command(
+    "drag",
+    "drag a goal of a task along a path, frame by frame",
+    """\
 Drag a goal of a task file (its first point or frame, or the one that --goal names) along a path at a constant speed; a
 frame keeps its orientation. The figure follows frame by frame and at the end meets the goal to 1e-5 m. Print a table
 of times and remaining errors, assessed independently in every frame and between frames. Write into a folder the
@@ -28,8 +37,25 @@ without a network).
 paths:
   line      from the start of the dragged frame to --to, or to the goal's target
   circle    from the start to a circle of radius --size around the goal's target, normal to --normal
-  FILE      from the start through the points of a text file: x y z in metres, one point a line"""
-EPILOG = """\
+  FILE      from the start through the points of a text file: x y z in metres, one point a line""",
+    option("task", type=Path, metavar="TASK.toml", help="the task file"),
+    _path_or_live,
+    option("--method", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton along a path, qp with --live)"),
+    option("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)"),
+    option("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)"),
+    option("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)"),
+    option("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)"),
+    option(
+        "--normal",
+        type=float,
+        nargs=3,
+        default=(1.0, 0.0, 0.0),
+        metavar=("X", "Y", "Z"),
+        help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
+    ),
+    option("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m"),
+    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)"),
+    epilog="""\
 --live opens a page instead: drag the handles on hands, feet, pelvis, head and things with the mouse, click one to
 hold it; "undo" goes back, "save" writes the posture as a task file into the folder.
 
@@ -38,33 +64,8 @@ examples:
   wholebody drag sit_on_chair.toml --path line --method newton
   wholebody drag shelf.toml --path circle --size 0.05 --method qp
   wholebody drag shelf.toml --path corners.csv --frames 300 --out out/shelf
-exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("drag", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    way = parser.add_mutually_exclusive_group(required=True)
-    way.add_argument("--path", metavar="FILE|circle|line", help="path of the goal")
-    way.add_argument("--live", action="store_true", help="drag handles with the mouse in a browser (needs viser)")
-    parser.add_argument(
-        "--method", metavar="NAME", help=f"{', '.join(METHODS)} (default: newton along a path, qp with --live)"
-    )
-    parser.add_argument("--port", type=int, default=8080, metavar="N", help="of the live page (default: 8080)")
-    parser.add_argument("--goal", type=int, metavar="N", help="which goal, from 0 (default: first point or frame)")
-    parser.add_argument("--frames", type=int, metavar="N", help="number of frames (default: 0.5 m/s)")
-    parser.add_argument("--size", type=float, default=0.1, metavar="M", help="radius of a circle, m (default: 0.1)")
-    parser.add_argument(
-        "--normal", type=float, nargs=3, default=(1.0, 0.0, 0.0), metavar=("X", "Y", "Z"),
-        help="normal of a circle's plane (default: 1 0 0, which faces the figure)",
-    )  # fmt: skip
-    parser.add_argument("--to", type=float, nargs=3, metavar=("X", "Y", "Z"), help="end of a line, m")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/drag/NAME-OF-TASK)")
-    parser.set_defaults(run=run)
-
-
+exit code: 1 if the end is not met, or if the overlap in a frame or between two exceeds 1 mm, or a limit is violated""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Drag, assess, report and write; 1 if the end is not met or something was penetrated."""
     if arguments.live:

@@ -6,32 +6,28 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from wholebody.cli.arguments import Commands, add_person, person_options
+from wholebody.cli.arguments import add_person, person_options
+from wholebody.cli.command import command, option
 
-HELP = "describe a figure, or write a person as a URDF"
-DESCRIPTION = """\
+
+@command(
+    "figure",
+    "describe a figure, or write a person as a URDF",
+    """\
 List the joints with their limits, the frames for goals, groups and postures of a figure:
-human, avatar, hand, or the path of a URDF. With --out, write a person as a URDF instead."""
-EPILOG = """\
+human, avatar, hand, or the path of a URDF. With --out, write a person as a URDF instead.""",
+    option("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF"),
+    add_person,
+    option("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file"),
+    epilog="""\
 examples:
   wholebody figure human --sex female --stature 1.62 --mass 60
   wholebody figure human --sex female --stature 1.62 --mass 60 --out small-woman.urdf
   wholebody figure human --sex female --percentile 5 --age 60
   wholebody figure human --stature 1.80 --proportion sitting_height=0.96
   wholebody figure human --hands fingers --out with-fingers.urdf
-  wholebody figure robot.urdf"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("figure", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("name", metavar="FIGURE", help="human, avatar, hand, or the path of a URDF")
-    add_person(parser)
-    parser.add_argument("--out", type=Path, metavar="FILE.urdf", help="write a person's URDF to this file")
-    parser.set_defaults(run=run)
-
-
+  wholebody figure robot.urdf""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Describe or write."""
     from rich.console import Console

@@ -6,45 +6,30 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
+from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
+from wholebody.cli.command import command
 
 if TYPE_CHECKING:
     from wholebody.bench.measure.interaction import InteractionRow, WorstFrames
     from wholebody.tracking import InteractionScene, Judgement, Recording
 
-HELP = "follow a tracker frame by frame through a gallery without penetration"
-DESCRIPTION = """\
+
+@command(
+    "interact",
+    "follow a tracker frame by frame through a gallery without penetration",
+    """\
 Run a scene: a scripted tracker moves a hand or an avatar into walls, tables and itself, and the shown figure follows as
 far as contact allows. Print a table of times and remaining overlap, assessed independently. Write the numbers of every
 frame (CSV), a chart of the frame times (PNG, SVG) and the animation with the tracked posture as a ghost (HTML, opens
-without a network)."""
-EPILOG = """\
+without a network).""",
+    *scene_options("name of the scene, or all", "qp, ccd or all (default: qp)", "out/interact"),
+    epilog="""\
 examples:
   wholebody interact --list
   wholebody interact two_arms
   wholebody interact all --out out/interact
-exit code: 1 if a frame overlaps by more than the tolerance, passes through something or leaves a joint limit or cone"""
-
-
-CHARTED = ("hand_on_table", "two_arms")
-"""Scenes whose charts go into the documentation: those of figures 7 and 8 of the paper."""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    scene_parser(
-        commands,
-        run,
-        "interact",
-        scene="name of the scene, or all",
-        overlap="qp, ccd or all (default: qp)",
-        out="out/interact",
-        help=HELP,
-        description=DESCRIPTION,
-        epilog=EPILOG,
-    )
-
-
+exit code: 1 if a frame overlaps by more than the tolerance, passes through something, or leaves a joint limit""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
@@ -204,7 +189,8 @@ def _update(docs: Path, text: str, worst: list[WorstFrames], out: Path) -> None:
     charts, pictures = [], []
     for each in worst:
         scene, overlap = each.row.scene, each.row.overlap
-        if scene in CHARTED:
+        # scenes whose charts go into the documentation: those of figures 7 and 8 of the paper
+        if scene in ("hand_on_table", "two_arms"):
             name = f"{scene}-{overlap}.svg"
             shutil.copyfile(out / name, folder / name)
             charts.append(f"![Frame time of {scene.replace('_', ' ')}](assets/interaction/{name})")

@@ -20,7 +20,7 @@ COMMANDS = (
     *("pose", "show", "figure", "demo", "interact", "drag", "world", "clip"),
     *("study", "reach", "assess", "bench", "doctor", "completion"),
 )
-"""Each is a module of this folder."""
+"""Each is a module of this folder, whose `run` is the command."""
 
 DESCRIPTION = """\
 Pose people, avatars, hands and robots among objects, in contact and without penetration.
@@ -42,7 +42,7 @@ def parser(names: Sequence[str] = COMMANDS) -> argparse.ArgumentParser:
     top.add_argument("--version", action="version", version=f"wholebody {__version__}")
     commands = top.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in names:
-        import_module(f"wholebody.cli.{name}").add_to(commands)
+        import_module(f"wholebody.cli.{name}").run.add_to(commands)
     return top
 
 

@@ -5,37 +5,32 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, option
 from wholebody.methods import METHODS
 
-HELP = "find a posture for a task file"
-DESCRIPTION = """\
+
+@command(
+    "pose",
+    "find a posture for a task file",
+    """\
 Find a posture for a task file, print how good it is, and write into a folder:
 
   result.json   the posture, joints by name (rad), and its assessment
   scene.html    the scene, for any browser, without a network
   scene.png     a picture of it (needs Chromium; not with --json or --no-picture)
 
-docs/taskfile.md lists everything that a task file can contain."""
-EPILOG = """\
+docs/taskfile.md lists everything that a task file can contain.""",
+    option("task", type=Path, metavar="TASK.toml", help="the task file"),
+    option("--method", metavar="NAME", help=f"method, in place of the file's: {', '.join(METHODS)}"),
+    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
+    option("--json", action="store_true", help="print the result as JSON instead of tables; no picture"),
+    option("--no-picture", action="store_true", help="do not draw scene.png, which takes seconds"),
+    epilog="""\
 examples:
   wholebody pose shelf.toml
   wholebody pose shelf.toml --method qp --out results/shelf
-  wholebody pose shelf.toml --json | jq .joints"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("pose", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file")
-    parser.add_argument("--method", metavar="NAME", help=f"method, in place of the file's: {', '.join(METHODS)}")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
-    parser.add_argument("--json", action="store_true", help="print the result as JSON instead of tables; no picture")
-    parser.add_argument("--no-picture", action="store_true", help="do not draw scene.png, which takes seconds")
-    parser.set_defaults(run=run)
-
-
+  wholebody pose shelf.toml --json | jq .joints""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Pose, report and write; 1 if the posture is not a solution."""
     out = arguments.out or Path("out") / arguments.task.stem

@@ -5,39 +5,35 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import JOINED, Commands
+from wholebody.cli.arguments import JOINED
+from wholebody.cli.command import command, option
 
-HELP = "map the places that a hand or another frame can reach"
-DESCRIPTION = """\
+
+@command(
+    "reach",
+    "map the places that a hand or another frame can reach",
+    """\
 Find which places of a grid a frame of a task file's figure reaches, with everything that the task file asks except its
 goals, and write into a folder:
 
   reach.png    heat maps of all heights, seen from above
   reach.html   the same with a slider, for any browser
   reach.npz    all arrays: verdicts, distances left, postures
-  reach.vtk    verdicts and distances, for ParaView and the like"""
-EPILOG = """\
+  reach.vtk    verdicts and distances, for ParaView and the like""",
+    option("task", type=Path, metavar="TASK.toml", help="the task file: figure, things, constraints"),
+    option("--frame", required=True, metavar="NAME", help="the frame that reaches"),
+    option("--low", required=True, metavar=JOINED, help="least corner of the grid, metres"),
+    option("--high", required=True, metavar=JOINED, help="greatest corner"),
+    option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
+    option("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)"),
+    option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches"),
+    option("--goals", action="store_true", help="meet the task's goals too at every place"),
+    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
+    epilog="""\
 examples:
   wholebody reach seat.toml --frame right_index_tip --low 0,-0.8,0.4 --high 1.0,0.4,1.6 --step 0.1
-  wholebody reach seat.toml --frame left_palm --low 0.2,-0.5,0.9 --high 0.9,0.5,0.9 --step 0.05 --jobs 2"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("reach", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("task", type=Path, metavar="TASK.toml", help="the task file: figure, things, constraints")
-    parser.add_argument("--frame", required=True, metavar="NAME", help="the frame that reaches")
-    parser.add_argument("--low", required=True, metavar=JOINED, help="least corner of the grid, metres")
-    parser.add_argument("--high", required=True, metavar=JOINED, help="greatest corner")
-    parser.add_argument("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)")
-    parser.add_argument("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches")
-    parser.add_argument("--goals", action="store_true", help="meet the task's goals too at every place")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)")
-    parser.set_defaults(run=run)
-
-
+  wholebody reach seat.toml --frame left_palm --low 0.2,-0.5,0.9 --high 0.9,0.5,0.9 --step 0.05 --jobs 2""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Search and write; 1 if no place is reached."""
     from rich.console import Console

@@ -8,7 +8,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import Commands, add_person, person_options
+from wholebody.cli.arguments import add_person, person_options
+from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
     import numpy as np
@@ -18,44 +19,38 @@ if TYPE_CHECKING:
     from wholebody.taskfile.task import View
 
 LOCAL = "127.0.0.1"
-HELP = "show a figure, a task or a result"
-DESCRIPTION = """\
+
+
+@command(
+    "show",
+    "show a figure, a task or a result",
+    """\
 Show in a browser. The command waits for the first tab, and ends when the last one is closed, or with Ctrl-C:
 
   a figure   human, avatar, hand, or the path of a URDF
   a task     the start of a task file, with its goals
-  a result   result.json, written by `wholebody pose`"""
-EPILOG = """\
+  a result   result.json, written by `wholebody pose`""",
+    option("what", metavar="FIGURE|TASK|RESULT", help="what to show"),
+    add_person,
+    option("--posture", metavar="NAME", help="name of a posture of the figure"),
+    option("--pieces", action="store_true", help="draw the pieces that contacts are measured with"),
+    option("--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"),
+    option("--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"),
+    option(
+        "--host",
+        default=LOCAL,
+        metavar="ADDRESS",
+        help=f"address of the live page (default: {LOCAL}; 0.0.0.0 allows access from other machines)",
+    ),
+    epilog="""\
 examples:
   wholebody show human --posture sitting
   wholebody show human --sex female --stature 1.55
   wholebody show human --pieces                    # what contacts are measured with, instead of the body's surface
   wholebody show out/shelf/result.json
   wholebody show shelf.toml --port 7777            # on another machine: ssh -L 7777:localhost:7777 HOST, then this
-  wholebody show shelf.toml --save shelf.png"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("show", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("what", metavar="FIGURE|TASK|RESULT", help="what to show")
-    add_person(parser)
-    parser.add_argument("--posture", metavar="NAME", help="name of a posture of the figure")
-    parser.add_argument("--pieces", action="store_true", help="draw the pieces that contacts are measured with")
-    parser.add_argument(
-        "--save", type=Path, metavar="FILE", help="write FILE.html, FILE.png or FILE.glb (glTF); open no browser"
-    )
-    parser.add_argument(
-        "--port", type=int, default=0, metavar="N", help="port of the live page (default: a free one from 7000)"
-    )
-    parser.add_argument(
-        "--host", default=LOCAL, metavar="ADDRESS",
-        help=f"address of the live page (default: {LOCAL}; 0.0.0.0 allows access from other machines)",
-    )  # fmt: skip
-    parser.set_defaults(run=run)
-
-
+  wholebody show shelf.toml --save shelf.png""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Show, and wait until the first tab is opened and the last one is closed."""
     from wholebody.base.errors import InputError

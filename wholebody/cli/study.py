@@ -6,15 +6,23 @@ import argparse
 import sys
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
+from wholebody.cli.command import command, option
 
-HELP = "solve one task for many people, targets and layouts"
-DESCRIPTION = """\
+
+@command(
+    "study",
+    "solve one task for many people, targets and layouts",
+    """\
 Solve the task of a study file for each person, with each target, in each layout, and write into a folder:
 
   cases.csv         one row a case
-  records.sqlite    the same with the postures; a run that was ended goes on from it"""
-EPILOG = """\
+  records.sqlite    the same with the postures; a run that was ended goes on from it""",
+    option("study", type=Path, metavar="FILE.toml", help="the study file"),
+    option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)"),
+    option("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)"),
+    option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the cases"),
+    option("--parquet", action="store_true", help="write cases.parquet too (needs pyarrow)"),
+    epilog="""\
 a study file:
   task = "shelf.toml"                     # relative to the study file
 
@@ -33,21 +41,8 @@ a study file:
 
 examples:
   wholebody study shelf-study.toml --jobs 2
-  wholebody study shelf-study.toml --out results/study --parquet"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser("study", help=HELP, description=DESCRIPTION, epilog=EPILOG, formatter_class=shape)
-    parser.add_argument("study", type=Path, metavar="FILE.toml", help="the study file")
-    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-FILE)")
-    parser.add_argument("--jobs", type=int, default=1, metavar="N", help="cases at a time (default: 1)")
-    parser.add_argument("--cluster", metavar="ADDRESS", help="dask scheduler that runs the cases")
-    parser.add_argument("--parquet", action="store_true", help="write cases.parquet too (needs pyarrow)")
-    parser.set_defaults(run=run)
-
-
+  wholebody study shelf-study.toml --out results/study --parquet""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Solve, report and write; 1 if a case is not solved."""
     from rich.console import Console

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands, check_overlaps, scene_names, scene_parser
+from wholebody.cli.arguments import check_overlaps, scene_names, scene_options
+from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
     from wholebody.bench.measure.world_runs import WorldRow
@@ -14,41 +15,29 @@ if TYPE_CHECKING:
     from wholebody.dynamics.scenes import WorldScene
     from wholebody.dynamics.world import WorldFrame
 
-HELP = "let a hand or an avatar meet balls, boxes and dominoes that move by themselves"
-DESCRIPTION = """\
+
+@command(
+    "world",
+    "let a hand or an avatar meet balls, boxes and dominoes that move by themselves",
+    """\
 Run a scene: a scripted tracker moves a hand or an avatar, and the things that it meets fall, roll, slide and bounce.
 With a task file the figure stands as the file starts. Print a table of frame times, impacts and overlap. Write the
 numbers of every frame (CSV), a chart of the energy and the frame times (PNG, SVG) and the animation (HTML, opens
-without a network)."""
-EPILOG = """\
+without a network).""",
+    *scene_options(
+        "name of the scene, or all; or a task file whose objects have a density or a mass",
+        "qp or ccd (default: qp)",
+        "out/world",
+    ),
+    option("--picture", action="store_true", help="draw five moments too, by a headless Chromium"),
+    epilog="""\
 examples:
   wholebody world --list
   wholebody world flick
   wholebody world my_task.toml --frames 300
   wholebody world all --out out/world
-exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided"""
-DEEPEST = 0.1  # mm
-CHARTED = ("flick", "avatar_and_cartons")  # a hand and an avatar, as figures 7 and 8 of the paper
-STANDING = 180  # frames of a task file
-FILM = (460, 420)  # pixels of a moment
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = scene_parser(
-        commands,
-        run,
-        "world",
-        scene="name of the scene, or all; or a task file whose objects have a density or a mass",
-        overlap="qp or ccd (default: qp)",
-        out="out/world",
-        help=HELP,
-        description=DESCRIPTION,
-        epilog=EPILOG,
-    )
-    parser.add_argument("--picture", action="store_true", help="draw five moments too, by a headless Chromium")
-
-
+exit code: 1 if pieces were deeper in each other than 0.1 mm after a frame, or a collision could not be avoided""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """List the scenes, or run one or all."""
     from wholebody.base.files import check_writable, make_folder
@@ -71,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     print(f"wrote {arguments.out}")
     if arguments.update_docs is not None:
         _update(arguments, text, names)
-    return 0 if all(row.deepest_mm <= DEEPEST and not row.unavoided for row in rows) else 1
+    return 0 if all(row.deepest_mm <= 0.1 and not row.unavoided for row in rows) else 1  # mm
 
 
 def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
@@ -82,7 +71,8 @@ def _scene(name: str, arguments: argparse.Namespace) -> WorldScene:
 
     if name.endswith(".toml"):
         problem = read_task(name).problem
-        return standing_scene(title_of(name), problem.scene, problem.start, frames=arguments.frames or STANDING)
+        # frames of a task file
+        return standing_scene(title_of(name), problem.scene, problem.start, frames=arguments.frames or 180)
     return build_world_scene(name, frames=arguments.frames, seed=arguments.seed)
 
 
@@ -139,7 +129,7 @@ def _animation(
         viewer.save(out / f"{scene.name}.html")
         if picture:
             chosen = [postures[number] for number in moments(frames)]
-            write_filmstrip(viewer, chosen, out / f"{scene.name}-film.png", FILM)
+            write_filmstrip(viewer, chosen, out / f"{scene.name}-film.png", (460, 420))  # pixels of a moment
     return seconds
 
 
@@ -152,7 +142,8 @@ def _update(arguments: argparse.Namespace, text: str, names: list[str]) -> None:
     docs = arguments.update_docs
     folder = docs / "assets" / "bench"
     folder.mkdir(parents=True, exist_ok=True)
-    charted = [name for name in CHARTED if name in names]
+    # a hand and an avatar, as figures 7 and 8 of the paper
+    charted = [name for name in ("flick", "avatar_and_cartons") if name in names]
     for name in charted:
         shutil.copyfile(arguments.out / f"{name}.svg", folder / f"world-{name}.svg")
     pictures = [f"![Energy and frame time: {name}](assets/bench/world-{name}.svg)" for name in charted]

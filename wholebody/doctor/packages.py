@@ -41,6 +41,7 @@ EXTRAS = {
     "viser": "drag",
     "shtab": "completion",
     "pybvh": "motion",
+    "mujoco-core": "mjcf",
     "pin-pink": "compare",
     "mink": "compare",
     "mujoco": "compare",

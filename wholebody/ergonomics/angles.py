@@ -22,12 +22,6 @@ SEGMENTS = ("pelvis", "thorax", "neck", "head")
 SIDE_SEGMENTS = ("upper_arm", "forearm", "hand")
 SIDE_FRAMES = ("shoulder", "elbow", "wrist", "palm", "hip", "knee", "ankle")
 
-SIDEWAYS = 0.2
-"""Length of an upper arm's direction in the sagittal plane below which it points sideways and has no flexion there."""
-
-HORIZONTAL = 0.1
-"""Horizontal part of a direction below which it points up or down."""
-
 
 class Scored(Protocol):
     """Scores of one side."""
@@ -217,7 +211,8 @@ class _Body:
         """Horizontal directions (3,) forward and left of the pelvis."""
         left = self.axes["pelvis"][:, 1].copy()
         left[2] = 0.0
-        if np.linalg.norm(left) < HORIZONTAL:  # lying on a side
+        # horizontal part of a direction below which it points up or down
+        if np.linalg.norm(left) < 0.1:  # lying on a side
             left = np.cross((0.0, 0.0, 1.0), self.axes["pelvis"][:, 0])
         left /= np.linalg.norm(left)
         return np.cross(left, (0.0, 0.0, 1.0)), left
@@ -234,8 +229,10 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
     rise = [body.axes["thorax"].T @ (body.at[f"{side}_shoulder"] - body.at["thorax"]) for body in (now, upright)]
     hand = -now.turn(f"{side}_forearm", f"{side}_hand")[:, 2]  # the long axis of a hanging hand points down
     thigh, shank = _unit(knee - hip), _unit(ankle - knee)
+    # length of an upper arm's direction in the sagittal plane below which it points sideways and has no flexion
+    # there
     return SideAngles(
-        shoulder_flexion=float(np.arctan2(upper[0], -upper[2])) if np.hypot(upper[0], upper[2]) > SIDEWAYS else 0.0,
+        shoulder_flexion=float(np.arctan2(upper[0], -upper[2])) if np.hypot(upper[0], upper[2]) > 0.2 else 0.0,
         shoulder_abduction=float(np.arcsin(np.clip(out * upper[1], -1.0, 1.0))),
         shoulder_rise=float(rise[0][2] - rise[1][2]),
         elbow_flexion=_between(upper, lower),

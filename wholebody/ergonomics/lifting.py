@@ -16,38 +16,11 @@ import numpy as np
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import check_person
+from wholebody.ergonomics.published import published
 from wholebody.figures.figure import Figure
-
-CONSTANT = 23.0  # kg
-COUPLINGS = ("good", "fair", "poor")
-KNEE_HIGH = 75.0  # cm: height of the hands from which the second columns of the tables count
-
-FREQUENCIES = (0.2, 0.5, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-"""Lifts a minute, of the manual's table 5. Beyond the last one nothing may be lifted."""
-
-MULTIPLIERS = {
-    1.0: (
-        (1.0, 0.97, 0.94, 0.91, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.52, 0.45, 0.41, 0.37, 0.0, 0.0, 0.0),
-        (1.0, 0.97, 0.94, 0.91, 0.88, 0.84, 0.8, 0.75, 0.7, 0.6, 0.52, 0.45, 0.41, 0.37, 0.34, 0.31, 0.28),
-    ),
-    2.0: (
-        (0.95, 0.92, 0.88, 0.84, 0.79, 0.72, 0.6, 0.5, 0.42, 0.35, 0.3, 0.26, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (0.95, 0.92, 0.88, 0.84, 0.79, 0.72, 0.6, 0.5, 0.42, 0.35, 0.3, 0.26, 0.23, 0.21, 0.0, 0.0, 0.0),
-    ),
-    8.0: (
-        (0.85, 0.81, 0.75, 0.65, 0.55, 0.45, 0.35, 0.27, 0.22, 0.18, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (0.85, 0.81, 0.75, 0.65, 0.55, 0.45, 0.35, 0.27, 0.22, 0.18, 0.15, 0.13, 0.0, 0.0, 0.0, 0.0, 0.0),
-    ),
-}
-"""Greatest duration, hours -> frequency multipliers with the hands below 75 cm, and at 75 cm or above."""
-
-COUPLING = {"good": (1.0, 1.0), "fair": (0.95, 1.0), "poor": (0.9, 0.9)}
-"""Coupling multipliers below 75 cm, and at 75 cm or above (table 7)."""
 
 CLOSEST, FARTHEST = 25.0, 63.0  # cm, of H
 HIGHEST = 175.0  # cm, of V and D
-LEAST_TRAVEL = 25.0  # cm
-MOST_TURNED = 135.0  # degrees
 
 
 @dataclass(frozen=True)
@@ -84,7 +57,7 @@ class Lift:
         checks.settle(self, "asymmetry", checks.number(self.asymmetry, "Lift: asymmetry", 0.0, pi, "rad"))
         checks.settle(self, "frequency", checks.number(self.frequency, "Lift: frequency", 0.0, 60.0, "lifts a minute"))
         checks.settle(self, "duration", checks.number(self.duration, "Lift: duration", 0.0, 8.0, "hours"))
-        checks.choice(self.coupling, COUPLINGS, "Lift: coupling")
+        checks.choice(self.coupling, ("good", "fair", "poor"), "Lift: coupling")
         if self.load is not None:
             checks.settle(self, "load", checks.number(self.load, "Lift: load", 0.0, 1000.0, "kg"))
 
@@ -99,21 +72,23 @@ class Lift:
     def multipliers(self) -> dict[str, float]:
         """HM, VM, DM, AM, FM and CM by name, each 0 to 1."""
         h, v, d, a = 100.0 * self.horizontal, 100.0 * self.vertical, 100.0 * self.travel, degrees(self.asymmetry)
-        high = int(v >= KNEE_HIGH)
-        column = next(table[high] for most, table in MULTIPLIERS.items() if self.duration <= most)
+        high = int(v >= 75.0)  # cm: height of the hands from which the second columns of the tables count
+        column = next(row[1 + high] for row in published("niosh")["multipliers"] if self.duration <= row[0])
+        # cm: least travel
+        # degrees: most turned
         return {
             "HM": 25.0 / max(h, CLOSEST) if h <= FARTHEST else 0.0,
             "VM": 1.0 - 0.003 * abs(v - 75.0) if v <= HIGHEST else 0.0,
-            "DM": 0.82 + 4.5 / max(d, LEAST_TRAVEL) if d <= HIGHEST else 0.0,
-            "AM": 1.0 - 0.0032 * a if a <= MOST_TURNED else 0.0,
+            "DM": 0.82 + 4.5 / max(d, 25.0) if d <= HIGHEST else 0.0,
+            "AM": 1.0 - 0.0032 * a if a <= 135.0 else 0.0,
             "FM": _frequency(self.frequency, column),
-            "CM": COUPLING[self.coupling][high],
+            "CM": published("niosh")["coupling"][self.coupling][high],
         }
 
     @property
     def limit(self) -> float:
         """The recommended weight limit, kg; 0 where the equation allows no such lift."""
-        return float(CONSTANT * np.prod(list(self.multipliers.values())))
+        return float(23.0 * np.prod(list(self.multipliers.values())))  # constant, kg
 
     @property
     def index(self) -> float | None:
@@ -169,11 +144,12 @@ def _hands(figure: Figure, q: Array) -> tuple[float, float, float]:
     return float(np.linalg.norm(away)), float(hands[2]), float(turned)
 
 
-def _frequency(asked: float, column: tuple[float, ...]) -> float:
+def _frequency(asked: float, column: list[float]) -> float:
     """The frequency multiplier, interpolated between the frequencies of the table; 0 from where the table has 0."""
-    if asked > FREQUENCIES[-1]:
+    frequencies = published("niosh")["frequencies"]
+    if asked > frequencies[-1]:
         return 0.0
-    upper = next(k for k, frequency in enumerate(FREQUENCIES) if asked <= frequency)
+    upper = next(k for k, frequency in enumerate(frequencies) if asked <= frequency)
     if column[upper] == 0.0:
         return 0.0
-    return float(np.interp(asked, FREQUENCIES, column))
+    return float(np.interp(asked, frequencies, column))

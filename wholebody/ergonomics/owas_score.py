@@ -13,6 +13,7 @@ from math import radians
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import BodyAngles
+from wholebody.ergonomics.published import published
 from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import KNEELING, Work, both_feet
 from wholebody.figures.figure import Figure
@@ -21,34 +22,6 @@ from wholebody.scene.scene import Scene
 BENT = radians(20.0)  # of the trunk forward or backward
 TURNED = radians(20.0)  # of the trunk sideways or about its axis
 BENT_KNEE = radians(30.0)
-
-BACK = ("straight", "bent", "twisted", "bent and twisted")
-ARMS = ("both below the shoulders", "one at the shoulder or above", "both at the shoulders or above")
-LEGS = (
-    "sitting",
-    "standing on two straight legs",
-    "standing on one straight leg",
-    "standing on two bent knees",
-    "standing on one bent knee",
-    "kneeling",
-    "walking",
-)
-LOADS = ("less than 10 kg", "10 to 20 kg", "more than 20 kg")
-
-CATEGORIES = (
-    ("111111111222222111111", "111111111222222111111", "111111111223223111112"),
-    ("223223223333333222233", "223223233344344334234", "334223333344444444234"),
-    ("111111112333444111111", "223111112444444333111", "223111233444444444111"),
-    ("233223223444444444234", "334234334444444444234", "444234334444444444234"),
-)
-"""Action categories by back and arms; in a text by legs, and for each by load."""
-
-ACTIONS = (
-    "no harmful effect",
-    "some harm; correct it in the near future",
-    "distinct harm; correct it as soon as possible",
-    "extreme harm; correct it at once",
-)
 
 
 @dataclass(frozen=True)
@@ -84,16 +57,17 @@ class Owas:
     @property
     def category(self) -> int:
         """The action category, 1 to 4."""
-        return int(CATEGORIES[self.back - 1][self.arms - 1][3 * (self.legs - 1) + self.load - 1])
+        return int(published("owas")["categories"][self.back - 1][self.arms - 1][3 * (self.legs - 1) + self.load - 1])
 
     @property
     def action(self) -> str:
         """What the category says."""
-        return ACTIONS[self.category - 1]
+        return str(published("owas")["actions"][self.category - 1])
 
     def __str__(self) -> str:
         """The code in words."""
-        words = (BACK[self.back - 1], ARMS[self.arms - 1], LEGS[self.legs - 1], LOADS[self.load - 1])
+        digits = {"back": self.back, "arms": self.arms, "legs": self.legs, "loads": self.load}
+        words = [published("owas")[name][digit - 1] for name, digit in digits.items()]
         return f"{self.code}: back {words[0]}, arms {words[1]}, {words[2]}, {words[3]}"
 
 

@@ -18,7 +18,6 @@ from wholebody.motion.clip_torques import clip_torques
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength
 
-FRICTION = 0.8  # coefficient between soles and ground, as for `wb.motion.torques`
 LEGS = ("hip", "knee", "ankle", "toe")
 
 
@@ -80,7 +79,8 @@ def static_torques(
     carrying = with_load(person, load)
     clip = Clip(carrying, np.array([q, q]), 1.0, "posture")
     stands = standing_feet(clip, [f"{side}_foot" for side in SIDES])
-    found = clip_torques(clip, stands, strength, FRICTION, None)
+    # coefficient between soles and ground, as for `wb.motion.torques`
+    found = clip_torques(clip, stands, strength, 0.8, None)
     torques, shares = {}, {}
     for name in person.joints:
         joint = person.model.joints[person.joint_id(name)]

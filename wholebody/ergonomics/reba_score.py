@@ -8,6 +8,7 @@ from math import radians
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
+from wholebody.ergonomics.published import action, published
 from wholebody.ergonomics.rula_score import (
     ABDUCTED,
     DEVIATED,
@@ -22,47 +23,6 @@ from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import COUPLINGS, Work, both_feet
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
-
-TABLE_A = (
-    ((1, 2, 3, 4), (2, 3, 4, 5), (2, 4, 5, 6), (3, 5, 6, 7), (4, 6, 7, 8)),
-    ((1, 2, 3, 4), (3, 4, 5, 6), (4, 5, 6, 7), (5, 6, 7, 8), (6, 7, 8, 9)),
-    ((3, 3, 5, 6), (4, 5, 6, 7), (5, 6, 7, 8), (6, 7, 8, 9), (7, 8, 9, 9)),
-)
-"""Of neck (1 to 3), trunk (1 to 5) and legs (1 to 4)."""
-
-TABLE_B = (
-    ((1, 2, 2), (1, 2, 3)),
-    ((1, 2, 3), (2, 3, 4)),
-    ((3, 4, 5), (4, 5, 5)),
-    ((4, 5, 5), (5, 6, 7)),
-    ((6, 7, 8), (7, 8, 8)),
-    ((7, 8, 8), (8, 9, 9)),
-)
-"""Of upper arm (1 to 6), lower arm (1 or 2) and wrist (1 to 3)."""
-
-TABLE_C = (
-    (1, 1, 1, 2, 3, 3, 4, 5, 6, 7, 7, 7),
-    (1, 2, 2, 3, 4, 4, 5, 6, 6, 7, 7, 8),
-    (2, 3, 3, 3, 4, 5, 6, 7, 7, 8, 8, 8),
-    (3, 4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9),
-    (4, 4, 4, 5, 6, 7, 8, 8, 9, 9, 9, 9),
-    (6, 6, 6, 7, 8, 8, 9, 9, 10, 10, 10, 10),
-    (7, 7, 7, 8, 9, 9, 9, 10, 10, 11, 11, 11),
-    (8, 8, 8, 9, 10, 10, 10, 10, 10, 11, 11, 11),
-    (9, 9, 9, 10, 10, 10, 11, 11, 11, 12, 12, 12),
-    (10, 10, 10, 11, 11, 11, 11, 12, 12, 12, 12, 12),
-    (11, 11, 11, 11, 12, 12, 12, 12, 12, 12, 12, 12),
-    (12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12, 12),
-)
-"""Of score A and score B, 1 to 12."""
-
-ACTIONS = (
-    (1, "negligible risk"),
-    (3, "low risk; change may be needed"),
-    (7, "medium risk; investigate further, change soon"),
-    (10, "high risk; investigate and change"),
-    (15, "very high risk; change now"),
-)
 
 
 @dataclass(frozen=True)
@@ -105,22 +65,22 @@ class RebaParts:
     @property
     def body(self) -> int:
         """Score A: table A and the load."""
-        return TABLE_A[self.neck - 1][self.trunk - 1][self.legs - 1] + self.load
+        return int(published("reba")["A"][self.neck - 1][self.trunk - 1][self.legs - 1]) + self.load
 
     @property
     def arm(self) -> int:
         """Score B: table B and the coupling."""
-        return TABLE_B[self.upper_arm - 1][self.lower_arm - 1][self.wrist - 1] + self.coupling
+        return int(published("reba")["B"][self.upper_arm - 1][self.lower_arm - 1][self.wrist - 1]) + self.coupling
 
     @property
     def score(self) -> int:
         """The REBA score, 1 to 15: table C and the activity."""
-        return TABLE_C[min(self.body, 12) - 1][min(self.arm, 12) - 1] + self.activity
+        return int(published("reba")["C"][min(self.body, 12) - 1][min(self.arm, 12) - 1]) + self.activity
 
     @property
     def action(self) -> str:
         """What the paper says of the score."""
-        return next(words for most, words in ACTIONS if self.score <= most)
+        return action("reba", self.score)
 
 
 class Reba(BothSides[RebaParts]):

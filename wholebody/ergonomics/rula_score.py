@@ -13,62 +13,18 @@ from math import pi, radians
 from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides, SideAngles
+from wholebody.ergonomics.published import action, published
 from wholebody.ergonomics.seat import seen
 from wholebody.ergonomics.work import Work, both_feet
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
-TURNED = radians(10.0)
-"""From which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10 degrees "not clearly
-visible"."""
 NEUTRAL = radians(5.0)
 """Up to which a wrist is neutral, a trunk upright, and a head not in extension."""
 ABDUCTED = radians(20.0)
 RAISED = 0.03  # m: of a shoulder
-OUTWARD = radians(30.0)  # of a forearm out of the sagittal plane: "out to the side of the body"
 DEVIATED = radians(10.0)  # of a wrist from its middle line
-RIGHT_ANGLE = radians(90.0)  # between trunk and thighs, from which a seated trunk with a back is well supported
 END_OF_TWIST = radians(45.0)  # half of the forearm's usual range to either side: "at or near the end of range"
-
-TABLE_A = (
-    (((1, 2), (2, 2), (2, 3), (3, 3)), ((2, 2), (2, 2), (3, 3), (3, 3)), ((2, 3), (3, 3), (3, 3), (4, 4))),
-    (((2, 3), (3, 3), (3, 4), (4, 4)), ((3, 3), (3, 3), (3, 4), (4, 4)), ((3, 4), (4, 4), (4, 4), (5, 5))),
-    (((3, 3), (4, 4), (4, 4), (5, 5)), ((3, 4), (4, 4), (4, 4), (5, 5)), ((4, 4), (4, 4), (4, 5), (5, 5))),
-    (((4, 4), (4, 4), (4, 5), (5, 5)), ((4, 4), (4, 4), (4, 5), (5, 5)), ((4, 4), (4, 5), (5, 5), (6, 6))),
-    (((5, 5), (5, 5), (5, 6), (6, 7)), ((5, 6), (6, 6), (6, 7), (7, 7)), ((6, 6), (6, 7), (7, 7), (7, 8))),
-    (((7, 7), (7, 7), (7, 8), (8, 9)), ((8, 8), (8, 8), (8, 9), (9, 9)), ((9, 9), (9, 9), (9, 9), (9, 9))),
-)
-"""Of upper arm (1 to 6), lower arm (1 to 3), wrist (1 to 4) and wrist twist (1 to 2)."""
-
-TABLE_B = (
-    ((1, 3), (2, 3), (3, 4), (5, 5), (6, 6), (7, 7)),
-    ((2, 3), (2, 3), (4, 5), (5, 5), (6, 7), (7, 7)),
-    ((3, 3), (3, 4), (4, 5), (5, 6), (6, 7), (7, 7)),
-    ((5, 5), (5, 6), (6, 7), (7, 7), (7, 7), (8, 8)),
-    ((7, 7), (7, 7), (7, 8), (8, 8), (8, 8), (8, 8)),
-    ((8, 8), (8, 8), (8, 8), (8, 9), (9, 9), (9, 9)),
-)
-"""Of neck (1 to 6), trunk (1 to 6) and legs (1 to 2)."""
-
-TABLE_C = (
-    (1, 2, 3, 3, 4, 5, 5),
-    (2, 2, 3, 4, 4, 5, 5),
-    (3, 3, 3, 4, 4, 5, 6),
-    (3, 3, 3, 4, 5, 6, 6),
-    (4, 4, 4, 5, 6, 7, 7),
-    (4, 4, 5, 6, 6, 7, 7),
-    (5, 5, 6, 6, 7, 7, 7),
-    (5, 5, 6, 7, 7, 7, 7),
-)
-"""Of score C (arm and wrist, 1 to 8 and more) and score D (neck, trunk and legs, 1 to 7 and more)."""
-
-ACTIONS = (
-    (2, "acceptable"),
-    (4, "investigate further; changes may be needed"),
-    (6, "investigate and change soon"),
-    (7, "investigate and change at once"),
-)
-"""Greatest score of each action level, and what the paper says of it."""
 
 
 @dataclass(frozen=True)
@@ -112,23 +68,24 @@ class RulaParts:
     @property
     def arm(self) -> int:
         """Posture score A, of table A."""
-        return TABLE_A[self.upper_arm - 1][self.lower_arm - 1][self.wrist - 1][self.wrist_twist - 1]
+        table = published("rula")["A"]
+        return int(table[self.upper_arm - 1][self.lower_arm - 1][self.wrist - 1][self.wrist_twist - 1])
 
     @property
     def body(self) -> int:
         """Posture score B, of table B."""
-        return TABLE_B[self.neck - 1][self.trunk - 1][self.legs - 1]
+        return int(published("rula")["B"][self.neck - 1][self.trunk - 1][self.legs - 1])
 
     @property
     def score(self) -> int:
         """The grand score, 1 to 7, of table C."""
         more = self.muscle + self.force
-        return TABLE_C[min(self.arm + more, 8) - 1][min(self.body + more, 7) - 1]
+        return int(published("rula")["C"][min(self.arm + more, 8) - 1][min(self.body + more, 7) - 1])
 
     @property
     def action(self) -> str:
         """What the paper says of the score."""
-        return next(words for most, words in ACTIONS if self.score <= most)
+        return action("rula", self.score)
 
 
 class Rula(BothSides[RulaParts]):
@@ -153,9 +110,10 @@ def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
 def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
+    # of a forearm out of the sagittal plane: "out to the side of the body"
     return RulaParts(
         upper_arm=_upper_arm(arm, work),
-        lower_arm=lower_arm(arm) + int(arm.across or arm.forearm_outward > OUTWARD),
+        lower_arm=lower_arm(arm) + int(arm.across or arm.forearm_outward > radians(30.0)),
         wrist=_wrist(arm),
         wrist_twist=1 + int(abs(arm.forearm_twist) > END_OF_TWIST),
         neck=_neck(angles),
@@ -183,7 +141,9 @@ def lower_arm(arm: SideAngles) -> int:
 
 def turned(*angles: float) -> int:
     """How many of some angles, to one or the other side, count as turned."""
-    return sum(abs(angle) > TURNED for angle in angles)
+    # from which a trunk or neck counts as twisted or bent sideways: EN 1005-4 (2005) calls up to 10
+    # degrees "not clearly visible"
+    return sum(abs(angle) > radians(10.0) for angle in angles)
 
 
 def _upper_arm(arm: SideAngles, work: Work) -> int:
@@ -207,7 +167,8 @@ def _trunk(angles: BodyAngles, work: Work) -> int:
     """A trunk that rests on a back scores 1 if it is at least at a right angle to the thighs, however it leans."""
     bent = abs(angles.trunk_flexion)
     opened = pi - max(angles.left.thigh_slope, angles.right.thigh_slope) - angles.trunk_flexion
-    rests = bool(work.back_supported) and work.sits(angles) and opened >= RIGHT_ANGLE
+    # between trunk and thighs, from which a seated trunk with a back is well supported
+    rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
     score = 1 if rests else 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return score + turned(angles.trunk_twist, angles.trunk_lateral)
 

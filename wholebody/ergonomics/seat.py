@@ -14,9 +14,6 @@ from wholebody.scene.scene import Scene
 
 SEATED = ("pelvis", "left_thigh", "right_thigh")
 TRUNK = ("thorax", "upper_lumbar", "lower_lumbar")
-NEAR = 0.005  # m: up to which a body rests on a thing, as the viewer colours contacts
-BELOW = 0.5  # upward part of a contact's unit normal, from which the thing is rather below than beside
-RECLINED = radians(70.0)  # of the trunk against the vertical: who is beyond lies
 
 
 class Seen(NamedTuple):
@@ -65,14 +62,17 @@ def seen(body: Figure | Scene, q: Array, work: Work | None, what: str) -> Seen:
 
 def _bearers(scene: Scene, q: Array, angles: BodyAngles) -> tuple[str | None, str | None]:
     """Names of the things nearest below pelvis or thighs and at the trunk; no seat for who lies."""
-    lies = max(abs(angles.trunk_flexion), abs(angles.trunk_lateral)) > RECLINED
-    found, seat, rest = scene.contacts(q, within=NEAR), None, None
+    # of the trunk against the vertical: who is beyond lies
+    lies = max(abs(angles.trunk_flexion), abs(angles.trunk_lateral)) > radians(70.0)
+    # m: up to which a body rests on a thing, as the viewer colours contacts
+    found, seat, rest = scene.contacts(q, within=0.005), None, None
     for (one, other), normal in zip(found.pair, found.normal, strict=True):
         owners = scene.piece_owner[one], scene.piece_owner[other]
         for thing, segment, up in ((*owners, normal[2]), (*owners[::-1], -normal[2])):
             if thing not in scene.objects or scene.objects[thing].segment is not None:
                 continue  # what is carried bears nobody
-            if segment in SEATED and up > BELOW and not lies:
+            # upward part of a contact's unit normal, from which the thing is rather below than beside
+            if segment in SEATED and up > 0.5 and not lies:
                 seat = seat or thing
             if segment in TRUNK:
                 rest = rest or thing

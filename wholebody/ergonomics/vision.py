@@ -19,12 +19,9 @@ from wholebody.tasks import inputs
 EYES = "gaze"
 """Frame between the eyes; its x axis points ahead."""
 
-OWN = ("head", "neck")
-"""Segments that do not hide anything from their own eyes."""
 
 RAY = 1e-3  # m: radius of a line of sight
 NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
-HALVINGS = 16  # of a line of sight, to find where it meets a piece first: 0.2 mm of ten metres
 BLURRED = 0.05  # m: nearer points are not seen
 
 
@@ -145,17 +142,18 @@ def _between(scene: Scene, q: Array, eyes: Array, target: Array, distance: float
         return _meet(shape, there, coal.Capsule(RAY, reach), at)
 
     spot, found, nearest = coal.Transform3s(np.eye(3), target), "", length
+    # segments that do not hide anything from their own eyes
     pieces = [
         (piece.geometry, owner, coal.Transform3s(place.rotation, place.translation))
         for piece, owner, place in zip(scene.geometry.geometryObjects, scene.piece_owner, placed.oMg, strict=True)
-        if owner not in OWN
+        if owner not in ("head", "neck")
     ]
     looked_at = {owner for shape, owner, there in pieces if _meet(shape, there, coal.Sphere(RAY), spot)}
     for shape, owner, there in pieces:
         if owner in looked_at or not meets(shape, there, nearest):
             continue
         free = 0.0
-        for _ in range(HALVINGS):
+        for _ in range(16):  # halvings of a line of sight, to find where it meets a piece first: 0.2 mm of ten metres
             middle = 0.5 * (free + nearest)
             free, nearest = (free, middle) if meets(shape, there, middle) else (middle, nearest)
         found = owner

@@ -11,12 +11,7 @@ from wholebody.ergonomics.angles import BodyAngles
 COUPLINGS = ("good", "fair", "poor", "unacceptable")
 HEAVIEST = 200.0  # kg
 
-SEATED_SLOPE = 0.7854  # rad: of both thighs, from which a body with bent knees counts as seated
-SEATED_KNEE = 0.5236  # rad: 30 degrees
-LYING = 2.0  # rad: a thigh that points upwards belongs to nobody who sits
-BEHIND = -0.12  # m: centre of mass before the ankles; farther back nobody stands on their feet
 KNEELING = 0.12  # m: height of a knee above the lower ankle up to which it is on the ground
-RAISED_FOOT = 0.08  # m: height of an ankle above the other up to which both feet stand
 BOTH_FEET = 0.1  # share of the weight that a foot bears at least if both stand
 
 
@@ -76,12 +71,16 @@ class Work:
         checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.ergonomics.body_angles(figure, q)")
         if self.seated is not None:
             return self.seated
+        # rad: of both thighs, from which a body with bent knees counts as seated
+        # rad: 30 degrees
         lies = all(
-            side.thigh_slope > SEATED_SLOPE and side.knee_flexion > SEATED_KNEE and side.knee_height > KNEELING
+            side.thigh_slope > 0.7854 and side.knee_flexion > 0.5236 and side.knee_height > KNEELING
             for side in (angles.left, angles.right)
         )
-        behind = angles.center_ahead < BEHIND
-        return lies and behind and max(angles.left.thigh_slope, angles.right.thigh_slope) < LYING
+        # m: centre of mass before the ankles; farther back nobody stands on their feet
+        behind = angles.center_ahead < -0.12
+        # rad: a thigh that points upwards belongs to nobody who sits
+        return lies and behind and max(angles.left.thigh_slope, angles.right.thigh_slope) < 2.0
 
 
 def check_work(work: object, what: str) -> Work:
@@ -95,5 +94,6 @@ def check_work(work: object, what: str) -> Work:
 
 def both_feet(angles: BodyAngles) -> bool:
     """Whether both feet bear weight."""
-    level = max(angles.left.foot_height, angles.right.foot_height) <= RAISED_FOOT
+    # m: height of an ankle above the other up to which both feet stand
+    level = max(angles.left.foot_height, angles.right.foot_height) <= 0.08
     return level and BOTH_FEET <= angles.left_share <= 1.0 - BOTH_FEET

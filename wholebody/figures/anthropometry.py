@@ -19,20 +19,21 @@ from statistics import NormalDist
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import number, shown
+from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.fields import Range
 
-STATURE_RANGE = (1.3, 2.2)
-"""Metres. The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
+STATURE = Range(1.3, 2.2, "m")
+"""The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
 
-MASS_RANGE = (25.0, 250.0)
-"""Kilograms."""
+MASS = Range(25.0, 250.0, "kg")
+PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
 
 BODY_MASS_INDEX_RANGE = (13.0, 50.0)
 """kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
 
-AGE_RANGE = (20.0, 69.0)
-"""Years of the adults whose ranges of motion were measured (table "age_ranges")."""
+AGE = Range(20.0, 69.0, "years")
+"""Of the adults whose ranges of motion were measured (table "age_ranges")."""
 
 _SEXES = {"male": "M", "female": "F"}
 
@@ -181,21 +182,21 @@ def make_person(
     if percentile is not None:
         if stature is not None and mass is not None:
             raise InputError("stature and mass are given, which leaves nothing to percentile; leave one out")
-        share = number(percentile, "percentile", 1.0, 99.0, "percent, such as 95")
+        share = PERCENTILE(percentile, "percentile")
         stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
         mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:
         factor, exponent = _EXPECTED_MASS[column]
-        mass = factor * number(stature, "stature", *STATURE_RANGE, "m") ** exponent
-    height = number(float(median["stature_m"]) if stature is None else stature, "stature", *STATURE_RANGE, "m")
-    weight = number(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass", *MASS_RANGE, "kg")
+        mass = factor * STATURE(stature, "stature") ** exponent
+    height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
+    weight = MASS(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass")
     index = weight / height**2
     if not BODY_MASS_INDEX_RANGE[0] <= index <= BODY_MASS_INDEX_RANGE[1]:
         low, high = (limit * height**2 for limit in BODY_MASS_INDEX_RANGE)
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )
-    return Person(sex, height, weight, age=None if age is None else number(age, "age", *AGE_RANGE, "years"))
+    return Person(sex, height, weight, age=None if age is None else AGE(age, "age"))
 
 
 def _percentile(column: str, dimension: str, percentile: float) -> float:

@@ -13,8 +13,9 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import known, number, shown
+from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
 from wholebody.base.records import with_values
 from wholebody.geometry.convex import HULL_VERTICES, coacd_version, convex_pieces, mesh_hull
 from wholebody.geometry.hull import hull_piece
@@ -57,8 +58,8 @@ class LinkShape(NamedTuple):
     name: str = ""
 
 
-CONCAVITY = (0.01, 1.0)
-"""Least and greatest concavity of the pieces, as a share of a mesh's size: close pieces, and hulls."""
+CONCAVITY = Range(0.01, 1.0)
+"""Concavity of the pieces, as a share of a mesh's size, from close pieces to hulls."""
 
 
 def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
@@ -73,10 +74,10 @@ def check_concavity(concavity: object, links: Iterable[str]) -> Concavity:
         return None
     if isinstance(concavity, Mapping):
         return {
-            known(link, names, "link", "concavity"): number(value, f"concavity of link {shown(link)}", *CONCAVITY)
+            known(link, names, "link", "concavity"): CONCAVITY(value, f"concavity of link {shown(link)}")
             for link, value in concavity.items()
         }
-    return number(concavity, "concavity", *CONCAVITY, "or None for hulls")
+    return CONCAVITY(concavity, "concavity")
 
 
 def link_pieces(shape: LinkShape, concavity: Concavity) -> tuple[list[tuple[Any, pin.SE3]], tuple[str, ...]]:

@@ -43,7 +43,7 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
     """
     from wholebody.figures.hand import hand_figure
     from wholebody.figures.human.figure import avatar_figure, human_figure
-    from wholebody.figures.mjcf_figure import xml_figure
+    from wholebody.figures.mjcf.figure import xml_figure
     from wholebody.figures.urdf.figure import urdf_figure
 
     if not isinstance(spec, (str, PathLike)):

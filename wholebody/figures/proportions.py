@@ -15,10 +15,13 @@ from functools import cache, lru_cache
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import known, number, shown
+from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
 from wholebody.figures.anthropometry import Person, table
 from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
+
+DIMENSION = Range(0.0, 3.0, "m")
 
 FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
@@ -64,7 +67,7 @@ def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Per
         raise InputError(f"proportions is {shown(proportions)}; give metres by dimension: {{'sitting_height': 0.93}}")
     names = dimension_names()
     stated = {
-        known(name, names, "dimension", "proportions"): number(value, f"proportions: {name}", 0.0, 3.0, "m")
+        known(name, names, "dimension", "proportions"): DIMENSION(value, f"proportions: {name}")
         for name, value in proportions.items()
     }
     return _proportioned(person, tuple(sorted(stated.items()))) if stated else person

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import coal
 import numpy as np
@@ -15,11 +16,11 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, InputError, WholebodyError
-from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description
+from wholebody.figures.description import ROOT_JOINT, Articulated, Chain, Description, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, LinkShape, link_pieces
 from wholebody.figures.rest_posture import RestPosture, rest_posture
-from wholebody.figures.self_pairs import choose_pairs
+from wholebody.figures.self_pairs import choose_pairs, drop_pairs
 from wholebody.figures.urdf.file import LinkVisual
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.pieces import SMALLEST
@@ -30,44 +31,70 @@ DATA_KEPT = 4
 COLOR = (0.62, 0.66, 0.70, 1.0)
 
 
-def robot_figure(
-    name: str,
-    model: pin.Model,
-    links: tuple[str, ...],
-    geometry: pin.GeometryModel,
-    notes: Iterable[str],
-    samples: int,
-    seed: int,
-    visual: pin.GeometryModel | None = None,
-) -> Figure:
-    """Return the figure of a robot from its model and geometry alone.
+class Robot(NamedTuple):
+    """A robot as a file has it.
 
-    Args:
+    Attributes:
         name: of the robot.
         model: Pinocchio's model.
         links: names, the root link first.
-        geometry: the pieces; this function chooses its pairs.
-        notes: changes made so far.
+        geometry: the pieces; their pairs are chosen.
+        notes: sentences on what was changed or left out.
+        visual: what is drawn; the pieces if None.
+        frames: names of more frames for goals.
+        postures: named postures of the file, (nq,).
+        cones: limits of ball joints.
+        untested: why two pieces, by their numbers, are never tested by the file; None where it does not say.
+        place: of a free root in the first posture.
+    """
+
+    name: str
+    model: pin.Model
+    links: tuple[str, ...]
+    geometry: pin.GeometryModel
+    notes: tuple[str, ...] = ()
+    visual: pin.GeometryModel | None = None
+    frames: tuple[str, ...] = ()
+    postures: Mapping[str, Array] = MappingProxyType({})
+    cones: Mapping[str, JointCone] = MappingProxyType({})
+    untested: Callable[[int, int], str | None] | None = None
+    place: pin.SE3 | None = None
+
+
+def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
+    """Return the figure of a robot.
+
+    Args:
+        robot: as its file has it.
         samples: number of random postures for choosing the pairs.
         seed: of those postures.
-        visual: what is drawn; the pieces if None.
     """
+    model, geometry, links = robot.model, robot.geometry, robot.links
     excluded = choose_pairs(model, geometry, samples, seed)
+    if robot.untested is not None:
+        told = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
+        for reason in sorted(set(filter(None, told))):
+            told_now = [robot.untested(pair.first, pair.second) for pair in geometry.collisionPairs]
+            excluded += tuple(drop_pairs(geometry, [k for k, why in enumerate(told_now) if why == reason], reason))
     rest = rest_posture(model, geometry, seed)
+    if robot.place is not None:
+        rest.q[:7] = rest.zero[:7] = pin.SE3ToXYZQUAT(robot.place)
     carrying = {model.frames[piece.parentFrame].name for piece in geometry.geometryObjects}
     postures = {"neutral": partial(_copied, q=rest.q)}
     if np.abs(rest.q - rest.zero).max(initial=0.0) > 1e-12:
         postures["zero"] = partial(_copied, q=rest.zero)
+    postures |= {name: partial(_copied, q=q) for name, q in robot.postures.items() if name not in postures}
     description = Description(
         groups={"all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
         chains=link_chains(model, links),
-        frames=links,
+        frames=(*links, *robot.frames),
         segments=tuple(link for link in links if link in carrying) or links,
         postures=postures,
+        cones=robot.cones,
         excluded=(*excluded, *rest.excluded),
-        notes=(*notes, *_told(rest)),
+        notes=(*robot.notes, *_told(rest)),
     )
-    return Figure(name, model, geometry, "own", description, visual)
+    return Figure(robot.name, model, geometry, "own", description, robot.visual)
 
 
 def _copied(figure: Articulated, q: Array) -> Array:
@@ -150,6 +177,14 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
     return geometry_model(made) if made else None
 
 
+class LinkGeometry(NamedTuple):
+    """The convex pieces of links; one sentence on each change; number of the shape that each piece belongs to."""
+
+    geometry: pin.GeometryModel
+    notes: tuple[str, ...]
+    shapes: tuple[int, ...]
+
+
 def geometry_of_links(
     model: pin.Model,
     shapes: Iterable[LinkShape],
@@ -157,7 +192,7 @@ def geometry_of_links(
     path: Path,
     named: bool = False,
     colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
-) -> tuple[pin.GeometryModel, tuple[str, ...]]:
+) -> LinkGeometry:
     """Return the convex pieces of links, and one sentence on each change.
 
     Args:
@@ -171,9 +206,9 @@ def geometry_of_links(
     Raises:
         FileFormatError: a mesh that cannot be read, with the link.
     """
-    made, notes = [], []
+    made, notes, numbers = [], [], []
     count: dict[str, int] = {}
-    for shape in shapes:
+    for number, shape in enumerate(shapes):
         try:
             pieces, remarks = link_pieces(shape, concavity)
         except WholebodyError as error:
@@ -193,4 +228,5 @@ def geometry_of_links(
             piece.meshColor[:] = colors.get(shape.link, COLOR)
             piece.overrideMaterial = shape.link in colors  # Pinocchio's sign that a viewer shall use this colour
             made.append(piece)
-    return geometry_model(made), tuple(notes)
+            numbers.append(number)
+    return LinkGeometry(geometry_model(made), tuple(notes), tuple(numbers))

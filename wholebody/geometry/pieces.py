@@ -8,8 +8,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import array, number, shown
-from wholebody.base.errors import InputError
 
 SMALLEST = 1e-4
 """Least extent of a piece, metres: below 1e-5 m coal reads gaps as zero, and at 1e-6 m it loses the depth."""
@@ -43,24 +41,3 @@ def box_corners(geometry: Any) -> Array:
     own.computeLocalAABB()
     sides = np.array([own.aabb_local.min_, own.aabb_local.max_])
     return np.array([[sides[x, 0], sides[y, 1], sides[z, 2]] for x, y, z in np.ndindex(2, 2, 2)])
-
-
-def check_length(value: object, what: str) -> float:
-    """Return a length as a float.
-
-    Raises:
-        InputError: not a number, or not within SMALLEST ... LARGEST metres.
-    """
-    return number(value, what, SMALLEST, LARGEST, "m")
-
-
-def check_vector(value: object, what: str) -> tuple[float, float, float]:
-    """Return three finite numbers.
-
-    Raises:
-        InputError: not three numbers, or one that is not finite.
-    """
-    vector = array(value, what, "three finite numbers")
-    if vector.shape != (3,) or not np.isfinite(vector).all():
-        raise InputError(f"{what} is {shown(value)}; give three finite numbers")
-    return float(vector[0]), float(vector[1]), float(vector[2])

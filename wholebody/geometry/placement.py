@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TypeAlias
 
@@ -9,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.checks import array
+from wholebody.base.checks import array, numbers
 from wholebody.base.errors import InputError
 
 PlacementLike: TypeAlias = Sequence[float] | NDArray[np.float64] | pin.SE3
@@ -67,6 +68,22 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
     raise InputError(
         f"{what}: shape {values.shape} is none of (3,) position, (7,) position and quaternion, (4, 4) matrix{angles}"
     )
+
+
+def unit_vector(value: object, what: str) -> tuple[float, float, float]:
+    """The unit vector along another.
+
+    Raises:
+        InputError: not three finite numbers, or too short or too long to have a direction.
+    """
+    x, y, z = numbers(value, (3,), what).tolist()
+    length = math.hypot(x, y, z)
+    if not 1e-9 <= length <= 1e9:
+        raise InputError(
+            f"{what} is {[x, y, z]} and has no direction; give a vector of a length from 1e-09 to 1e+09, such as "
+            "(0, 0, 1)"
+        )
+    return x / length, y / length, z / length
 
 
 def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what: str) -> pin.SE3:

@@ -7,23 +7,22 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
 from itertools import pairwise
 from os import PathLike
-from typing import Literal, Protocol, runtime_checkable
+from typing import Annotated, Literal, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import array, choice, number, path, settle, shown, whole
+from wholebody.base.checks import array, path, shown
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import check_mesh, convex_pieces
 from wholebody.geometry.hull import check_points, hull_piece
 from wholebody.geometry.mesh_cache import ConvexPieces
 from wholebody.geometry.meshes import Y_UP, read_mesh
-from wholebody.geometry.pieces import LARGEST, Piece, check_length, check_vector
-
-MAX_VERTICES = (8, 256)
-"""Least and greatest `Mesh.max_vertices`."""
+from wholebody.geometry.pieces import LARGEST, SMALLEST, Piece
+from wholebody.geometry.placement import unit_vector
 
 MOST_CORNERS = 2**31
 """Greatest index of a vertex."""
@@ -34,12 +33,14 @@ SIDES = 64
 SECTORS, TUBE_SIDES = 24, 12
 """Pieces of a ring, and sides of its tube: 24 and 12 are 1 % of the radius and 4 % of the tube too far out."""
 
-THRESHOLD = (0.01, 1.0)
-"""Least and greatest `Mesh.threshold`."""
+LENGTH = Range(SMALLEST, LARGEST, "m")
+Length: TypeAlias = Annotated[float, LENGTH]
+Lengths: TypeAlias = Annotated[tuple[float, float, float], Vector(3, LENGTH)]
 
 __all__ = [
     "Box",
     "Capsule",
+    "Compound",
     "Cylinder",
     "Ellipsoid",
     "HalfSpace",
@@ -52,7 +53,7 @@ __all__ = [
 ]
 
 
-class Shape(ABC):
+class Shape(Checked, ABC):
     """A solid, in its own axes, metres.
 
     Raises:
@@ -77,10 +78,7 @@ class Box(Shape):
         size: full lengths along x, y and z, metres.
     """
 
-    size: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "size", _lengths(self.size, "Box size"))
+    size: Lengths
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Box."""
@@ -97,10 +95,7 @@ class Sphere(Shape):
         radius: metres.
     """
 
-    radius: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", check_length(self.radius, "Sphere radius"))
+    radius: Length
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Sphere."""
@@ -118,12 +113,8 @@ class Capsule(Shape):
         length: of the segment, without the two half balls, metres.
     """
 
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", check_length(self.radius, "Capsule radius"))
-        object.__setattr__(self, "length", check_length(self.length, "Capsule length"))
+    radius: Length
+    length: Length
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Capsule."""
@@ -144,12 +135,8 @@ class Cylinder(Shape):
         length: along z, metres.
     """
 
-    radius: float
-    length: float
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", check_length(self.radius, "Cylinder radius"))
-        object.__setattr__(self, "length", check_length(self.length, "Cylinder length"))
+    radius: Length
+    length: Length
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
@@ -178,14 +165,13 @@ class Torus(Shape):
         InputError: a length out of range, or the tube is not thinner than the ring.
     """
 
-    radius: float
-    tube: float
+    radius: Length
+    tube: Length
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "radius", check_length(self.radius, "Torus radius"))
-        object.__setattr__(self, "tube", check_length(self.tube, "Torus tube"))
+        super().__post_init__()
         if not self.tube < self.radius:
-            raise InputError(f"Torus tube is {self.tube:g} m; give less than the radius of {self.radius:g} m")
+            raise InputError(f"Torus: tube is {self.tube:g} m; give less than the radius of {self.radius:g} m")
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex a sector: the hull of the tube's circles at both of its ends."""
@@ -204,11 +190,6 @@ class Torus(Shape):
         return sum(piece.volume for piece in self.pieces()) / exact - 1.0
 
 
-def _lengths(value: object, what: str) -> tuple[float, ...]:
-    """Three lengths, metres."""
-    return tuple(check_length(length, what) for length in check_vector(value, what))
-
-
 def around(radius: float, sides: int) -> Array:
     """Corners (sides, 2) of the regular polygon around a circle."""
     angles = 2.0 * math.pi * np.arange(sides) / sides
@@ -223,10 +204,7 @@ class Ellipsoid(Shape):
         semi_axes: half lengths along x, y and z, metres.
     """
 
-    semi_axes: tuple[float, float, float]
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "semi_axes", _lengths(self.semi_axes, "Ellipsoid semi_axes"))
+    semi_axes: Lengths
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Ellipsoid."""
@@ -248,19 +226,8 @@ class HalfSpace(Shape):
         InputError: the normal has no length, or a value is no number or out of range.
     """
 
-    normal: tuple[float, float, float] = (0.0, 0.0, 1.0)
-    offset: float = 0.0
-
-    def __post_init__(self) -> None:
-        normal = check_vector(self.normal, "HalfSpace normal")
-        length = math.hypot(*normal)
-        if not 1e-9 < length < 1e9:
-            raise InputError(
-                f"HalfSpace normal is {shown(self.normal)}; give a direction out of the solid, such as (0, 0, 1)"
-            )
-        offset = number(self.offset, "HalfSpace offset", -LARGEST, LARGEST, "m")
-        object.__setattr__(self, "normal", tuple(x / length for x in normal))
-        object.__setattr__(self, "offset", offset)
+    normal: Annotated[tuple[float, float, float], unit_vector] = (0.0, 0.0, 1.0)
+    offset: Annotated[float, Range(-LARGEST, LARGEST, "m")] = 0.0
 
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Halfspace, of infinite volume."""
@@ -283,7 +250,7 @@ class Hull(Shape):
     points: Array
 
     def __post_init__(self) -> None:
-        points = check_points(array(self.points, "Hull points", "an array of shape (n, 3)"), "Hull")
+        points = check_points(array(self.points, "Hull: points", "an array of shape (n, 3)"), "Hull")
         hull_piece(points, "Hull")
         points.setflags(write=False)
         object.__setattr__(self, "points", points)
@@ -291,6 +258,25 @@ class Hull(Shape):
     def pieces(self) -> tuple[Piece, ...]:
         """One coal Convex."""
         return (hull_piece(self.points, "Hull"),)
+
+
+@dataclass(frozen=True, eq=False)
+class Compound(Shape):
+    """Shapes that are one thing.
+
+    Attributes:
+        parts: each shape, and its placement.
+    """
+
+    parts: tuple[tuple[Shape, pin.SE3], ...]
+
+    def pieces(self) -> tuple[Piece, ...]:
+        """The pieces of all shapes."""
+        return tuple(
+            Piece(piece.geometry, at * piece.placement, piece.volume)
+            for shape, at in self.parts
+            for piece in shape.pieces()
+        )
 
 
 @runtime_checkable
@@ -328,18 +314,15 @@ class Mesh(Shape):
     """
 
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
-    scale: float = 1.0
+    scale: Annotated[float, Range(1e-12, 1e12, wanted="metres for each unit of the file, such as 0.001")] = 1.0
     up: Literal["z", "y"] = "z"
-    max_vertices: int = 32
-    threshold: float = 0.05
+    max_vertices: Annotated[int, Range(8, 256, whole=True)] = 32
+    threshold: Annotated[float, Range(0.01, 1.0)] = 0.05
     vertices: Array = field(init=False, repr=False)
     faces: NDArray[np.int64] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        scale = number(self.scale, "Mesh scale", 1e-12, 1e12, "metres for each unit of the file, such as 0.001")
-        choice(self.up, ("z", "y"), "Mesh up")
-        settle(self, "max_vertices", whole(self.max_vertices, "Mesh max_vertices", *MAX_VERTICES))
-        settle(self, "threshold", number(self.threshold, "Mesh threshold", *THRESHOLD))
+        super().__post_init__()
         if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
             object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):
@@ -356,7 +339,7 @@ class Mesh(Shape):
                 "arrays (vertices, faces)"
             )
         with np.errstate(over="ignore"):  # overflowed values are refused as not finite
-            vertices = vertices * scale
+            vertices = vertices * self.scale
         vertices, faces = check_mesh(vertices, faces, self._name())
         vertices = vertices @ Y_UP.T if self.up == "y" else vertices.copy()
         faces = faces.copy()

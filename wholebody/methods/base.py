@@ -12,7 +12,7 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import number, posture, time_step
+from wholebody.base.checks import posture, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.methods.control import Progress
@@ -212,7 +212,7 @@ class SolvingTracker(NotCopyable):
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
         """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
         if tolerance is not None:
-            tolerance = number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+            tolerance = TOLERANCE(tolerance, "tolerance")
         solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
         return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
 

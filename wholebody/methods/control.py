@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from wholebody.assessment.posture import Assessment
-from wholebody.base.checks import a, number
+from wholebody.base.checks import a
 from wholebody.base.compiled import compile_seconds
 from wholebody.base.errors import InputError, UndefinedTermError
 from wholebody.solution import TraceEntry
@@ -21,9 +21,6 @@ from wholebody.solution import TraceEntry
 LONGEST = 4.0
 """Default time limit of a solve, seconds of processor time. Few solves come near it, and the load of the machine does
 not change their answers."""
-
-LIMITS = (1e-9, 1e9)
-"""Least and greatest time limit, seconds."""
 
 Progress = Callable[[TraceEntry], Any]
 """Called after every iteration with its entry of the trace; if it returns True, the solve ends."""
@@ -137,14 +134,3 @@ def ctrl_c_ends_all() -> Iterator[None]:
         yield
     finally:
         signal.signal(signal.SIGINT, signal.default_int_handler)
-
-
-def check_time_limit(value: float | None) -> float | None:
-    """A method's setting `time_limit`.
-
-    Raises:
-        InputError: it is neither None nor a positive number.
-    """
-    if value is None or (isinstance(value, float) and value == np.inf):
-        return value
-    return number(value, "time_limit", *LIMITS, "s, math.inf for no limit, or None")

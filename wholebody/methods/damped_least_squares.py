@@ -18,19 +18,20 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
-from wholebody.base.checks import settle
+from wholebody.base.fields import Checked
 from wholebody.figures.state import State
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import REST
-from wholebody.methods.inputs import DAMPING, ITERATIONS, TOLERANCE, check_problem, check_settings
+from wholebody.methods.inputs import DAMPING, Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution, TraceEntry
 from wholebody.tasks.answers import values
@@ -42,7 +43,7 @@ RANK = 1e-8  # squared singular values below this share of the largest count as 
 
 
 @dataclass(frozen=True)
-class DampedLeastSquares(SolvesAnew):
+class DampedLeastSquares(Checked, SolvesAnew):
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
@@ -59,19 +60,10 @@ class DampedLeastSquares(SolvesAnew):
             ends after four seconds of processor time.
     """
 
-    tolerance: float = 1e-5
-    iterations: int = 300
-    damping: float = 1e-3
-    time_limit: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-        """
-        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, damping=DAMPING)
-        settle(self, "time_limit", check_time_limit(self.time_limit))
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 300
+    damping: Annotated[float, DAMPING] = 1e-3
+    time_limit: TimeLimit = None
 
     @property
     def name(self) -> str:

@@ -13,7 +13,7 @@ from scipy.special import ndtri
 from wholebody.base import checks
 from wholebody.base.errors import InputError
 from wholebody.ergonomics.vision import sight
-from wholebody.figures.anthropometry import STATURE_RANGE, table
+from wholebody.figures.anthropometry import STATURE, table
 from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.records import Records
@@ -22,9 +22,7 @@ from wholebody.studies.task_files import TaskFile
 from wholebody.tasks import inputs
 
 SEXES = {"male": "M", "female": "F"}
-MOST_PEOPLE = 10_000
 REACHED = 1e-3  # m, rad: by which a goal may be missed by somebody who reaches it
-FITS = 1e-4  # m, rad: by which limits, constraints and distances may be violated by somebody who fits
 
 
 @dataclass(frozen=True)
@@ -71,14 +69,14 @@ def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[st
     Raises:
         InputError: a value of the wrong kind or range.
     """
-    count = checks.whole(count, "people: count", 1, MOST_PEOPLE)
+    count = checks.whole(count, "people: count", 1, 10_000)  # most people
     found = {}
     for sex in checks.listed(sexes, "people: sexes", "['male', 'female']"):
         checks.choice(sex, SEXES, "people: a sex")
         mean, deviation = _statures(sex)
         for k in range(count):
             part = (k + 0.5) / count
-            stature = float(np.clip(mean + deviation * ndtri(part), *STATURE_RANGE))
+            stature = float(np.clip(mean + deviation * ndtri(part), STATURE.low, STATURE.high))
             found[f"{sex} P{100.0 * part:.3g}"] = {"sex": sex, "stature": stature}
     if not found:
         raise InputError("people: sexes is empty; give 'male', 'female' or both")
@@ -119,9 +117,10 @@ def accommodation(
     population = people(count, sexes)
     records = study(task, people=population, method=method, jobs=jobs, folder=folder, progress=progress)
     reaches = tuple(one.q is not None and one.goal_error <= REACHED and one.goal_angle <= REACHED for one in records)
+    # m, rad: by which limits, constraints and distances may be violated by somebody who fits
     fits = tuple(
         one.q is not None
-        and all(missed <= FITS for missed in (one.penetration, one.limit_violation, one.constraint_violation))
+        and all(missed <= 1e-4 for missed in (one.penetration, one.limit_violation, one.constraint_violation))
         for one in records
     )
     seen = None

@@ -16,7 +16,6 @@ from wholebody.studies.reach_pictures import new_chart, png
 
 MOST = 100  # rows or columns; letters of more are too small to read
 WIDTH, HEIGHT = 0.9, 0.3  # inches of a cell
-LETTER = 0.09  # inches of a letter of a row's name
 
 COLORS: Mapping[str, str] = MappingProxyType(
     {
@@ -69,7 +68,7 @@ def draw_outcomes(cells: Sequence[Cell], path: Path) -> Path:
         raise InputError(
             f"chart: {len(rows)} rows and {len(columns)} columns; give records of 1 to {MOST} of each, such as a part"
         )
-    wide = WIDTH * len(columns) + LETTER * max(map(len, rows)) + 1.8
+    wide = WIDTH * len(columns) + 0.09 * max(map(len, rows)) + 1.8  # inches of a letter of a row's name
     chart, axes = new_chart(1, 1, (wide, HEIGHT * len(rows) + 1.2))
     axis = axes[0, 0]
     for one in cells:

@@ -25,8 +25,6 @@ from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, sea
 from wholebody.tasks import inputs
 
 MOST_PLACES = 1_000_000
-ROUNDS = 12  # most rounds in which bricks hand postures on to their neighbours
-BRICKS = 64  # about how many there are of many places: more = more whole solves, fewer = less to do beside each other
 LEAST_EDGE, MOST_EDGE = 2, 6  # places along an edge of a brick
 
 
@@ -127,7 +125,7 @@ class _Search:
     def run(self) -> None:
         """All rounds."""
         self._round(self._first())
-        for _ in range(ROUNDS):
+        for _ in range(12):  # most rounds in which bricks hand postures on to their neighbours
             bricks = list(self._following())
             if not bricks or self._over:
                 return
@@ -269,7 +267,8 @@ def _numbered(sent: tuple[int, Any]) -> tuple[int, list[tuple[Try, int]]]:
 def _bricks(grid: _Grid) -> list[Indices]:
     """The places in bricks of equal edges; their size depends on the number of places alone."""
     dimensions = max(sum(len(axis) > 1 for axis in grid.axes), 1)
-    edge = (len(grid.places) / BRICKS) ** (1.0 / dimensions)
+    # about how many there are of many places: more = more whole solves, fewer = less to do beside each other
+    edge = (len(grid.places) / 64) ** (1.0 / dimensions)
     size = int(min(max(round(edge), LEAST_EDGE), MOST_EDGE))
     keys = grid.cells // size
     order: dict[tuple[int, ...], list[int]] = {}

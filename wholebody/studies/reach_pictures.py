@@ -13,11 +13,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.files import write
 
-MOST_SLICES = 24  # heights in one picture; of more, some are left out evenly
-COLUMNS = 6
 INCHES = 2.4  # width of one height
-LETTERS = 0.75  # inches of one height for its title and its axis
-DPI = 120
 MEANING = "red: metres short    green: reached, 1 with the least measure"
 INSIDE_GRAY = (0.35, 0.35, 0.38, 1.0)
 
@@ -39,11 +35,12 @@ slider.addEventListener("input",show);show();
 
 def draw_slices(found: Any, path: Path) -> Path:
     """Draw the heights of a reach map beside each other, seen from above; returns the path."""
-    shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), MOST_SLICES)).round().astype(int)).tolist()
-    rows = -(-len(shown) // COLUMNS)
+    # heights in one picture; of more, some are left out evenly
+    shown = np.unique(np.linspace(0, len(found.z) - 1, min(len(found.z), 24)).round().astype(int)).tolist()
+    rows = -(-len(shown) // 6)  # columns
     columns = -(-len(shown) // rows)
     deep, wide = (float(np.ptp(places)) + 0.1 for places in (found.x, found.y))
-    high = INCHES * min(max(deep / wide, 0.4), 2.5) + LETTERS
+    high = INCHES * min(max(deep / wide, 0.4), 2.5) + 0.75  # inches of one height for its title and its axis
     chart, axes = new_chart(rows, columns, (INCHES * columns + 1.6, max(high * rows + 0.5, 4.0)))
     values = heat(found)
     image: Any = None
@@ -121,7 +118,7 @@ def new_chart(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, 
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    chart = Figure(figsize=size, dpi=DPI, layout="constrained")
+    chart = Figure(figsize=size, dpi=120, layout="constrained")
     FigureCanvasAgg(chart)
     return chart, chart.subplots(rows, columns, squeeze=False)
 

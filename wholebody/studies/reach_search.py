@@ -16,9 +16,6 @@ from wholebody.problem import Problem
 from wholebody.tasks import Point
 
 SURE = 0.95  # share of what is left of a place within which no place is searched: 1 trusts descents to the last digit
-MOST_TRIES = 4  # starts of one place: more finds more places behind things, and takes longer at the border of the reach
-SURROUNDED = 3  # reached neighbours from which a place that was not reached is tried once more
-OUT_OF_REACH = ("unreachable",)
 
 
 class Try(NamedTuple):
@@ -161,14 +158,17 @@ class Brick:
             near = [other for other in self.neighbours[place] if other in self.reached]
             tries = sum(pair[0] == place for pair in self.tried)
             fresh = [other for other in near if (place, other) not in self.tried]
-            if len(near) >= SURROUNDED and fresh and tries < MOST_TRIES and (place, fresh[0]) not in self.again:
+            # starts of one place: more finds more places behind things, and takes longer at the border of
+            # the reach
+            # reached neighbours from which a place that was not reached is tried once more
+            if len(near) >= 3 and fresh and tries < 4 and (place, fresh[0]) not in self.again:
                 self.again.append((place, fresh[0]))
 
 
 def _solved(asked: Asked, problem: Problem, place: int, whole: bool) -> Try:
     solution = (asked.whole if whole else asked.quick).solve(problem)
     judged = solution.assessment
-    sure = asked.alone and solution.status in OUT_OF_REACH
+    sure = asked.alone and solution.status in ("unreachable",)
     return Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, np.asarray(solution.q))
 
 

@@ -11,7 +11,6 @@ from wholebody.base.files import make_folder
 from wholebody.studies.records import CANCELLED, ENDED, SolveRecord
 
 NAME = "records.sqlite"
-PATIENCE = 60.0  # s: that another process may hold the file
 
 
 class RecordStore:
@@ -54,7 +53,7 @@ class RecordStore:
             connection.execute("INSERT OR REPLACE INTO records VALUES (?, ?)", (asked, record.as_json()))
 
     def _connection(self) -> sqlite3.Connection:
-        return sqlite3.connect(self.path, timeout=PATIENCE)
+        return sqlite3.connect(self.path, timeout=60.0)  # s: that another process may hold the file
 
     def _foreign(self) -> FileFormatError:
         return FileFormatError(f"{self.path}: holds no records of wb.solve_many; give another folder")

@@ -24,7 +24,6 @@ from wholebody.studies.store import RecordStore
 from wholebody.studies.task_files import TaskFile
 
 MOST_CASES = 1_000_000
-FACTORS = ("person", "target", "layout")
 
 TaskFunction = Callable[[Any, Any, Any], Problem]
 """Makes the problem of a figure, a target and a layout; each is None where the study has none."""
@@ -109,7 +108,9 @@ def study(
     for (i, (who, person)), (j, (where, layout)) in pairs:
         cases = []
         for k, (aim, target) in enumerate(_or_none(factors[1])):
-            named = {key: name for key, name in zip(FACTORS, (who, aim, where), strict=True) if name}
+            named = {
+                key: name for key, name in zip(("person", "target", "layout"), (who, aim, where), strict=True) if name
+            }
             variant = Variant(make, person, target, layout)
             asked = fingerprint(mark, person, target, layout, running.method, warm_start) if store else ""
             record = SolveRecord(", ".join(named.values()), factors=named)

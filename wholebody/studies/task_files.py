@@ -14,9 +14,6 @@ from wholebody.problem import Problem
 from wholebody.taskfile.reading import Entry, read_contents
 from wholebody.taskfile.task import task_from
 
-TARGETED = ("point", "frame")
-"""Types of goals whose target is a place."""
-
 SIZE = frozenset(("sex", "stature", "mass", "percentile", "proportions", "age"))
 """Options of a figure that together say what person it is."""
 
@@ -95,7 +92,7 @@ class TaskFile:
 
     def _goal(self) -> int:
         for number, entry in enumerate(self.contents.tables.get("goal", ())):
-            if entry.name in TARGETED:
+            if entry.name in ("point", "frame"):  # types of goals whose target is a place
                 return number
         raise InputError(f"study: {self.path.name} has no goal of type point or frame, so targets mean nothing")
 

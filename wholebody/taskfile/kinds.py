@@ -8,18 +8,17 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from wholebody.base.checks import FAR, color, shown, unit_hint
+from wholebody.base import fields
+from wholebody.base.checks import color, flag, shown, text, unit_hint
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.fields import Check, Range, Vector, check_of
 from wholebody.figures.figure import Figure
+from wholebody.figures.proportions import DIMENSION
+from wholebody.geometry.placement import unit_vector
 from wholebody.scene.matter.joints import BallJoint, Hinge
 from wholebody.taskfile.where import Where
+from wholebody.tasks import inputs
 from wholebody.tasks.inputs import FARTHEST
-
-_SLIPS = {
-    "rad": ((math.pi / 180.0, "degrees"),),
-    "kg": ((0.001, "grams"),),
-}
-"""Unit -> the units that people write by mistake, with their size in the unit."""
 
 
 class Kind(ABC):
@@ -48,53 +47,46 @@ class Kind(ABC):
 
 @dataclass(frozen=True)
 class Number(Kind):
-    """A finite number within a range, both ends included."""
+    """A finite number within a range."""
 
-    low: float
-    high: float
-    unit: str = ""
-    whole: bool = False
+    range: Range
 
     @property
     def words(self) -> str:
         """Range and unit."""
-        return f"{'whole number' if self.whole else 'number'} from {self.low:g} to {self.high:g} {self.unit}".strip()
+        one = self.range
+        return f"{'whole number' if one.whole else 'number'} from {one.low:g} to {one.high:g} {one.unit}".strip()
 
     def read(self, value: Any, where: Where) -> float:
         """Return the number."""
-        if isinstance(value, bool) or not isinstance(value, int if self.whole else (int, float)):
+        low, high = self.range.low, self.range.high
+        if isinstance(value, bool) or not isinstance(value, int if self.range.whole else (int, float)):
             raise where.fault(f"{shown(value)} is not a {self.words}; write a plain number")
-        if not self.low <= value <= self.high:
-            raise where.fault(f"{shown(value)} is not a {self.words}{self._slip(value)}")
-        return value if self.whole else float(value)
-
-    def _slip(self, value: float) -> str:
-        if self.unit == "m":
-            return unit_hint(value, self.low, self.high) or "; change it"
-        for factor, unit in _SLIPS.get(self.unit, ()):
-            if abs(value) < FAR and self.low <= value * factor <= self.high:
-                return f"; if it is in {unit}, write {value * factor:.6g}"
-        return "; change it"
+        if not low <= value <= high:
+            hint = unit_hint(value, low, high, self.range.unit) or "; change it"
+            raise where.fault(f"{shown(value)} is not a {self.words}{hint}")
+        return value if self.range.whole else float(value)
 
 
 @dataclass(frozen=True)
-class Vector(Kind):
-    """A fixed count of numbers of one kind."""
+class Numbers(Kind):
+    """A fixed count of numbers of one range."""
 
-    count: int
-    number: Number
+    vector: Vector
     axes: str = ""
 
     @property
     def words(self) -> str:
         """Count and unit."""
-        return f"{self.axes or f'{self.count} numbers'}{', ' + self.number.unit if self.number.unit else ''}"
+        unit = self.vector.each.unit
+        return f"{self.axes or f'{self.vector.count} numbers'}{', ' + unit if unit else ''}"
 
     def read(self, value: Any, where: Where) -> tuple[float, ...]:
         """Return the numbers."""
-        if not isinstance(value, list) or len(value) != self.count:
-            raise where.fault(f"{shown(value)} is not {self.words}; write {self.count} numbers in brackets")
-        return tuple(self.number.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
+        count, each = self.vector.count, Number(self.vector.each)
+        if not isinstance(value, list) or len(value) != count:
+            raise where.fault(f"{shown(value)} is not {self.words}; write {count} numbers in brackets")
+        return tuple(each.read(entry, where.at(f"[{i}]")) for i, entry in enumerate(value))
 
 
 @dataclass(frozen=True)
@@ -109,7 +101,7 @@ class Placement(Kind):
     def read(self, value: Any, where: Where) -> Any:
         """Return the placement, as `wholebody.geometry.placement` takes it."""
         if isinstance(value, list) and len(value) == 4 and all(isinstance(row, list) for row in value):
-            row = Vector(4, Number(-FARTHEST, FARTHEST, "m"))
+            row = Numbers(Vector(4, POSITION.vector.each))
             return [row.read(entries, where.at(f"[{i}]")) for i, entries in enumerate(value)]
         if isinstance(value, list) and len(value) == 7:
             return POSITION.read(value[:3], where) + QUATERNION.read(value[3:], where)
@@ -264,7 +256,7 @@ class Joints(ByName):
 
     def __init__(self) -> None:
         """Radians, and metres of sliding joints."""
-        number = Number(-2.0 * math.pi, 2.0 * math.pi, "rad")
+        number = Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad"))
         super().__init__(number, "joints", "left_elbow_flexion = 0.5", "rad (m for sliding joints)")
 
     def names(self, value: Any, figure: Figure, where: Where) -> None:
@@ -319,12 +311,10 @@ JOINTS: dict[str, type[BallJoint]] = {"hinge": Hinge, "ball": BallJoint}
 
 _ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}
 
-POSITION = Vector(3, Number(-FARTHEST, FARTHEST, "m"), "[x, y, z]")
-DIRECTION = Vector(3, Number(-1e6, 1e6), "[x, y, z], any length")
+POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
+DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
 PLACEMENT = Placement()
-QUATERNION = Vector(4, Number(-1.001, 1.001), "[qx, qy, qz, qw]")
-LENGTH = Number(1e-4, FARTHEST, "m")
-WEIGHT = Number(1e-9, 1e9)
+QUATERNION = Numbers(Vector(4, Range(-1.001, 1.001)), "[qx, qy, qz, qw]")
 JOINT = Name("joint", lambda figure: figure.joints)
 GROUP = Name(
     "joint or group", lambda figure: {*figure.joints, *figure.groups, *(["root"] if figure.root == "free" else [])}
@@ -332,6 +322,27 @@ GROUP = Name(
 FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.joints})
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
-PROPORTIONS = ByName(LENGTH, "dimensions", "sitting_height = 0.93", "m")
+PROPORTIONS = ByName(Number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
 CONE = Name("reach cone", lambda figure: figure.cones)
 RANGE = Name("range of motion", lambda figure: figure.ranges)
+
+_OF_CHECKS: dict[Check, Kind] = {
+    inputs.point: POSITION,
+    inputs.direction: DIRECTION,
+    unit_vector: DIRECTION,
+    inputs.target_placement: PLACEMENT,
+    inputs.target_rotation: QUATERNION,
+    flag: Flag(),
+    inputs.name: Text(),
+    text: Text(),
+}
+
+
+def kind_of(record: type, field: str) -> Kind:
+    """The values that a field of a class accepts, as they are written in a file."""
+    check = check_of(record, field)
+    if isinstance(check, Range):
+        return Number(check)
+    if isinstance(check, Vector):
+        return Numbers(check)
+    return Choice(tuple(check.options)) if isinstance(check, fields.Choice) else _OF_CHECKS[check]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from wholebody.problem import CLEARANCE
+from wholebody.scene.matter.body import Body
 from wholebody.taskfile import kinds
-from wholebody.taskfile.kinds import FRAME, PLACEMENT, POSITION, Number
+from wholebody.taskfile.kinds import FRAME, PLACEMENT, POSITION, Number, kind_of
 from wholebody.taskfile.tables import Key, Table
 from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES, METHODS
 from wholebody.taskfile.things import FIGURES, SHAPES
@@ -14,19 +16,17 @@ _THING = (
 )
 
 _BODY = (
-    Key("density", Number(1e-3, 1e6, "kg/m3"), "of a thing that moves by itself, in `wholebody world`"),
-    Key("mass", Number(1e-9, 1e9, "kg"), "in place of a density"),
+    Key("density", kind_of(Body, "density"), "of a thing that moves by itself, in `wholebody world`"),
+    Key("mass", kind_of(Body, "mass"), "in place of a density"),
     Key("material", kinds.Choice(("wood", "human", "metal")), "for impacts and friction; wood if left out"),
-    Key("velocity", kinds.Vector(3, Number(-1e3, 1e3, "m/s")), "of a thing that moves by itself; 0 if left out"),
-    Key(
-        "angular_velocity", kinds.Vector(3, Number(-1e3, 1e3, "rad/s")), "of it, along the world's axes; 0 if left out"
-    ),
+    Key("velocity", kind_of(Body, "velocity"), "of a thing that moves by itself; 0 if left out"),
+    Key("angular_velocity", kind_of(Body, "angular_velocity"), "of it, along the world's axes; 0 if left out"),
     Key("joints", kinds.ThingJoints(), "that hold a thing that moves by itself; free if left out"),
 )
 
 TOP = (
     Key("title", kinds.Text(), "one line of description"),
-    Key("clearance", Number(0.0, 0.5, "m"), "least distance between any two pieces; 0 if left out"),
+    Key("clearance", Number(CLEARANCE), "least distance between any two pieces; 0 if left out"),
     Key(
         "touching",
         kinds.Several(kinds.Several(kinds.Text(), 2), example='[["right_hand", "table"]]'),

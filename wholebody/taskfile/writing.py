@@ -26,8 +26,6 @@ from wholebody.taskfile.kinds import JOINTS
 from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
 from wholebody.taskfile.things import SHAPES
 
-SAME = 1e-12  # rad, m: a joint nearer than this to its value in the first posture is not written
-
 
 def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: str | None = None) -> Path:
     """Write a problem, or a scene alone, as a task file that `read_task` and `wholebody pose` read.
@@ -101,10 +99,11 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
 def _start(problem: Problem) -> dict[str, Any]:
     figure, q = problem.scene.figure, problem.start
     first = figure.joint_values(figure.posture(figure.postures[0]))
+    # rad, m: a joint nearer than this to its value in the first posture is not written
     joints = {
         name: value
         for name, value in figure.joint_values(q).items()
-        if name not in figure.followers and abs(value - first[name]) > SAME
+        if name not in figure.followers and abs(value - first[name]) > 1e-12
     }
     start: dict[str, Any] = {"posture": figure.postures[0]}
     if joints:

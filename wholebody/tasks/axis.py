@@ -15,11 +15,11 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import shown
+from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
+from wholebody.base.fields import called
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings, filled
@@ -60,27 +60,22 @@ class Axis(Goal):
     """
 
     frame: str
-    axis: ArrayLike
+    axis: inputs.Direction
     _: KW_ONLY
-    direction: ArrayLike | None = None
-    toward: ArrayLike | None = None
-    weight: float = 1.0
+    direction: inputs.Direction | None = None
+    toward: inputs.Position | None = None
+    weight: inputs.Weight = 1.0
     basis: Array = field(init=False, repr=False)
     resolved_target: Array = field(init=False, repr=False)
     place: inputs.Place = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Axis({shown(self.frame)})"
         if (self.direction is None) == (self.toward is None):
-            raise InputError(f"{where} takes either a direction or a place to point toward; give one of the two")
-        object.__setattr__(self, "basis", across(inputs.direction(self.axis, f"{where}: axis")))
-        if self.direction is None:
-            wanted = inputs.point(self.toward, f"{where}: toward")
-        else:
-            wanted = inputs.direction(self.direction, f"{where}: direction")
-        object.__setattr__(self, "resolved_target", wanted)
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+            raise InputError(f"{called(self)} takes either a direction or a place to point toward; give one of the two")
+        super().__post_init__()
+        settle(self, "basis", across(np.asarray(self.axis)))
+        settle(self, "resolved_target", self.toward if self.direction is None else self.direction)
 
     def resolve(self, scene: Surroundings, start: Array) -> Axis:
         """Find the frame."""

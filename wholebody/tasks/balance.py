@@ -4,16 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import listed, number
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Names, Range
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.support import convex_polygon, edges, shrunk, standing_points
+
+Feet: TypeAlias = Annotated[Sequence[str], Names("['left_foot', 'right_foot']")]
+Margin: TypeAlias = Annotated[float, Range(0.0, 1.0, "m")]
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,19 +37,11 @@ class Balance(Constraint):
         InputError: no feet are named, or the margin is negative.
     """
 
-    feet: Sequence[str] = ("left_foot", "right_foot")
+    feet: Feet = ("left_foot", "right_foot")
     _: KW_ONLY
-    margin: float = 0.0
+    margin: Margin = 0.0
     normals: Array = field(init=False, repr=False)
     offsets: Array = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        feet = tuple(listed(self.feet, "Balance: feet", "['left_foot', 'right_foot']"))
-        if not feet:
-            raise InputError("Balance: feet is empty; give a list of names, such as ['left_foot', 'right_foot']")
-        object.__setattr__(self, "feet", feet)
-        object.__setattr__(self, "margin", number(self.margin, "Balance: margin", 0.0, inputs.FARTHEST, "m"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Compute the support polygon at the start.

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.fields import Checked
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import answers
 
@@ -79,8 +80,8 @@ class SupportingPlanes(NamedTuple):
     bend_row: Indices
 
 
-class Term:
-    """Base of goals, constraints, bounds and measures."""
+class Term(Checked):
+    """Base of goals, constraints, bounds and measures; `Checked` says how the fields of one are checked."""
 
     @property
     def touching(self) -> tuple[tuple[str, str], ...]:

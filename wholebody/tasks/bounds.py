@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
+from typing import Annotated, TypeAlias
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance, number, shown
+from wholebody.base.checks import instance, shown
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range
 from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Bound, Surroundings, filled
 
-SLOWEST, FASTEST = 1e-9, 1e9  # rad/s, m/s: least and greatest velocity limit
+SPEED = Range(1e-9, 1e9, endless=True)  # rad/s, m/s
+Speed: TypeAlias = Annotated[float, SPEED]
 BRAKING = 0.05  # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
 
 
@@ -72,19 +75,18 @@ class StepLimit(Bound):
         InputError: a velocity is not a positive number.
     """
 
-    velocity: float = np.inf
+    velocity: Speed = np.inf
     _: KW_ONLY
     joints: Mapping[str, float] = field(default_factory=dict)
-    root_velocity: float = np.inf
-    root_turn: float = np.inf
+    root_velocity: Speed = np.inf
+    root_turn: Speed = np.inf
     _velocity: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
-        for name in ("velocity", "root_velocity", "root_turn"):
-            object.__setattr__(self, name, _speed(getattr(self, name), f"StepLimit: {name}"))
+        super().__post_init__()
         instance(self.joints, Mapping, "StepLimit: joints", "give velocities by name, such as {'left_arm': 1.0}")
-        speeds = {name: _speed(speed, f"StepLimit: joints[{shown(name)}]") for name, speed in self.joints.items()}
+        speeds = {name: SPEED(speed, f"StepLimit: joints[{shown(name)}]") for name, speed in self.joints.items()}
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
@@ -153,10 +155,3 @@ def allowed(bounds: Sequence[Bound], limits: Limits, state: State, dt: float | N
         low, high = bound.bounds(state, dt)
         np.clip(box, low, high, out=box)
     return box
-
-
-def _speed(value: object, where: str) -> float:
-    """Return a positive number; inf stands for no bound."""
-    if isinstance(value, (float, np.floating)) and value == np.inf:
-        return np.inf
-    return number(value, where, SLOWEST, FASTEST, "or inf for no bound")

@@ -6,10 +6,9 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import choice
+from wholebody.base.checks import settle
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings
@@ -31,18 +30,16 @@ class CenterOfMass(Goal):
         InputError: the target is not in metres, or the axes are others.
     """
 
-    target: ArrayLike
+    target: inputs.Position
     _: KW_ONLY
     axes: Literal["xy", "xyz"] = "xyz"
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     resolved_target: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         """Check the values."""
-        choice(self.axes, ("xyz", "xy"), "CenterOfMass: axes")
-        target = inputs.point(self.target, "CenterOfMass: target")
-        object.__setattr__(self, "resolved_target", target[: len(self.axes)])
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "CenterOfMass: weight"))
+        super().__post_init__()
+        settle(self, "resolved_target", self.resolved_target[: len(self.axes)])
 
     def resolve(self, scene: Surroundings, start: Array) -> CenterOfMass:
         """Return the goal itself.

@@ -59,16 +59,8 @@ class Discomfort(Measure):
         limited: the joints that have two limits, once resolved.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     limited: LimitedJoints = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "Discomfort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
         """Read the limits, the neutral posture and the weights of the figure."""

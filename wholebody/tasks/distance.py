@@ -105,16 +105,8 @@ class Effort(DistanceMeasure):
         distance: the start, and the weight of every degree of freedom; once resolved.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "Effort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Store the start."""
@@ -133,16 +125,8 @@ class Displacement(DistanceMeasure):
         distance: the neutral posture, and the weight of every degree of freedom; once resolved.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     distance: SquaredDistance = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "Displacement: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:
         """Read the neutral posture and the weights of the figure."""

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any
+from typing import Annotated, Any
 
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import shown
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual
@@ -41,29 +38,7 @@ class PlacementGoal(Goal):
 
 
 @dataclass(frozen=True, eq=False)
-class _FrameGoal(PlacementGoal):
-    """A frame and its target in the world, checked."""
-
-    frame: str
-    target: PlacementLike
-    _: KW_ONLY
-    weight: float = 1.0
-    resolved_target: Any = field(init=False, repr=False)
-    residual: PlacementResidual = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"{type(self).__name__}({shown(self.frame)})"
-        object.__setattr__(self, "resolved_target", self._placed(f"{where}: target"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
-
-    @abstractmethod
-    def _placed(self, where: str) -> Any:
-        """The target as a pin.SE3; `where` begins the sentence of an error."""
-
-
-@dataclass(frozen=True, eq=False)
-class Frame(_FrameGoal):
+class Frame(PlacementGoal):
     """Move a frame to a position and an orientation.
 
     The error is the position of the frame minus the target [m], then the rotation vector from the target's orientation
@@ -82,8 +57,12 @@ class Frame(_FrameGoal):
         InputError: the target is none of these, or not in metres.
     """
 
-    def _placed(self, where: str) -> Any:
-        return inputs.target_placement(self.target, where)
+    frame: str
+    target: inputs.Target
+    _: KW_ONLY
+    weight: inputs.Weight = 1.0
+    resolved_target: Any = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
@@ -92,7 +71,7 @@ class Frame(_FrameGoal):
 
 
 @dataclass(frozen=True, eq=False)
-class Orientation(_FrameGoal):
+class Orientation(PlacementGoal):
     """Turn a frame to an orientation; its position is free.
 
     The error is the rotation vector from the target to the frame, in world axes [rad].
@@ -108,10 +87,12 @@ class Orientation(_FrameGoal):
         InputError: the target is not a rotation.
     """
 
-    target: ArrayLike
-
-    def _placed(self, where: str) -> Any:
-        return inputs.target_rotation(self.target, where)
+    frame: str
+    target: Annotated[ArrayLike, inputs.target_rotation]
+    _: KW_ONLY
+    weight: inputs.Weight = 1.0
+    resolved_target: Any = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from math import pi
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import choice, number, shown
+from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Range, called
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
@@ -22,9 +22,8 @@ from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Over, Part, owner_pairs
 from wholebody.tasks.opposition import Opposing, rounded
 from wholebody.tasks.surfaces import Surface, carried_by, face, joined, segments_beyond, surface
-from wholebody.tasks.touch import check_apart, named
+from wholebody.tasks.touch import check_apart
 
-KINDS = ("palm", "power", "pinch", "fingertips")
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
@@ -76,36 +75,25 @@ class Grasp(ContactTerm):
             angle or a place is out of range.
     """
 
-    hand: str
-    thing: str
+    hand: inputs.Name
+    thing: inputs.Name
     kind: Literal["palm", "power", "pinch", "fingertips"] = "palm"
     _: KW_ONLY
-    side: ArrayLike | None = None
-    opposed: float = pi / 4
-    along: float | None = None
+    side: inputs.Direction | None = None
+    opposed: Annotated[float, Range(0.0, pi, "rad")] = pi / 4
+    along: Annotated[float, Range(-1.0, 1.0)] | None = None
     approach: Literal["overhand", "underhand", "side"] | None = None
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     parts: Sequence[Part] = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     def __post_init__(self) -> None:
         """Check the values."""
-        where = f"Grasp({shown(self.hand)})"
-        for name in (self.hand, self.thing):
-            named(name, where)
-        if self.hand.split("_")[0] not in ("left", "right"):
-            raise InputError(f"{where}: hand is {shown(self.hand)}; give 'left' or 'right'")
-        choice(self.kind, KINDS, f"{where}: kind")
-        object.__setattr__(self, "opposed", number(self.opposed, f"{where}: opposed", 0.0, pi, ", in radians"))
-        if self.along is not None:
-            object.__setattr__(self, "along", number(self.along, f"{where}: along", -1.0, 1.0))
-            if self.kind == "palm":
-                raise InputError(f"{where}: along is for bars; a palm takes a face, so give its side")
-        if self.approach is not None:
-            choice(self.approach, tuple(APPROACHES), f"{where}: approach")
-        if self.side is not None:
-            object.__setattr__(self, "side", inputs.direction(self.side, f"{where}: side"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
+        super().__post_init__()
+        if self._side not in ("left", "right"):
+            raise InputError(f"{called(self)}: hand is {shown(self.hand)}; give 'left' or 'right'")
+        if self.along is not None and self.kind == "palm":
+            raise InputError(f"{called(self)}: along is for bars; a palm takes a face, so give its side")
 
     @property
     def frame(self) -> str:

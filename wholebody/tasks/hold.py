@@ -9,9 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import flag, settle, shown
 from wholebody.figures.state import State, Wrench
-from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
@@ -36,24 +34,18 @@ class Hold(Constraint):
     """
 
     frame: str
-    at: PlacementLike | None = None
+    at: inputs.Target | None = None
     _: KW_ONLY
     orientation: bool = True
     relative_to: str | None = None
-    _at: Any = field(init=False, repr=False, default=None)
+    resolved_at: Any = field(init=False, repr=False, default=None)
     residual: PlacementResidual = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        settle(self, "orientation", flag(self.orientation, f"Hold({shown(self.frame)}): orientation"))
-        if self.at is not None:
-            object.__setattr__(self, "_at", inputs.target_placement(self.at, f"Hold({shown(self.frame)}): at"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Hold:
         """Find the frames, and their placements at the start."""
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
-        at = self._at if self._at is not None else placement_between(scene, start, place, base)
+        at = placement_between(scene, start, place, base) if self.at is None else self.resolved_at
         return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
 
     @property

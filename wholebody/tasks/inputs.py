@@ -4,29 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.checks import array, number, numbers, shown
+from wholebody.base.checks import array, numbers, shown
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.fields import Range
 from wholebody.figures.state import State
-from wholebody.geometry.placement import PlacementLike, placement
+from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
 
 FARTHEST = 100.0
 """Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre."""
 
-LIGHTEST, HEAVIEST = 1e-12, 1e12
-"""Least and greatest weight: beyond them the squares of weights make other terms vanish in rounding."""
-
-LONGEST_DIRECTION = 1e9
-"""Length beyond which a vector is refused as a mistake."""
-
-SHORTEST_DIRECTION = 1e-9
-"""Length below which a vector has no direction: a millionth of a millimetre for a difference of points in metres."""
+WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out")
+"""Weights of terms: beyond this range the squares of weights make other terms vanish in rounding."""
 
 
 class Place(NamedTuple):
@@ -125,28 +120,9 @@ def direction(value: object, where: str) -> Array:
     Raises:
         InputError: not three finite numbers, or all of them zero.
     """
-    given = numbers(value, (3,), where)
-    length = math.hypot(*given)
-    if not SHORTEST_DIRECTION <= length <= LONGEST_DIRECTION:
-        raise InputError(
-            f"{where} is {given.tolist()} and has no direction; give a vector of a length from "
-            f"{SHORTEST_DIRECTION:g} to {LONGEST_DIRECTION:g}"
-        )
-    unit = given / length
+    unit = np.array(unit_vector(value, where))
     unit.flags.writeable = False
     return unit
-
-
-def weight(value: object, where: str) -> float:
-    """The weight of a term.
-
-    Raises:
-        InputError: it is no number from `LIGHTEST` to `HEAVIEST`.
-    """
-    try:
-        return number(value, where, LIGHTEST, HEAVIEST)
-    except InputError:
-        raise InputError(f"{where} is {shown(value)}; give a positive number such as 1, or leave it out") from None
 
 
 def target_placement(at: PlacementLike, where: str) -> Any:
@@ -174,6 +150,24 @@ def target_rotation(value: ArrayLike, where: str) -> Any:
         matrix[:3, :3] = numbers(given, (3, 3), where)
         return target_placement(matrix, where)
     raise InputError(f"{where} takes a quaternion (x, y, z, w) or a matrix (3, 3), not shape {given.shape}")
+
+
+def name(value: object, what: str) -> str:
+    """The name of a segment, a piece or a thing.
+
+    Raises:
+        InputError: it is no text, or empty.
+    """
+    if not isinstance(value, str) or not value:
+        raise InputError(f"{what} is {shown(value)}; give the name of a segment or a thing")
+    return value
+
+
+Weight: TypeAlias = Annotated[float, WEIGHT]
+Position: TypeAlias = Annotated[ArrayLike, point]
+Direction: TypeAlias = Annotated[ArrayLike, direction]
+Target: TypeAlias = Annotated[PlacementLike, target_placement]
+Name: TypeAlias = Annotated[str, name]
 
 
 def check_mass(scene: Surroundings, where: str) -> None:

@@ -6,10 +6,8 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import choice, shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
@@ -37,27 +35,19 @@ class Plane(Constraint):
     """
 
     frame: str
-    normal: ArrayLike
+    normal: inputs.Direction
     _: KW_ONLY
-    point: ArrayLike | None = None
+    point: inputs.Position | None = None
     side: Literal["on", "above"] = "on"
     resolved_normal: Array = field(init=False, repr=False)
-    _point: Array | None = field(init=False, repr=False, default=None)
+    resolved_point: Array | None = field(init=False, repr=False, default=None)
     place: inputs.Place = field(init=False, repr=False)
     height: float = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Plane({shown(self.frame)})"
-        choice(self.side, ("on", "above"), f"{where}: side")
-        object.__setattr__(self, "resolved_normal", inputs.direction(self.normal, f"{where}: normal"))
-        if self.point is not None:
-            object.__setattr__(self, "_point", inputs.point(self.point, f"{where}: point"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Plane:
         """Find the frame, and the plane through its position at the start."""
         place = inputs.find_place(scene, self.frame, "Plane")
-        point = self._point
+        point = self.resolved_point
         if point is None:
             point = State(scene.model).update(start).frame(place.frame).translation
         return filled(self, place=place, height=float(self.resolved_normal @ point))

@@ -5,10 +5,8 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import shown
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Goal, Surroundings, filled
@@ -35,20 +33,13 @@ class Point(Goal):
     """
 
     frame: str
-    target: ArrayLike
+    target: inputs.Position
     _: KW_ONLY
-    offset: ArrayLike = (0.0, 0.0, 0.0)
-    weight: float = 1.0
+    offset: inputs.Position = (0.0, 0.0, 0.0)
+    weight: inputs.Weight = 1.0
     place: inputs.Place = field(init=False, repr=False)
     resolved_target: Array = field(init=False, repr=False)
     resolved_offset: Array = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Point({shown(self.frame)})"
-        object.__setattr__(self, "resolved_target", inputs.point(self.target, f"{where}: target"))
-        object.__setattr__(self, "resolved_offset", inputs.point(self.offset, f"{where}: offset"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Point:
         """Find the frame."""

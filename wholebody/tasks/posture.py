@@ -39,7 +39,7 @@ class Posture(Goal):
     target: str | ArrayLike
     _: KW_ONLY
     joints: Sequence[str] | None = None
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     resolved_target: Array = field(init=False, repr=False)
     dofs: Array = field(init=False, repr=False)
     _angular: Mask = field(init=False, repr=False)
@@ -47,11 +47,11 @@ class Posture(Goal):
 
     def __post_init__(self) -> None:
         """Check the values."""
+        super().__post_init__()
         if not isinstance(self.target, str):
             array(self.target, "Posture: target", "the name of a posture, or its numbers")
         if self.joints is not None and not isinstance(self.joints, str):
             object.__setattr__(self, "joints", tuple(listed(self.joints, "Posture: joints", "['left_arm']")))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "Posture: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Posture:
         """Look up the posture and the joints."""

@@ -42,16 +42,8 @@ class PotentialEnergy(Measure):
         masses: of the segments, once resolved.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     masses: Masses = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "PotentialEnergy: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> PotentialEnergy:
         """Compute the weights of the segments, and their heights in the neutral posture."""

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, TypeAlias
+from typing import Annotated, Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import known, listed
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Names
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, MotionRange, TwistRange
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
@@ -153,14 +154,9 @@ class RangeOfMotion(Constraint):
         InputError: names is no list.
     """
 
-    names: Sequence[str] | None = None
+    names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
     rows: tuple[Row, ...] = field(init=False, repr=False)
     row_names: tuple[str, ...] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if self.names is not None:
-            object.__setattr__(self, "names", tuple(listed(self.names, "RangeOfMotion: names", "['neck']")))
 
     def resolve(self, scene: Surroundings, start: Array) -> RangeOfMotion:
         """Find the ranges, their frames and joints.

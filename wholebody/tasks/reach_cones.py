@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import known, listed
+from wholebody.base.checks import known
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Names
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Constraint, Surroundings, filled
@@ -49,15 +50,10 @@ class ReachCones(Constraint):
         InputError: names is no list.
     """
 
-    names: Sequence[str] | None = None
+    names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
     limbs: tuple[Limb, ...] = field(init=False, repr=False)
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        if self.names is not None:
-            object.__setattr__(self, "names", tuple(listed(self.names, "ReachCones: names", "['left_shoulder']")))
 
     def resolve(self, scene: Surroundings, start: Array) -> ReachCones:
         """Find the cones and their frames.

@@ -6,8 +6,6 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import flag, settle, shown
-from wholebody.geometry.placement import PlacementLike
 from wholebody.tasks import inputs
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.frame import PlacementGoal
@@ -37,24 +35,16 @@ class Relative(PlacementGoal):
 
     frame: str
     to: str
-    placement: PlacementLike | None = None
+    placement: inputs.Target | None = None
     _: KW_ONLY
     orientation: bool = True
-    weight: float = 1.0
-    _placement: Any = field(init=False, repr=False, default=None)
+    weight: inputs.Weight = 1.0
+    resolved_placement: Any = field(init=False, repr=False, default=None)
     residual: PlacementResidual = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Relative({shown(self.frame)}, {shown(self.to)})"
-        settle(self, "orientation", flag(self.orientation, f"{where}: orientation"))
-        if self.placement is not None:
-            object.__setattr__(self, "_placement", inputs.target_placement(self.placement, f"{where}: placement"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Relative:
         """Find the frames, and their relative placement at the start."""
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
-        target = self._placement if self._placement is not None else placement_between(scene, start, place, base)
+        target = placement_between(scene, start, place, base) if self.placement is None else self.resolved_placement
         return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))

@@ -100,18 +100,10 @@ class Rhythm(Measure):
         lumbar: the lumbar spine, once resolved; None without a free root.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     girdles: tuple[Elevation, ...] = field(init=False, repr=False)
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
     lumbar: Lumbar | None = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "Rhythm: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start.

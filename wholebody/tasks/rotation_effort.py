@@ -73,17 +73,9 @@ class RotationEffort(Measure):
         others: the start, and the weights of all other degrees of freedom; once resolved.
     """
 
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     balls: tuple[BallJoint, ...] = field(init=False, repr=False)
     others: SquaredDistance = field(init=False, repr=False)
-
-    def __post_init__(self) -> None:
-        """Check the value.
-
-        Raises:
-            InputError: the weight is not positive, or out of range.
-        """
-        object.__setattr__(self, "weight", inputs.weight(self.weight, "RotationEffort: weight"))
 
     def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:
         """Find the ball joints, and store the start."""

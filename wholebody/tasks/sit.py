@@ -16,7 +16,6 @@ from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
 from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Level, Near, Over, Part, owner_pairs
 from wholebody.tasks.surfaces import Surface, face, joined, surface
-from wholebody.tasks.touch import named
 
 UP = np.array((0.0, 0.0, 1.0))
 MARGIN = 0.08  # m: by which the middle of the pelvis is within the edges of the seat; half the seat if that is less
@@ -44,21 +43,14 @@ class Sit(ContactTerm):
         InputError: a name is not a string, or the weight is not positive.
     """
 
-    on: str
-    back: str | None = None
+    on: inputs.Name
+    back: inputs.Name | None = None
     _: KW_ONLY
-    pelvis: str = "pelvis"
-    trunk: str = "thorax"
-    weight: float = 1.0
+    pelvis: inputs.Name = "pelvis"
+    trunk: inputs.Name = "thorax"
+    weight: inputs.Weight = 1.0
     parts: Sequence[Part] = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Sit({shown(self.on)})"
-        for name in (self.on, self.pelvis, self.trunk, *(() if self.back is None else (self.back,))):
-            named(name, where)
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     @property
     def frame(self) -> str:

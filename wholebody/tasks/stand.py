@@ -9,17 +9,17 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.base.checks import flag, listed, number, settle, shown
+from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
+from wholebody.tasks.balance import Feet, Margin
 from wholebody.tasks.base import Constraint, SupportingPlanes, Surroundings, filled
 from wholebody.tasks.contact_parts import Facing, Gap, Over, Part, owner_pairs, planes_of
 from wholebody.tasks.sit import UP
 from wholebody.tasks.support import STANDING_HEIGHT, hull_corners, low_points
 from wholebody.tasks.surfaces import face, segments_beyond, surface
-from wholebody.tasks.touch import named
 
 FAR_INSIDE = 1.0  # m: value of a row whose corner is no corner of the polygon
 
@@ -43,25 +43,14 @@ class Stand(Constraint):
         InputError: no feet are named, a name is not a string, or the margin is negative.
     """
 
-    on: str
+    on: inputs.Name
     _: KW_ONLY
-    feet: Sequence[str] = ("left_foot", "right_foot")
+    feet: Feet = ("left_foot", "right_foot")
     balance: bool = True
-    margin: float = 0.0
+    margin: Margin = 0.0
     parts: Sequence[Part] = field(init=False, repr=False)
     polygon: SolePolygon | None = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Stand({shown(self.on)})"
-        named(self.on, where)
-        feet = tuple(listed(self.feet, f"{where}: feet", "['left_foot', 'right_foot']"))
-        if not feet:
-            raise InputError(f"{where}: feet is empty; give a list of names, such as ['left_foot', 'right_foot']")
-        object.__setattr__(self, "feet", feet)
-        settle(self, "balance", flag(self.balance, f"{where}: balance"))
-        object.__setattr__(self, "margin", number(self.margin, f"{where}: margin", 0.0, 1.0, "m"))
 
     def resolve(self, scene: Surroundings, start: Array) -> Stand:
         """Find the soles and the face that they stand on.

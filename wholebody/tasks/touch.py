@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
@@ -41,19 +40,12 @@ class Touch(ContactTerm):
         InputError: a name is not a string, or the weight is not positive.
     """
 
-    part: str
-    thing: str
+    part: inputs.Name
+    thing: inputs.Name
     _: KW_ONLY
-    weight: float = 1.0
+    weight: inputs.Weight = 1.0
     parts: Sequence[Part] = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Touch({shown(self.part)}, {shown(self.thing)})"
-        for name in (self.part, self.thing):
-            named(name, where)
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     @property
     def frame(self) -> str:
@@ -96,22 +88,14 @@ class Lean(ContactTerm):
         InputError: a name is not a string, the side has no direction, or the weight is not positive.
     """
 
-    on: str
+    on: inputs.Name
     _: KW_ONLY
-    part: str = "thorax"
-    side: ArrayLike = (-1.0, 0.0, 0.0)
-    weight: float = 1.0
+    part: inputs.Name = "thorax"
+    side: inputs.Direction = (-1.0, 0.0, 0.0)
+    weight: inputs.Weight = 1.0
     resolved_side: Array = field(init=False, repr=False)
     parts: Sequence[Part] = field(init=False, repr=False)
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
-
-    def __post_init__(self) -> None:
-        """Check the values."""
-        where = f"Lean({shown(self.on)})"
-        for name in (self.on, self.part):
-            named(name, where)
-        object.__setattr__(self, "resolved_side", inputs.direction(self.side, f"{where}: side"))
-        object.__setattr__(self, "weight", inputs.weight(self.weight, f"{where}: weight"))
 
     @property
     def frame(self) -> str:
@@ -160,17 +144,6 @@ def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
 def touched(scene: Surroundings, found: Surface) -> tuple[str, ...]:
     """Segments and things whose clearance is zero where a surface touches: without owners, what its joint carries."""
     return found.owners or carried_by(scene, found.name, found.joints[0]).owners
-
-
-def named(name: object, where: str) -> str:
-    """The name of something.
-
-    Raises:
-        InputError: it is not a string, or empty.
-    """
-    if not isinstance(name, str) or not name:
-        raise InputError(f"{where} takes the names of segments and things, not {shown(name)}")
-    return name
 
 
 def check_apart(first: Surface, second: Surface, where: str) -> None:

@@ -10,15 +10,6 @@ from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
 
-NOTED = 1e-3
-"""Remaining depth, metres, from which a frame's note reports it."""
-
-SPEED = 4.0
-"""Largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast enough to return
-from 2 rad in half a second, and slow enough not to look like a jump."""
-
-ROOT_SPEED = 2.0  # m/s
-
 
 class CCDStrategy:
     """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.overlap_resolution`)."""
@@ -35,9 +26,11 @@ class CCDStrategy:
             seed: of the order of the chains.
         """
         self.scene = scene
-        self._largest_motion = np.full(scene.model.nv, SPEED * dt)
+        # largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast
+        # enough to return from 2 rad in half a second, and slow enough not to look like a jump
+        self._largest_motion = np.full(scene.model.nv, 4.0 * dt)
         if scene.figure.root == "free":
-            self._largest_motion[:3] = ROOT_SPEED * dt
+            self._largest_motion[:3] = 2.0 * dt  # root speed, m/s
         self._tracked = shown
         self._rng = np.random.default_rng(seed)
 
@@ -46,7 +39,8 @@ class CCDStrategy:
         largest_motion = self._largest_motion + np.abs(pin.difference(self.scene.model, self._tracked, tracked))
         self._tracked = tracked
         result = resolve_overlap(self.scene, shown, tracked, self._rng, largest_motion)
-        note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > NOTED else ""
+        # remaining depth, metres, from which a frame's note reports it
+        note = f"{1e3 * result.deepest:.1f} mm of overlap are left" if result.deepest > 1e-3 else ""
         return Resolution(
             candidates=(result.q,),
             contact_seconds=result.contact_seconds,

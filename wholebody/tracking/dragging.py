@@ -30,10 +30,6 @@ from wholebody.tracking.moving_goals import copied, moving_goal, retarget
 
 Counts = NDArray[np.intp]
 
-SETTLED = 1e-3  # m, rad: largest error at the end of the path for which no frames are added
-GAIN = 1e-4  # m, rad: a figure that approaches the goal by less in a frame is at rest
-SETTLING = 120  # most frames that are added for a figure that lags behind
-
 
 @dataclass(frozen=True, eq=False)
 class Dragged:
@@ -169,7 +165,10 @@ def drag_along(
 
 def _lags(left: list[float], late: int) -> bool:
     """Whether a figure still approaches the last position, from the error in each frame."""
-    return late < SETTLING and left[-1] > SETTLED and left[-2] - left[-1] > GAIN
+    # m, rad: largest error at the end of the path for which no frames are added
+    # m, rad: a figure that approaches the goal by less in a frame is at rest
+    # most frames that are added for a figure that lags behind
+    return late < 120 and left[-1] > 1e-3 and left[-2] - left[-1] > 1e-4
 
 
 def judge_drag(problem: Problem, dragged: Dragged, *, goal: int = 0) -> DragJudgement:

@@ -17,21 +17,6 @@ from wholebody.methods.ccd.overlap_resolution.resolver import chains_of
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 
-FAR = 0.05
-"""Distance of a degree of freedom from its tracked value, radians and metres, below which nothing holds it back: the
-clearance keeps it off by less."""
-
-GAIN = 0.2
-"""Share of the possible approach of a frame below which limbs in contact hold each other. More lets limbs give way that
-only slide along each other."""
-
-GIVES_WAY = 0.1
-"""Weight of a limb that gives way, relative to the others. Damping slows it down in proportion: with 0.01 it comes back
-in a second only after it was pushed aside."""
-
-PATIENCE = 10
-"""Frames after which the other limb gives way instead."""
-
 
 class Entanglement:
     """Looks whether two limbs hold each other, and which of them gives way."""
@@ -62,10 +47,12 @@ class Entanglement:
             away = np.abs(pin.difference(self._model, shown, tracked))
             if not self._frames:  # the limb that is nearer to where it belongs has less to lose
                 self._giving = int(np.argmin([away[self._dofs[limb]].max() for limb in self._holding]))
-            elif not self._frames % PATIENCE:
+            elif not self._frames % 10:  # frames after which the other limb gives way instead
                 self._giving = 1 - self._giving
             self._frames += 1
-            factors[self._dofs[self._holding[self._giving]]] = GIVES_WAY
+            # Weight of a limb that gives way, relative to the others. Damping slows it down in
+            # proportion: with 0.01 it comes back in a second only after it was pushed aside.
+            factors[self._dofs[self._holding[self._giving]]] = 0.1
         else:
             self._frames = 0
         return factors
@@ -91,7 +78,11 @@ class Entanglement:
         dofs = np.concatenate([self._dofs[limb] for limb in pair])
         was, now = (np.abs(pin.difference(self._model, q, tracked))[dofs] for q in (before, shown))
         possible = np.minimum(was, self._largest_motion[dofs]).max()
-        held = now.max() > FAR and was.max() - now.max() < GAIN * possible
+        # distance of a degree of freedom from its tracked value, radians and metres, below which nothing
+        # holds it back: the clearance keeps it off by less
+        # Share of the possible approach of a frame below which limbs in contact hold each other. More lets
+        # limbs give way that only slide along each other.
+        held = now.max() > 0.05 and was.max() - now.max() < 0.2 * possible
         self._holding = pair if held else None
 
     def _free(self, tracked: Array) -> bool:

@@ -19,7 +19,6 @@ Counts = NDArray[np.intp]
 PASSING = {"qp": 1e-4, "ccd": 1e-3}
 """Depth between two frames that counts as passing through, metres: as much as may remain in the frames themselves."""
 
-BACK = 1e-3  # rad, m: the shown posture has returned if it is nearer to the tracked one than this
 IN_TIME = 30  # frames after the end of contact in which it should return
 
 
@@ -87,6 +86,7 @@ def _returns(touching: NDArray[np.bool_], apart: Array) -> tuple[tuple[int, int]
         free = int(later[0]) if len(later) else len(touching) - end
         if free < IN_TIME:
             continue
-        back = np.flatnonzero(apart[end : end + free] < BACK)
+        # rad, m: the shown posture has returned if it is nearer to the tracked one than this
+        back = np.flatnonzero(apart[end : end + free] < 1e-3)
         found.append((int(end), int(back[0]) if len(back) else -1))
     return tuple(found)

@@ -23,9 +23,7 @@ from wholebody.tracking.drag import Drag
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
 
-NEAR = 0.002  # m: pairs nearer than this are counted as contacts
 FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
-MOST_UNDONE = 100  # postures that are remembered
 SLOW, QUICK = 1.5 * FRAME, 0.75 * FRAME  # s of the processor: after such a frame the goal may go half, or twice as far
 LEAST_MOVE = 0.002  # m: a goal may always go so far in a frame
 
@@ -106,7 +104,7 @@ class LiveDrag:
         """
         known(name, {*self.handles, *self.things}, "handle")
         self._undo.append((self.q.copy(), self._subject.remembered()))
-        del self._undo[:-MOST_UNDONE]
+        del self._undo[:-100]  # postures that are remembered
         self.taken = name
         self._restart()
 
@@ -237,7 +235,8 @@ class LiveDrag:
         self._subject.move(self.taken, pin.SE3(at.rotation, at.translation + way), FRAME)
 
     def _report(self, error: float, seconds: float) -> LiveFrame:
-        contacts = self.scene.contacts(self.q, within=NEAR)
+        # m: pairs nearer than this are counted as contacts
+        contacts = self.scene.contacts(self.q, within=0.002)
         overlap = float(-contacts.distance.min(initial=0.0))
         doing = f"dragging {self.taken}" if self.taken else "take a handle and drag it; click one to hold it"
         status = f"{doing}, by {self.method.name}"

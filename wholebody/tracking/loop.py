@@ -96,7 +96,7 @@ class FrameLoop(NotCopyable):
         check_scene(scene, "FrameLoop")
         known(overlap, OVERLAPS, "way to remove overlap", "overlap")
         dt = time_step(dt, "dt")
-        SEED.check(seed, "seed")
+        SEED(seed, "seed")
         rigid = flag(rigid, "rigid")
         for name in listed(touching, "FrameLoop: touching", "['ball']"):
             known(name, scene.objects, "object", "touching")

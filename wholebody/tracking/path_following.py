@@ -29,7 +29,6 @@ from wholebody.tracking.moving_goals import copied, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
 
 SPACING = 0.05  # m between intermediate goals; smaller = more solves, each from a nearer start
-CLOSEST = 1e-6  # m: least spacing
 MOST_GOALS = 10_000
 
 
@@ -106,7 +105,7 @@ def _spaced(path: ArrayLike, spacing: float) -> Sequence[Array]:
         raise InputError(f"path has shape {corners.shape}; give corners of shape (k, 3), metres")
     for place, corner in enumerate(corners):
         point(corner, f"path[{place}]")
-    spacing = checks.number(spacing, "spacing", CLOSEST, FARTHEST, "m")
+    spacing = checks.number(spacing, "spacing", 1e-6, FARTHEST, "m")  # m: least spacing
     legs = np.linalg.norm(np.diff(corners, axis=0), axis=1)
     if (legs.sum() / MOST_GOALS) > spacing:
         raise InputError(f"a spacing of {spacing:g} m makes more than {MOST_GOALS} goals of this path; make it larger")

@@ -19,8 +19,6 @@ from wholebody.tracking.frame import FRAME
 from wholebody.tracking.tracks import MOST_FRAMES
 
 SPEED = 0.5  # m/s: of the goal, if the number of frames is not given
-CORNERS = 72  # of a circle
-SMALLEST = 1e-6  # m: of a circle
 LARGEST = 100.0  # m: a point farther from the origin is refused as a wrong unit
 
 
@@ -43,11 +41,11 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
         InputError: the radius is not positive, or a value is not finite.
     """
     middle, axis = point(center, "circle: center"), direction(normal, "circle: normal")
-    radius = number(radius, "circle: radius", SMALLEST, LARGEST, "m")
+    radius = number(radius, "circle: radius", 1e-6, LARGEST, "m")  # m: smallest circle
     down = np.array((0.0, 0.0, -1.0)) if abs(axis[2]) < 0.99 else np.array((1.0, 0.0, 0.0))
     first = down - (down @ axis) * axis
     first /= np.linalg.norm(first)
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS + 1)[:, None]
+    angle = np.linspace(0.0, 2.0 * np.pi, 73)[:, None]  # a polygon of 72 sides
     corners: Array = middle + radius * (np.cos(angle) * first + np.sin(angle) * np.cross(axis, first))
     return corners
 

@@ -20,12 +20,6 @@ from wholebody.tracking.frame import Resolution
 CLEARANCE = 1e-3
 """Clearance of pieces, metres. A step is exact to first order only; the clearance must exceed its error."""
 
-STEPS = 2
-"""Most programs a frame. One is enough without contact; the second corrects the second-order error of the first. More
-would converge in fewer frames and take longer in each."""
-
-SETTLED = 1e-4
-"""Largest entry of a step, radians and metres, below which the frame is done."""
 
 SPEED = 8.0
 """Velocity limit of joints, rad/s: above that of people, so that a released figure returns soon but does not jump."""
@@ -86,13 +80,16 @@ class QPStrategy:
         q = shown
         candidates: list[Array] = []
         path: list[tuple[float, Array]] = []
-        while len(candidates) < STEPS:
+        # Most programs a frame. One is enough without contact; the second corrects the second-order error of
+        # the first. More would converge in fewer frames and take longer in each.
+        while len(candidates) < 2:
             step = self._tracker.step(q)
             # steps of a root that turns do not add, and rows of cones are exact to first order only
             q = self._into_cones(self._motion_limit.kept(self.scene.model, step.q))
             candidates.append(q)
             path += [*step.path[:-1], (1.0, q)] if step.path else [(1.0, q)] if path else []
-            if np.abs(step.displacement).max() < SETTLED or not step.rows:
+            # largest entry of a step, radians and metres, below which the frame is done
+            if np.abs(step.displacement).max() < 1e-4 or not step.rows:
                 break
         contacts = workspace.near(q, 1.01 * CLEARANCE)
         if self._entanglement is not None:

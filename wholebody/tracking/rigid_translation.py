@@ -21,18 +21,6 @@ from wholebody.geometry.penetration import global_depth
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
 
-STEP = 0.01
-"""Largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's top, a finger), so
-that it does not leave them on the other side."""
-
-STEPS = 6  # most steps a frame: 3.6 m/s at 60 frames a second
-TURN = 0.1  # rad: largest rotation of the hand in one step
-DISPLACEMENTS = 30  # most displacements a step; one is enough for one pair, and in a corner the walls alternate
-MARGIN = 5e-4  # m beyond PD_g: room for the arcs of fingertips from frame to frame
-CANCELLED = 1e-6  # m: a shorter PD_g has no direction
-HALVINGS = 8
-GAIN = 1e-5  # m, rad: a step that brings the hand nearer by less than this ends the frame
-
 
 class RigidTranslation:
     """Follows tracked postures of a figure with a free root that is displaced as a rigid body."""
@@ -62,9 +50,10 @@ class RigidTranslation:
         note, q = "", self._with_fingers(shown, tracked)
         if q is None:
             q, note = shown, "the fingers would be inside each other or have no room; they stay"
-        for _ in range(STEPS):
+        for _ in range(6):  # most steps a frame: 3.6 m/s at 60 frames a second
             following = self._freed(q, self._toward(q, tracked))
-            if self._root_distance(following, tracked) > self._root_distance(q, tracked) - GAIN:
+            # m, rad: a step that brings the hand nearer by less than this ends the frame
+            if self._root_distance(following, tracked) > self._root_distance(q, tracked) - 1e-5:
                 break
             q = following
         queried = self._workspace.proximity.seconds - queried
@@ -81,7 +70,10 @@ class RigidTranslation:
         turn = pin.Quaternion(q[3:7]).toRotationMatrix()
         for out in self._out:
             way[:3] -= min(0.0, float(way[:3] @ (turn.T @ out))) * (turn.T @ out)
-        long = max(float(np.linalg.norm(way[:3])) / STEP, float(np.linalg.norm(way[3:6])) / TURN, 1.0)
+        # largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's
+        # top, a finger), so that it does not leave them on the other side
+        # rad: largest rotation of the hand in one step
+        long = max(float(np.linalg.norm(way[:3])) / 0.01, float(np.linalg.norm(way[3:6])) / 0.1, 1.0)
         way[:6] /= long
         way[6:] = 0.0
         return np.asarray(pin.integrate(self.model, q, way))
@@ -91,12 +83,13 @@ class RigidTranslation:
         displaced = self._displaced(drawn)
         if displaced is not None:
             return displaced
-        return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), HALVINGS)
+        return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), 8)  # halvings
 
     def _displaced(self, q: Array) -> Array | None:
         """The hand displaced by PD_g until nothing overlaps; None if that does not end."""
         q = q.copy()
-        for _ in range(DISPLACEMENTS):
+        # most displacements a step; one is enough for one pair, and in a corner the walls alternate
+        for _ in range(30):
             depths, normals, obstacles = self._overlaps(q)
             if not len(depths):
                 return q
@@ -108,9 +101,10 @@ class RigidTranslation:
                 of = obstacles == obstacle
                 push = global_depth(depths[of], normals[of])
                 length = float(np.linalg.norm(push))
-                if length < CANCELLED:
+                if length < 1e-6:  # m: a shorter PD_g has no direction
                     return None  # opposed normals cancel (figure 4b)
-                q[:3] += push * (1.0 + MARGIN / length)
+                # m beyond PD_g: room for the arcs of fingertips from frame to frame
+                q[:3] += push * (1.0 + 5e-4 / length)
                 self._out = [*self._out[-1:], push / length]
         return None
 

@@ -24,7 +24,6 @@ BLUE: Color = (0.30, 0.42, 0.58, 1.0)
 HALF_WIDTH = 2.5  # m: of a room, along y
 LENGTH = 5.0  # m: of a room, along x; the rooms meet at x = 0
 HEIGHT = 2.6
-THICKNESS = 0.15
 DOOR_WIDTH, DOOR_HEIGHT = 1.0, 2.1
 
 TABLE: Place = (-2.5, 1.2, 0.74)  # m: middle of the top of the long table
@@ -46,7 +45,7 @@ def gallery(figure: Figure) -> Scene:
 
 
 def _walls(scene: Scene) -> None:
-    t, h, middle = THICKNESS, HEIGHT, 0.5 * HEIGHT
+    t, h, middle = 0.15, HEIGHT, 0.5 * HEIGHT  # thickness
     outside = 2.0 * (LENGTH + t)
     scene.add(Box((t, 2.0 * HALF_WIDTH, h)), name="west wall", at=(-LENGTH - 0.5 * t, 0.0, middle), color=WALL)
     scene.add(Box((t, 2.0 * HALF_WIDTH, h)), name="east wall", at=(LENGTH + 0.5 * t, 0.0, middle), color=WALL)

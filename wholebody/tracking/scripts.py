@@ -21,11 +21,8 @@ from wholebody.tracking.tracks import MOST_FRAMES, Track
 Place = tuple[float, float, float]
 Keys = list[tuple[float, Array]]
 
-TIME_STEPS = (1e-3, 1.0)  # s: least and greatest from frame to frame
-TREMOR = 2e-3  # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
 STILL = ("hip", "knee", "ankle", "toe")
 """Parts of the names of joints without tremor, because the feet stand on the floor."""
-TREMOR_BAND = (0.3, 2.0)  # Hz
 WAVES = 5
 
 
@@ -57,8 +54,8 @@ class ScenePlan:
         """
         if frames is not None:
             frames = whole(frames, "frames", 1, MOST_FRAMES)
-        SEED.check(seed, "seed")
-        dt = number(dt, "dt", *TIME_STEPS, "s")
+        SEED(seed, "seed")
+        dt = number(dt, "dt", 1e-3, 1.0, "s")  # s: least and greatest from frame to frame
         figure = load(self.figure)
         track = script(figure, self.keys(figure), dt=dt, seed=seed, name=name)
         return figure, track if frames is None else track.repeated(frames)
@@ -112,10 +109,11 @@ def _trembling(figure: Figure, q: Array, dt: float, rng: np.random.Generator) ->
     time = dt * np.arange(len(q))
     size = np.zeros(figure.model.nv)
     for joint in figure.joints:
-        size[figure.dofs(joint)] = 0.0 if any(part in joint for part in STILL) else TREMOR
+        # rad: amplitude of a tracker's noise and a person's tremor in arms, fingers and neck
+        size[figure.dofs(joint)] = 0.0 if any(part in joint for part in STILL) else 2e-3
     shake = np.zeros((len(q), figure.model.nv))
     for _ in range(WAVES):
-        rate = 2.0 * np.pi * rng.uniform(*TREMOR_BAND, figure.model.nv)
+        rate = 2.0 * np.pi * rng.uniform(0.3, 2.0, figure.model.nv)  # Hz
         shake += np.sin(np.outer(time, rate) + rng.uniform(0.0, 2.0 * np.pi, figure.model.nv))
     ramp = np.minimum(1.0, np.minimum(time, time[::-1]) / 0.5)
     shake *= size / WAVES * ramp[:, None]

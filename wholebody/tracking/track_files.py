@@ -22,7 +22,6 @@ ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
 LATEST = 1e9  # s
 TIME = "time"
-EVEN = 1e-3  # share of the time step by which the time of a line may differ
 
 
 def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
@@ -91,7 +90,8 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     dt = float(time[1] - time[0])
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
-    late = np.flatnonzero(np.abs(np.diff(time) - dt) > EVEN * abs(dt))
+    # share of the time step by which the time of a line may differ
+    late = np.flatnonzero(np.abs(np.diff(time) - dt) > 1e-3 * abs(dt))
     if len(late):
         line_number = places[int(late[0]) + 1]
         raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")

@@ -9,13 +9,12 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
-from wholebody.view import drawing, style
+from wholebody.view import drawing
 from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
-MOST = 4  # most blockers that are marked, the strongest; more labels hide each other
-
-_BALL = Marker("ball", style.BLOCKER, style.BLOCKER_RADIUS)
+_BALL = Marker("ball", LOOK.blocker, LOOK.blocker_radius)
 
 
 def mark_blockers(
@@ -30,14 +29,15 @@ def mark_blockers(
         contacts: near pairs at that posture.
         blockers: `Blocker`s of an assessment, the strongest first.
     """
-    for number, blocker in enumerate(blockers[:MOST]):
+    # most blockers that are marked, the strongest; more labels hide each other
+    for number, blocker in enumerate(blockers[:4]):
         place = _place(scene, state, contacts, blocker)
         if place is None:
             continue
-        root = f"{style.BLOCKER_NODE}/{number}"
+        root = f"{LOOK.blocker_node}/{number}"
         keyframe.markers[f"{root}/ball"] = (_BALL, drawing.point_placement(place))
-        label = Marker("label", style.BLOCKER_LABEL, style.LABEL_SIZE, f"in the way: {blocker}")
-        above = drawing.point_placement(place + [0.0, 0.0, 2.0 * style.BLOCKER_RADIUS])
+        label = Marker("label", LOOK.blocker_label, LOOK.label_size, f"in the way: {blocker}")
+        above = drawing.point_placement(place + [0.0, 0.0, 2.0 * LOOK.blocker_radius])
         keyframe.markers[f"{root}/text"] = (label, above)
 
 

@@ -15,7 +15,7 @@ from wholebody.view import drawing, style
 from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
-from wholebody.view.style import Color
+from wholebody.view.style import LOOK, Color
 from wholebody.view.surface import surface_of
 from wholebody.view.viewed_scene import ViewedAssembly, ViewedScene
 
@@ -46,7 +46,7 @@ class Body:
         """Colour in contact: the figure's pieces take this colour, things are tinted, half-spaces keep theirs."""
         if self.plate:
             return self.color
-        amount = style.TINT if self.thing is not None else 1.0
+        amount = LOOK.tint if self.thing is not None else 1.0
         return style.tinted(self.color, state, amount)
 
 
@@ -102,7 +102,7 @@ class Bodies:
         for piece, owner in zip(scene.geometry.geometryObjects, scene.piece_owner, strict=True):
             thing = owner if owner in numbers else None
             color = self._thing_color(thing, numbers[thing], piece) if thing is not None else _own_color(piece)
-            folder = f"{style.OBJECT_NODE}/{node(thing)}" if thing is not None else style.FIGURE_NODE
+            folder = f"{LOOK.object_node}/{node(thing)}" if thing is not None else LOOK.figure_node
             carrier = f"{folder}/{node(names[piece.parentJoint])}"
             plate = type(piece.geometry).__name__ == "Halfspace"
             path, corners = f"{carrier}/{node(piece.name)}", box_corners(piece.geometry)
@@ -131,7 +131,7 @@ class Bodies:
             if visual is None:
                 continue
             prefix = f"{name}/" if name else ""
-            folder = f"{style.FIGURE_NODE}/{node(name)}" if name else style.FIGURE_NODE
+            folder = f"{LOOK.figure_node}/{node(name)}" if name else LOOK.figure_node
             nodes = {joint: f"{folder}/{node(joint)}" for joint in visual.joints}
             for joint, path in nodes.items():
                 self.carriers[path] = int(self.scene.model.getJointId(f"{prefix}{joint}"))
@@ -143,15 +143,15 @@ class Bodies:
             color: Color = tuple(float(part) for part in given)  # type: ignore[assignment]
         elif type(piece.geometry).__name__ == "Halfspace":
             upward = float((piece.placement.rotation @ piece.geometry.n)[2]) > 0.9
-            color = style.FLOOR if upward else style.with_opacity(style.object_color(number), style.SEE_THROUGH)
+            color = LOOK.floor if upward else style.with_opacity(style.object_color(number), LOOK.see_through)
         else:
             color = style.object_color(number)
-        return style.with_opacity(color, style.SEE_THROUGH) if thing in self.see_through else color
+        return style.with_opacity(color, LOOK.see_through) if thing in self.see_through else color
 
     def build(self, graph: SceneGraph) -> None:
         """Put every piece in the scene graph, in place of earlier ones."""
-        graph.remove(style.FIGURE_NODE)
-        graph.remove(style.OBJECT_NODE)
+        graph.remove(LOOK.figure_node)
+        graph.remove(LOOK.object_node)
         self._patches = [
             (f"{figure.prefix}{patch.segment}", patch) for figure in self._drawn for patch in figure.build(graph)
         ]
@@ -162,7 +162,7 @@ class Bodies:
             graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             graph.place(body.path, piece.placement.homogeneous)
         floor = next(
-            (index for index, body in enumerate(self.all) if body.plate and body.color[:3] == style.FLOOR[:3]), None
+            (index for index, body in enumerate(self.all) if body.plate and body.color[:3] == LOOK.floor[:3]), None
         )
         graph.set("/Ground", "visible", floor is None)  # a plane for shadows if there is no floor
         grid = np.eye(4)
@@ -170,7 +170,7 @@ class Bodies:
             piece = self.scene.geometry.geometryObjects[floor]
             top = drawing.plate_placement(np.asarray(piece.geometry.n), float(piece.geometry.d))
             grid = piece.placement.homogeneous @ top
-            grid[:3, 3] += grid[:3, 2] * style.PLATE[2] / 2
+            grid[:3, 3] += grid[:3, 2] * LOOK.plate[2] / 2
         grid[:3, 3] += 0.0015 * grid[:3, 2]  # m: above the floor, otherwise the two flicker
         graph.place("/Grid", grid)
 
@@ -187,7 +187,7 @@ class Bodies:
             return
         for owner, patch in self._patches:
             if owner == self.scene.piece_owner[index]:
-                keyframe.colors[patch.path] = style.tinted(patch.color, state, style.PAINT)
+                keyframe.colors[patch.path] = style.tinted(patch.color, state, LOOK.paint)
 
     def pose(self, keyframe: Keyframe, data: Any) -> None:
         """Place the joints by `data`, and the things at their present placements."""
@@ -204,7 +204,7 @@ class Bodies:
 
     def ghost(self, graph: SceneGraph, number: int, data: Any, color: Color) -> None:
         """Draw the figure and what it carries once more, transparent, at the posture of `data`."""
-        root = f"{style.GHOST_NODE}/{number}"
+        root = f"{LOOK.ghost_node}/{number}"
         for figure in self._drawn:
             figure.build(graph, root, color)
             for path in figure.nodes.values():
@@ -222,7 +222,7 @@ class Bodies:
         """Place an existing ghost at the posture of `data`."""
         for path, joint in self.carriers.items():
             if joint:
-                keyframe.transforms[f"{style.GHOST_NODE}/{number}{path}"] = data.oMi[joint].homogeneous
+                keyframe.transforms[f"{LOOK.ghost_node}/{number}{path}"] = data.oMi[joint].homogeneous
 
     def corners(self, data: Any, *, things: bool) -> Array:
         """Corners (n, 3) in the world of boxes around the figure's pieces, or solid things that are no plates."""
@@ -245,7 +245,7 @@ class Bodies:
         for name, boxes in found.items():
             corners = np.concatenate(boxes)
             low, high = corners.min(axis=0), corners.max(axis=0)
-            tops[f"{style.NAME_NODE}/{node(name)}"] = (name, np.array([*(low + high)[:2] / 2, high[2]]))
+            tops[f"{LOOK.name_node}/{node(name)}"] = (name, np.array([*(low + high)[:2] / 2, high[2]]))
         return tops
 
     def color_segments(self, keyframe: Keyframe, colors: Mapping[str, Color]) -> None:
@@ -268,7 +268,7 @@ class Bodies:
 def _own_color(piece: Any) -> Color:
     """The colour that a robot's file gives the link of a piece, and otherwise that of figures."""
     if not piece.overrideMaterial and piece.meshColor[3] > 0.0:
-        return style.FIGURE
+        return LOOK.figure
     red, green, blue, alpha = (float(part) for part in piece.meshColor)
     return red, green, blue, alpha
 

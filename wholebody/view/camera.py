@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.view import commands, style
+from wholebody.view import commands
 from wholebody.view.server import CAMERA, Command
+from wholebody.view.style import LOOK
 
 NEAR = 0.3
 """Distance from the figure within which things are kept in the picture, metres."""
@@ -57,5 +58,5 @@ def camera_on(figure: Array, things: Array, direction: Array | None = None) -> C
     near = np.clip(things, low - NEAR, high + NEAR)
     points = np.concatenate([figure, near])
     target = (points.min(axis=0) + points.max(axis=0)) / 2
-    way = np.asarray(style.DIRECTION if direction is None else direction, dtype=float)
-    return look(target, style.FIELD_OF_VIEW, direction=way, points=points, margin=style.MARGIN)
+    way = np.asarray(LOOK.direction if direction is None else direction, dtype=float)
+    return look(target, LOOK.field_of_view, direction=way, points=points, margin=LOOK.margin)

@@ -13,7 +13,7 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.view import drawing, style
+from wholebody.view import drawing
 from wholebody.view.blocker_markers import mark_blockers
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
@@ -22,6 +22,7 @@ from wholebody.view.goal_markers import Goals, mark_frames
 from wholebody.view.inner_paths import Timed
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
+from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene
 
 
@@ -47,8 +48,8 @@ class Composition:
         self._bodies: Bodies | None = None
         self._goals: Goals | None = None
         self._frames: tuple[str, ...] = ()
-        self._axes = style.AXES_LENGTH
-        self.segment_colors: dict[str, style.Color] = {}
+        self._axes = LOOK.axes_length
+        self.segment_colors: dict[str, Color] = {}
 
     @property
     def figure(self) -> Figure:
@@ -108,21 +109,19 @@ class Composition:
         mark_frames(keyframe, self.scene, state, self._frames, self._axes)
         if self._names:
             for path, (name, top) in bodies.tops(state.data).items():
-                label = Marker("label", style.LABEL, style.LABEL_SIZE, name)
+                label = Marker("label", LOOK.label, LOOK.label_size, name)
                 keyframe.markers[path] = (label, drawing.point_placement(top))
         return keyframe
 
-    def ghosts(self, postures: Sequence[Array], color: style.Color) -> None:
+    def ghosts(self, postures: Sequence[Array], color: Color) -> None:
         """Draw the figure, transparent, at these postures, in place of earlier ghosts."""
         if postures and self.scene.figure is not None:
             self.scene.figure.warn_of_angles(np.array(postures), "ghosts")
-        self._graph.remove(style.GHOST_NODE)
+        self._graph.remove(LOOK.ghost_node)
         for number, q in enumerate(postures):
             self.bodies.ghost(self._graph, number, self._state.update(q).data, color)
 
-    def moving_ghost(
-        self, keyframes: Sequence[Keyframe], postures: Any, color: style.Color, played: Timed
-    ) -> list[Array]:
+    def moving_ghost(self, keyframes: Sequence[Keyframe], postures: Any, color: Color, played: Timed) -> list[Array]:
         """Add a moving ghost, one posture a frame, to a motion's keyframes; return its first posture.
 
         Raises:

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.view import style
 from wholebody.view.commands import floats, integers
-from wholebody.view.style import Color
+from wholebody.view.style import LOOK, Color
 
 Three = dict[str, Any]
 _FRONT, _BOTH = 0, 2
@@ -67,7 +66,7 @@ def _shape(geometry: Any, name: str) -> tuple[Three, tuple[float, float, float],
         size = {"radiusTop": top, "radiusBottom": float(geometry.radius), "height": 2 * float(geometry.halfLength)}
         return {"type": "CylinderGeometry", **size, "radialSegments": _AROUND}, one, _ALONG_Z, False
     if kind == "Halfspace":
-        width, height, depth = style.PLATE
+        width, height, depth = LOOK.plate
         plate = {"type": "BoxGeometry", "width": width, "height": height, "depth": depth}
         return plate, one, plate_placement(np.asarray(geometry.n), float(geometry.d)), True
     if kind == "Convex":
@@ -84,7 +83,7 @@ _ALONG_Z = np.array([[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 
 
 def plate_placement(normal: Array, offset: float) -> Array:
     """Placement (4, 4) of the plate that represents the half-space n.x <= d: its upper face is in the plane."""
-    placement = point_placement(normal * (offset - style.PLATE[2] / 2))
+    placement = point_placement(normal * (offset - LOOK.plate[2] / 2))
     placement[:3, :3] = _turned_to(normal)
     return placement
 
@@ -104,7 +103,7 @@ def _turned_to(direction: Array) -> Array:
 
 def arrow_placement(start: Array, direction: Array, length: float) -> Array:
     """Placement (4, 4), with scale, of the unit arrow from `start` along `direction`; long arrows keep their width."""
-    width = min(length, style.WIDEST_ARROW)
+    width = min(length, LOOK.widest_arrow)
     placement = point_placement(start)
     placement[:3, :3] = _turned_to(direction) * (width, width, length)
     return placement

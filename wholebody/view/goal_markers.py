@@ -13,12 +13,13 @@ from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.placement import placement
-from wholebody.view import drawing, style
+from wholebody.view import drawing
 from wholebody.view.scene_graph import Keyframe, Marker
+from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedScene
 
-_TARGET = Marker("ball", style.TARGET, style.TARGET_RADIUS)
-_TO_TARGET = Marker("rod", style.TARGET)
+_TARGET = Marker("ball", LOOK.target, LOOK.target_radius)
+_TO_TARGET = Marker("rod", LOOK.target)
 FARTHEST_LOOK = 1.0
 """Metres: what an axis is turned to is not drawn, and not kept in the picture, if it is farther from the frame."""
 
@@ -41,7 +42,7 @@ class Goals:
     def mark(self, keyframe: Keyframe, state: State) -> None:
         """Mark each goal that has a position: target, line to it, axes of an orientation goal, the error."""
         for number, goal in enumerate(self.goals):
-            root = f"{style.GOAL_NODE}/{number}"
+            root = f"{LOOK.goal_node}/{number}"
             here = self._here(goal, state)
             target, directed = _target(goal, here, state, self.scene)
             if here is None or target is None:
@@ -50,15 +51,15 @@ class Goals:
                 np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis"))
             ):
                 keyframe.markers[f"{root}/target"] = (_TARGET, drawing.point_placement(target.translation))
-            line = drawing.rod_placement(here.translation, target.translation, style.LINE_RADIUS)
+            line = drawing.rod_placement(here.translation, target.translation, LOOK.line_radius)
             if line is not None:
                 keyframe.markers[f"{root}/line"] = (_TO_TARGET, line)
             if directed:
-                mark_axes(keyframe, f"{root}/axes", target, style.AXES_LENGTH)
-                mark_axes(keyframe, f"{root}/frame", here, style.AXES_LENGTH / 2)
+                mark_axes(keyframe, f"{root}/axes", target, LOOK.axes_length)
+                mark_axes(keyframe, f"{root}/frame", here, LOOK.axes_length / 2)
             self._point(keyframe, root, goal, here)
             text = f"{getattr(goal, 'frame', 'centre of mass')}  {left(goal, state)}"
-            label = Marker("label", style.GOAL_LABEL, style.LABEL_SIZE, text)
+            label = Marker("label", LOOK.goal_label, LOOK.label_size, text)
             keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(target.translation))
 
     def targets(self, state: State) -> Array:
@@ -89,9 +90,9 @@ class Goals:
             return
         now = here.rotation @ np.asarray(axis, dtype=float)
         wanted = _wanted(goal, here)
-        blue, green = style.AXES[2], style.TARGET
+        blue, green = LOOK.axes[2], LOOK.target
         for name, color, way in (("is", blue, now), ("wanted", green, wanted)):
-            place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * style.AXES_LENGTH)
+            place = drawing.arrow_placement(here.translation, way / np.linalg.norm(way), 2.5 * LOOK.axes_length)
             keyframe.markers[f"{root}/{name}"] = (Marker("arrow", color, 0.35), place)
 
 
@@ -147,7 +148,7 @@ def left(goal: Any, state: State) -> str:
 
 def mark_axes(keyframe: Keyframe, path: str, place: pin.SE3, length: float) -> None:
     """Draw the three axes of a placement in the world, `length` metres long."""
-    for name, color, direction in zip("xyz", style.AXES, place.rotation.T, strict=True):
+    for name, color, direction in zip("xyz", LOOK.axes, place.rotation.T, strict=True):
         arrow = drawing.arrow_placement(place.translation, direction, length)
         keyframe.markers[f"{path}/{name}"] = (Marker("arrow", color, 0.7), arrow)
 
@@ -156,6 +157,6 @@ def mark_frames(keyframe: Keyframe, scene: ViewedScene, state: State, names: Ite
     """Draw the axes of named frames of the figure, each with its name, `length` metres long."""
     for name in names:
         place = state.frame(scene.figure.frame_id(name))
-        mark_axes(keyframe, f"{style.FRAME_NODE}/{name}", place, length)
-        label = Marker("label", style.LABEL, style.LABEL_SIZE, name)
-        keyframe.markers[f"{style.FRAME_NODE}/{name}/name"] = (label, drawing.point_placement(place.translation))
+        mark_axes(keyframe, f"{LOOK.frame_node}/{name}", place, length)
+        label = Marker("label", LOOK.label, LOOK.label_size, name)
+        keyframe.markers[f"{LOOK.frame_node}/{name}/name"] = (label, drawing.point_placement(place.translation))

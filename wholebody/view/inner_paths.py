@@ -12,8 +12,6 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 
-APART = 1e-3  # share of a frame: postures that follow each other at once are shown this far apart
-
 
 class Timed(NamedTuple):
     """Postures at times.
@@ -57,7 +55,8 @@ def timed(postures: Sequence[Array], paths: Sequence[Sequence[tuple[float, Array
         inner = [(share, there) for share, there in paths[frame][1:-1]] if frame and len(paths) else []
         last, shares = 1.0, list[float]()
         for share, _ in reversed(inner):
-            last = min(share, last - APART)
+            # share of a frame: postures that follow each other at once are shown this far apart
+            last = min(share, last - 1e-3)
             shares.append(last)
         found.q.extend([*(there for _, there in inner), q])
         found.shares.extend([*reversed(shares), 1.0])

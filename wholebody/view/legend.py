@@ -8,25 +8,19 @@ from typing import Any
 
 from wholebody.assessment.posture import Assessment
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.view import style
 from wholebody.view.commands import pack
 from wholebody.view.scene_graph import Keyframe
 from wholebody.view.server import OBJECT, Command
-
-NODE = "/panel"
-"""Node under which the page keeps it; nothing is drawn there."""
-
-SMALLEST_ANGLE = 1e-3
-"""Radians: smaller angles are not told."""
+from wholebody.view.style import LOOK
 
 _MARKED = (
-    ("/normal", style.CONTACT_NODE, style.NORMAL, "normal of a contact"),
-    ("/depth", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/first", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/second", style.CONTACT_NODE, style.DEPTH, "way out of an overlap"),
-    ("/target", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
-    ("/wanted", style.GOAL_NODE, style.TARGET, "goal, and the way to it"),
-    ("/ball", style.BLOCKER_NODE, style.BLOCKER, "in the way"),
+    ("/normal", LOOK.contact_node, LOOK.normal, "normal of a contact"),
+    ("/depth", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/first", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/second", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+    ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+    ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+    ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),
 )
 """End of a marker's node, its folder, its colour and its meaning."""
 
@@ -35,9 +29,9 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
     """Meanings and colours (red, green, blue) of what occurs in any of the keyframes."""
     found: dict[str, Any] = {}
     if any(keyframe.touching for keyframe in keyframes):
-        found["touches"] = style.CONTACT[:3]
+        found["touches"] = LOOK.contact[:3]
     if any(keyframe.overlapping for keyframe in keyframes):
-        found["overlaps"] = style.PENETRATION[:3]
+        found["overlaps"] = LOOK.penetration[:3]
     paths = {path for keyframe in keyframes for path in keyframe.markers}
     for end, folder, shade, meaning in _MARKED:
         if any(path.startswith(folder) and path.endswith(end) for path in paths):
@@ -56,7 +50,8 @@ def status(keyframes: Sequence[Keyframe], count: int, dt: float, found: Assessme
     """
     said = [f"{count} postures, {(count - 1) * dt:.2f} s"] if count > 1 else []
     if found is not None and found.goal_errors:
-        angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > SMALLEST_ANGLE else ""
+        # radians: smaller angles are not told
+        angle = f", {degrees(found.goal_angle):.1f}°" if found.goal_angle > 1e-3 else ""
         said.append(f"goals missed by at most {1e3 * found.goal_error:.1f} mm{angle}")
     if not all(keyframe.contacts_shown for keyframe in keyframes):
         return "; ".join(said)
@@ -71,4 +66,4 @@ def panel(title: str, keyframes: Sequence[Keyframe], count: int, dt: float, foun
     """The command that puts the panel on the page; the arguments are those of `status`, and the page's title."""
     rows = [[meaning, *(round(255 * float(part)) for part in color)] for meaning, color in legend(keyframes)]
     message = {"type": "panel", "title": title, "status": status(keyframes, count, dt, found), "legend": rows}
-    return Command(OBJECT, NODE, "", pack(message))
+    return Command(OBJECT, "/panel", "", pack(message))  # node under which the page keeps it; nothing is drawn there

@@ -20,11 +20,6 @@ from wholebody.view.viser_server import viser_server
 
 SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
-EYE = (2.2, -1.6, 0.6)  # m: of the camera, from the middle of the handles
-RADIUS = 0.04  # m: of a handle
-SETTLING = 90  # frames after the mouse lets go in which the figure still follows to where it let go
-THROUGH = 0.7  # opacity of the figure, so that the handles in it are seen
-ENDING = 1.0  # s: how long the server is waited for; open tabs keep it for 6 s, in threads that end with the process
 
 
 class LivePage:
@@ -75,7 +70,9 @@ class LivePage:
         self._loop.join(timeout=5.0)
         ending = threading.Thread(target=self.server.stop, name="wholebody drag ends", daemon=True)
         ending.start()
-        ending.join(timeout=ENDING)
+        # s: how long the server is waited for; open tabs keep it for 6 s, in threads that end with
+        # the process
+        ending.join(timeout=1.0)
 
     def wait(self) -> None:
         """Wait until the page is stopped, or Ctrl-C."""
@@ -85,7 +82,8 @@ class LivePage:
     def _look(self) -> None:
         """Look at the middle of the handles from the front right."""
         middle = np.mean([self.drag.place(name) for name in self.drag.handles], axis=0)
-        self.server.initial_camera.position = middle + np.array(EYE)
+        # m: of the camera, from the middle of the handles
+        self.server.initial_camera.position = middle + np.array((2.2, -1.6, 0.6))
         self.server.initial_camera.look_at = middle
 
     def _draw(self) -> list[Any]:
@@ -94,7 +92,8 @@ class LivePage:
         for number, piece in enumerate(scene.geometry.geometryObjects):
             thing = scene.objects.get(scene.piece_owner[number])
             color = SKIN if thing is None else _bytes(thing.color, number)
-            opacity = THROUGH if thing is None else None if thing.color is None else thing.color[3]
+            # opacity of the figure, so that the handles in it are seen
+            opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
             mesh = drawn_triangles(piece.geometry)
             pieces.append(
                 self.server.scene.add_mesh_simple(
@@ -107,8 +106,9 @@ class LivePage:
 
     def _handle(self, name: str) -> Any:
         color = GRIP if name in self.drag.things else HELD if name in self.drag.held else FREE
+        # m: radius of a handle
         ball = self.server.scene.add_icosphere(
-            f"/handles/{name}", RADIUS, color=color, position=self.drag.place(name), cast_shadow=False
+            f"/handles/{name}", 0.04, color=color, position=self.drag.place(name), cast_shadow=False
         )
         offset = np.zeros(3)
 
@@ -124,7 +124,9 @@ class LivePage:
                     offset = self.drag.place(name) - np.array(event.start_position)
                 self._target = np.array(event.end_position) + offset
                 if event.phase == "end":
-                    self._settling = SETTLING
+                    # frames after the mouse lets go in which the figure still follows to where it
+                    # let go
+                    self._settling = 90
 
         async def clicked(_: Any) -> None:
             if name in self.drag.handles:

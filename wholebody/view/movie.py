@@ -21,9 +21,6 @@ from wholebody.base.files import Scratch, checked_target
 
 FASTEST = {".gif": 25.0, ".mp4": 30.0}
 """Largest default pictures per second: GIF times are hundredths of a second, and browsers slow down beyond 50."""
-SLOWEST = 0.01  # pictures per second
-_COLORS = 256
-EVERY = 7  # pixels, of which one counts for the palette: all of them take half a second
 
 
 def check_movie(path: str | os.PathLike[str]) -> Path:
@@ -55,7 +52,7 @@ def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[l
     """
     if fps is None:
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
-    fps = number(fps, "fps", SLOWEST, 100.0, "pictures per second")
+    fps = number(fps, "fps", 0.01, 100.0, "pictures per second")
     return [number / fps for number in range(math.floor((count - 1) * dt * fps + 1e-9) + 1)], fps
 
 
@@ -81,7 +78,7 @@ def _gif(pictures: Iterable[bytes], fps: float) -> bytes:
 
     frames = [Image.open(io.BytesIO(picture)).convert("RGB") for picture in pictures]
     palette = Image.fromarray(_swatch([frames[0], frames[len(frames) // 2], frames[-1]]))
-    palette = palette.quantize(_COLORS, method=Image.Quantize.MEDIANCUT)
+    palette = palette.quantize(256, method=Image.Quantize.MEDIANCUT)
     indexed = [frame.quantize(palette=palette, dither=Image.Dither.NONE) for frame in frames]
     made, rest = io.BytesIO(), indexed[1:]
     indexed[0].save(
@@ -95,7 +92,8 @@ def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
 
     By the pixels alone nearly all colours would go to sky and floor, and a face would be grey.
     """
-    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::EVERY] for frame in frames])
+    # pixels, of which one counts for the palette: all of them take half a second
+    pixels = np.concatenate([np.asarray(frame).reshape(-1, 3)[::7] for frame in frames])
     _, first = np.unique(pixels >> 3, axis=0, return_index=True)
     kinds = np.repeat(pixels[first], len(pixels) // len(first) + 1, axis=0)
     every = np.concatenate([pixels, kinds])

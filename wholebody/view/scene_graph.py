@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.view import commands, drawing, style
+from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
 from wholebody.view.sender import Sender
 from wholebody.view.server import Command, Store
-from wholebody.view.style import Color
+from wholebody.view.style import LOOK, Color
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ class SceneGraph:
                 tracks.append(Track(path, "visible", "bool", [place is not None for place in places], steps=True))
             last = next(place for place in places if place is not None)
             matrices = np.array([last := place if place is not None else last for place in places])
-            tracks.extend(_motion(path, matrices, steps=path.startswith(style.CONTACT_NODE)))
+            tracks.extend(_motion(path, matrices, steps=path.startswith(LOOK.contact_node)))
         return tracks
 
 

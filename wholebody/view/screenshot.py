@@ -8,10 +8,11 @@ from typing import Any
 
 from wholebody.base.checks import listed, shown, whole
 from wholebody.base.errors import InputError
-from wholebody.view import commands, style
+from wholebody.view import commands
 from wholebody.view.browser import Browser
 from wholebody.view.page import picture_page
 from wholebody.view.server import ANIMATION, CAMERA, OBJECT, Command, Store, bundle
+from wholebody.view.style import LOOK
 
 LARGEST = 8192  # pixels: limit of software renderers
 
@@ -44,7 +45,7 @@ def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
         now = after.nodes.get(path)
         if now is None or not node.properties.keys() <= now.properties.keys():
             return None
-        body = path.startswith((style.FIGURE_NODE, style.GHOST_NODE))
+        body = path.startswith((LOOK.figure_node, LOOK.ghost_node))
         if (node.object is not None and (now.object is None or (body and now.object != node.object))) or (
             node.transform is not None and now.transform is None
         ):

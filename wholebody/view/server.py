@@ -26,9 +26,7 @@ PUSH, SYNC, PAGE = b"e", b"s", b"h"
 STOP = "stop"
 HEADER = struct.Struct("<cHHI")
 LOCAL = ("127.0.0.1", "localhost", "::1")
-EVERYWHERE = ("0.0.0.0", "::")
 FIRST_PORT, PORTS = 7000, 100
-PARENT_POLL = 0.5  # s
 _HOST = re.compile(r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^\[\]:/@\s]+))(:\d+)?")
 
 
@@ -313,14 +311,14 @@ async def serve(parent: int, host: str, port: int) -> None:
                 return
     server = HTTPServer(make_application(hub, host))
     server.add_sockets(sockets)
-    shown = LOCAL[0] if host in EVERYWHERE else f"[{host}]" if ":" in host else host
+    shown = LOCAL[0] if host in ("0.0.0.0", "::") else f"[{host}]" if ":" in host else host  # everywhere
     tell(url=f"http://{shown}:{sockets[0].getsockname()[1]}/")
 
     reader = asyncio.StreamReader(limit=2**20)
     await asyncio.get_running_loop().connect_read_pipe(lambda: asyncio.StreamReaderProtocol(reader), sys.stdin.buffer)
     listening = asyncio.ensure_future(hub.listen(reader))
     while not listening.done() and os.getppid() == parent:
-        await asyncio.wait([listening], timeout=PARENT_POLL)
+        await asyncio.wait([listening], timeout=0.5)  # s: poll of the parent
 
 
 if __name__ == "__main__":

@@ -16,9 +16,6 @@ from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.style import Color
 from wholebody.view.surface import Surface
 
-UNIT = 1e-4
-"""Metres: positions are sent as whole multiples of it, in half of the bytes."""
-
 
 class Skinned(NamedTuple):
     """One drawn patch: its node, segment and color."""
@@ -79,6 +76,7 @@ class Skin:
         for patch in self.patches:
             shown: Color = (*patch.color, 1.0) if color is None else color
             path = f"{root}/{patch.name}"
-            graph.do(commands.set_skin(path, root, patch, shown, UNIT))
+            # metres: positions are sent as whole multiples of it, in half of the bytes
+            graph.do(commands.set_skin(path, root, patch, shown, 1e-4))
             drawn.append(Skinned(path, patch.segment, shown))
         return drawn

@@ -26,8 +26,6 @@ if TYPE_CHECKING:
 MOST_POSTURES = 1200
 """Postures of the animation: of a longer clip each k-th frame is shown. More make the page larger, 3 kB each."""
 
-DIGITS = 4  # of depths in the page, after the point of millimetres
-
 
 def timeline(found: ClipCheck, scene: Scene | None = None) -> str:
     """HTML of a checked clip, which makes no network requests.
@@ -77,7 +75,8 @@ def _cells(contact: Contact) -> dict[str, Any]:
     times = np.zeros(2 * len(contact.depth) - 1)
     times[::2], times[1::2] = contact.depth, contact.between
     at = np.flatnonzero(times)
-    return {"at": at.tolist(), "depth": np.round(1e3 * times[at], DIGITS).tolist()}
+    # digits of depths in the page, after the point of millimetres
+    return {"at": at.tolist(), "depth": np.round(1e3 * times[at], 4).tolist()}
 
 
 def _json(value: Any) -> str:

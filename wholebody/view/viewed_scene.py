@@ -20,8 +20,7 @@ from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
-from wholebody.view import style
-from wholebody.view.style import Color
+from wholebody.view.style import LOOK, Color
 
 
 @dataclass(frozen=True)
@@ -63,7 +62,7 @@ def _color(assembly: Assembly, owner: str) -> Color | None:
         return assembly.scene.objects[owner].color
     figure = owner.split("/")[0]
     if owner not in assembly.bodies and figure in assembly.figures:
-        return assembly.colors.get(figure, style.FIGURE)
+        return assembly.colors.get(figure, LOOK.figure)
     return assembly.colors.get(owner)
 
 

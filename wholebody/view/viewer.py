@@ -23,7 +23,6 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
-from wholebody.view import style
 from wholebody.view.camera import look
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
@@ -36,11 +35,11 @@ from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender, seconds
 from wholebody.view.server import ANIMATION, CAMERA, Command
+from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
 DEFAULT_DT = 1 / 30  # s: postures without a time step
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
-CAMERA_POSTURES = 24  # number of postures of a motion that the camera takes into account
 
 
 class Viewer:
@@ -170,15 +169,16 @@ class Viewer:
         keyframes = [made(q, problem, overlaps=marked[k]) for q, k in zip(played.q, played.frames, strict=True)]
         if ghost is not None:
             followed = checks.listed(getattr(ghost, "q", ghost), "ghost", "postures, each of shape (nq,)")
-            self._ghosts = self._composition.moving_ghost(keyframes, followed, style.GHOST, played)
+            self._ghosts = self._composition.moving_ghost(keyframes, followed, LOOK.ghost, played)
         self._motion, self._shown = (len(postures), step), None
-        chosen = np.unique(np.linspace(0, len(postures) - 1, CAMERA_POSTURES).astype(int))
+        # number of postures of a motion that the camera takes into account
+        chosen = np.unique(np.linspace(0, len(postures) - 1, 24).astype(int))
         self._seen = [postures[index] for index in chosen]
         self._graph.do(self._camera_command())
         self._graph.do(panel(self.title, keyframes, len(postures), step))
         self._graph.play(keyframes, played.times, repeat)
 
-    def ghosts(self, postures: Sequence[ArrayLike], *, color: style.Color = style.GHOST) -> None:
+    def ghosts(self, postures: Sequence[ArrayLike], *, color: Color = LOOK.ghost) -> None:
         """Show more postures of the figure, transparent; they replace earlier ghosts.
 
         Args:
@@ -194,7 +194,7 @@ class Viewer:
         self._composition.ghosts(self._ghosts, painted)
         self._graph.flush()
 
-    def frames(self, names: Sequence[str] | None = None, *, length: float = style.AXES_LENGTH) -> None:
+    def frames(self, names: Sequence[str] | None = None, *, length: float = LOOK.axes_length) -> None:
         """Show the axes of frames of the figure, with their names: x red, y green, z blue.
 
         They are drawn at the posture that is shown, and at all that are shown or played after this call.
@@ -258,7 +258,7 @@ class Viewer:
             here, there = checks.numbers(eye, (3,), "eye"), checks.numbers(target, (3,), "target")
             if max(np.abs(here).max(), np.abs(there).max()) > FARTHEST or np.linalg.norm(here - there) < 1e-6:
                 raise InputError("look takes two different places; give an eye and a target, metres")
-            camera = look(there, style.FIELD_OF_VIEW, eye=here)
+            camera = look(there, LOOK.field_of_view, eye=here)
         self._camera = camera
         if self._seen:
             self._graph.do(self._camera_command())

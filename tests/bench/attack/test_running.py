@@ -75,7 +75,7 @@ def test_the_attack_goes_on_after_hangs_crashes_and_errors() -> None:
     assert "hangs" in found[1].verdict.words
     assert "SIGKILL" in found[2].verdict.words
     assert "ZeroDivisionError" in found[3].verdict.words
-    assert "Sphere radius" in found[4].verdict.words
+    assert "Sphere: radius" in found[4].verdict.words
     assert found[2].written == Written(SCRIPTS[2], {"note.txt": b"beside it"})
 
 

@@ -83,12 +83,12 @@ def test_hulls_and_meshes_of_a_box_away_from_their_origin_are_the_box() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"mass": 0.0}, "Body mass is 0.0; give a number between"),
-        ({"density": -1.0}, "Body density is -1.0; give a number between"),
+        ({"mass": 0.0}, "Body: mass is 0.0; give a number between"),
+        ({"density": -1.0}, "Body: density is -1.0; give a number between"),
         ({"density": 1.0, "mass": 1.0}, "both a density and a mass"),
-        ({"velocity": (1.0, 2.0)}, "Body velocity has shape"),
-        ({"velocity": (1e9, 0.0, 0.0)}, "Body velocity is"),
-        ({"material": 3}, "Body material is 3"),
+        ({"velocity": (1.0, 2.0)}, "Body: velocity has shape"),
+        ({"velocity": (1e9, 0.0, 0.0)}, "Body: velocity is"),
+        ({"material": 3}, "Body: material is 3"),
     ],
 )
 def test_a_body_that_cannot_be_is_refused_in_one_sentence(values: dict[str, Any], message: str) -> None:

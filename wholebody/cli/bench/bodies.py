@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 
 from wholebody.bench.machine import machine
-from wholebody.cli.bench.command import measuring, option, publish_page
+from wholebody.cli.bench.command import measuring, publish_page
+from wholebody.cli.command import option
 
 
 @measuring(

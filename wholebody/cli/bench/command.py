@@ -1,98 +1,28 @@
-"""How a command of `wholebody bench` is declared, with its words and options in one place, and where its results go."""
+"""The options that commands of `wholebody bench` share, and where their results go."""
 
 from __future__ import annotations
 
 import argparse
 import shutil
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from wholebody.base.errors import InputError
 from wholebody.bench.tables import replace_section, write_rows, write_text
-from wholebody.cli.arguments import Commands, add_folders
-
-Option = Callable[[argparse.ArgumentParser], object]
-"""Adds itself to a parser."""
+from wholebody.cli.arguments import folders
+from wholebody.cli.command import Command, Measure, Option, command, flag, option
 
 
-@dataclass(frozen=True)
-class Command:
-    """A command.
-
-    Attributes:
-        name: as typed.
-        help, description: as `argparse` shows them.
-        options: in the order of the help.
-        measure: what it does; None is the exit code 0.
-    """
-
-    name: str
-    help: str
-    description: str
-    options: tuple[Option, ...]
-    measure: Callable[[argparse.Namespace], int | None]
-
-    def add_to(self, commands: Commands) -> None:
-        """Add it to a group of commands."""
-        parser = commands.add_parser(self.name, help=self.help, description=self.description)
-        parser.set_defaults(run=self.run, counted=())
-        for add in self.options:
-            add(parser)
-
-    def run(self, arguments: argparse.Namespace) -> int:
-        """Run it, and return the exit code.
-
-        Raises:
-            InputError: an option that counts things is below one.
-        """
-        for flag in arguments.counted:
-            number = getattr(arguments, flag.removeprefix("--").replace("-", "_"))
-            if number is not None and number < 1:
-                raise InputError(f"{flag} is {number}; give 1 or more")
-        return self.measure(arguments) or 0
-
-
-def command(
-    name: str, help: str, description: str, *options: Option
-) -> Callable[[Callable[[argparse.Namespace], int | None]], Command]:
-    """Make the decorated function a command."""
-    return partial(Command, name, help, description, options)
-
-
-def measuring(
-    name: str, help: str, description: str, *options: Option
-) -> Callable[[Callable[[argparse.Namespace], int | None]], Command]:
+def measuring(name: str, help: str, description: str, *options: Option) -> Callable[[Measure], Command]:
     """The same with `--quick`, `--out` and `--update-docs`."""
-    return command(name, help, description, quick("a short run that shows whether all works"), folders(), *options)
-
-
-def option(*names: str, **settings: Any) -> Option:
-    """An option or an argument, as `ArgumentParser.add_argument` takes it."""
-    return lambda parser: parser.add_argument(*names, **settings)
+    return command(
+        name, help, description, quick("a short run that shows whether all works"), *folders("out/bench"), *options
+    )
 
 
 def quick(help: str) -> Option:
     """The option `--quick`."""
-    return option("--quick", action="store_true", help=help)
-
-
-def folders(out: str = "out/bench") -> Option:
-    """`--out`, with a folder where it is left out, and `--update-docs`."""
-    return partial(add_folders, out=out)
-
-
-def count(name: str, default: int | None, help: str) -> Option:
-    """An option that counts things to do: one or more; the help says the default."""
-
-    def add(parser: argparse.ArgumentParser) -> None:
-        said = help if default is None or "(default" in help else f"{help} (default: {default})"
-        parser.add_argument(name, type=int, default=default, metavar="N", help=said)
-        parser.set_defaults(counted=(*parser.get_default("counted"), name))
-
-    return add
+    return flag("--quick", help)
 
 
 def listed(name: str, help: str, metavar: str | None = "NAME", **settings: Any) -> Option:

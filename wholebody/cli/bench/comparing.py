@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 from wholebody.base.errors import InputError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows, write_text
-from wholebody.cli.bench.command import command, count, folders, listed, option, publish, quick, seed
+from wholebody.cli.arguments import folders
+from wholebody.cli.bench.command import listed, publish, quick, seed
+from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
     from wholebody.bench.suite.compare.settings import Settings
@@ -52,7 +54,7 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
         metavar="LOCK.json",
         help="repeat the comparison that left this file",
     ),
-    folders("out/compare"),
+    *folders("out/compare"),
 )
 def compare(arguments: argparse.Namespace) -> int:
     """Compare methods; 1 where a comparison that is repeated solves other problems.

@@ -6,7 +6,8 @@ import argparse
 
 from wholebody.base.errors import InputError
 from wholebody.bench.machine import machine
-from wholebody.cli.bench.command import count, measuring, option, publish
+from wholebody.cli.bench.command import measuring, publish
+from wholebody.cli.command import count, option
 
 PROBLEMS = 6  # of every set, where --count is left out
 

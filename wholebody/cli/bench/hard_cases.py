@@ -11,7 +11,9 @@ from typing import TYPE_CHECKING
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import read_rows, replace_section, write_rows, write_text
-from wholebody.cli.bench.command import command, count, folders, listed, measuring, option, seed
+from wholebody.cli.arguments import folders
+from wholebody.cli.bench.command import listed, measuring, seed
+from wholebody.cli.command import command, count, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -27,7 +29,6 @@ if TYPE_CHECKING:
 PAGE = "where-methods-fail.md"
 ASSETS = "assets/stability"
 ATTACKED = "reliability.md"
-INTERRUPTED = 130  # exit code after Ctrl-C
 
 
 @measuring(
@@ -166,7 +167,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
     listed("--kinds", "of cases: solve, stream, sweep, contact, file, argument", "KIND"),
     count("--jobs", 1, "processes at a time"),
     listed("--also", "attack.csv of other runs, counted too", "CSV", type=Path, default=[]),
-    folders("out/attack"),
+    *folders("out/attack"),
 )
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
@@ -198,7 +199,7 @@ def attack(arguments: argparse.Namespace) -> int:
     if arguments.update_docs is not None:
         replace_section(arguments.update_docs / ATTACKED, "attack", text)
         print(f"wrote {arguments.update_docs / ATTACKED}")
-    return INTERRUPTED if interrupted else int(any(one.outcome == "wrong" for one in rows))
+    return 130 if interrupted else int(any(one.outcome == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -10,7 +10,8 @@ from typing import Any
 
 from wholebody.base.errors import UnknownNameError
 from wholebody.bench.machine import machine
-from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
+from wholebody.cli.command import count, option
 
 PARTS = "task", "reaches", "detail"
 """Of `wholebody bench solve`, each into a table of its own."""

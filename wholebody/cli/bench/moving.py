@@ -11,7 +11,8 @@ from wholebody.base.checks import number
 from wholebody.base.files import make_folder
 from wholebody.bench.machine import machine
 from wholebody.bench.tables import write_rows
-from wholebody.cli.bench.command import Chart, count, listed, measuring, option, publish
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
+from wholebody.cli.command import count, option
 
 CLIPS = (
     option("--clips", type=Path, metavar="DIR", help="folder of recordings (BVH), beside the built-in clips"),
@@ -66,8 +67,6 @@ def _tell(done: int, count: int, said: str) -> None:
 
 
 QUICK = 3  # drops
-FRAMES = 30  # of a quick run
-THROWS = 3  # of each kind
 LONGEST = 1000.0  # minutes
 PARTS = ("closed", "throws", "drops", "long")
 
@@ -106,13 +105,14 @@ def world(arguments: argparse.Namespace) -> int:
 
     for row in closed_forms.closed_forms() if "closed" in parts else ():
         keep("closed", row, f"{row.motion}, {row.quantity}: {row.measured:.6g}, by formula {row.expected:.6g}")
-    for thrown in throws.all_throws(1 if arguments.quick else THROWS, arguments.quick) if "throws" in parts else ():
+    # throws of each kind
+    for thrown in throws.all_throws(1 if arguments.quick else 3, arguments.quick) if "throws" in parts else ():
         said = f"{thrown.limits} limits, who {thrown.person}, {thrown.thing} at {thrown.speed:g} m/s: "
         said += f"{thrown.deepest_mm:.3f} mm deep, named in {thrown.named} of {thrown.frames} frames, "
         keep("throws", thrown, f"{said}silent in {thrown.silent}")
     for name in (names[:QUICK] if arguments.quick else names) if "drops" in parts else ():
         for engine in tools:
-            dropped = measuring.measure(known[name], engine, FRAMES if arguments.quick else None)
+            dropped = measuring.measure(known[name], engine, 30 if arguments.quick else None)  # frames of a quick run
             keep("drops", dropped, f"{name}, {engine}: {dropped.median_ms:.2f} ms a frame", "world")
     if "long" in parts:
         keep(

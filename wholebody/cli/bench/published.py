@@ -7,9 +7,9 @@ from pathlib import Path
 
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import write_text
-from wholebody.cli.bench.command import command, count, listed, option, seed
+from wholebody.cli.bench.command import listed, seed
+from wholebody.cli.command import command, count, option
 
-WIDTH = 230  # columns of the judge's table, also where the terminal has fewer
 PROBLEMS = option("--problems", type=Path, required=True, metavar="DIR", help="folder of the exported problems")
 
 
@@ -82,7 +82,7 @@ def judge(arguments: argparse.Namespace) -> None:
     verdict = judge(read_answers(arguments.answers, arguments.problems), arguments.problems)
     write_text(out, dumped(as_json(verdict)))
     console = Console()
-    console.width = max(console.width, WIDTH)
+    console.width = max(console.width, 230)  # columns of the judge's table, also where the terminal has fewer
     table = Table(title=verdict.answers.method)
     for name in COLUMNS:
         table.add_column(name, justify="left" if name in COLUMNS[:2] else "right")

@@ -8,50 +8,40 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands, add_person, person_options
+from wholebody.cli.arguments import add_person, person_options
+from wholebody.cli.command import Option, option
 
 if TYPE_CHECKING:
     from wholebody.figures import Figure
     from wholebody.motion.clip import Clip
 
-MOST_JOBS = 4096
 
-
-def add_command(
-    commands: Commands, name: str, help: str, description: str,
-    epilog: str = "", many: bool = False,
-) -> argparse.ArgumentParser:  # fmt: skip
-    """Add a command that takes the file of a clip, or of several, and the figure that it moves."""
-    shape = argparse.RawDescriptionHelpFormatter
-    parser = commands.add_parser(name, help=help, description=description, epilog=epilog, formatter_class=shape)
-    if many:
-        parser.add_argument("files", type=Path, nargs="+", metavar="FILE", help="the motions")
-    else:
-        parser.add_argument("file", type=Path, metavar="FILE", help="the motion")
-    figure = parser.add_argument_group("figure")
-    figure.add_argument(
+def _figure(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("figure")
+    group.add_argument(
         "--figure", default="human", metavar="FIGURE", help="human (default), avatar, hand, or the path of a URDF"
     )
-    add_person(figure)
-    figure.add_argument(
+    add_person(group)
+    group.add_argument(
         "--root", choices=("fixed", "free"), help="of a robot: whether it goes about (default: as its file says)"
     )
-    return parser
 
 
-def add_equipment(parser: argparse.ArgumentParser) -> None:
-    """Add what the figure wears."""
-    parser.add_argument(
-        "--equipment", action="append", default=[], metavar="WHAT",
-        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
-        "repeated, each in turn",
-    )  # fmt: skip
+ONE_MOTION: tuple[Option, ...] = (option("file", type=Path, metavar="FILE", help="the motion"), _figure)
+"""The file of a motion, and the figure that it moves."""
 
+MOTIONS: tuple[Option, ...] = (option("files", type=Path, nargs="+", metavar="FILE", help="the motions"), _figure)
 
-def add_jobs(parser: argparse.ArgumentParser) -> None:
-    """Add how many cases are done at a time, and where."""
-    parser.add_argument("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)")
-    parser.add_argument("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786")
+EQUIPMENT = option(
+    "--equipment", action="append", default=[], metavar="WHAT",
+    help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back; "
+    "repeated, each in turn",
+)  # fmt: skip
+
+JOBS: tuple[Option, ...] = (
+    option("--jobs", type=int, metavar="N", help="cases at a time (default: 1, or all of the cluster)"),
+    option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
+)
 
 
 def jobs_of(arguments: argparse.Namespace) -> int:
@@ -65,7 +55,7 @@ def jobs_of(arguments: argparse.Namespace) -> int:
 
     if arguments.jobs is None:
         return threads(arguments.cluster) if arguments.cluster else 1
-    return whole(arguments.jobs, "--jobs", 1, MOST_JOBS)
+    return whole(arguments.jobs, "--jobs", 1, 4096)
 
 
 @contextmanager

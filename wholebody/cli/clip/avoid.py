@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
+from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
+from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -17,53 +17,53 @@ if TYPE_CHECKING:
     from wholebody.motion.avoider import Avoider
     from wholebody.motion.batch_table import AvoidedCase
 
-DESCRIPTION = """\
+METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
+
+
+@command(
+    "avoid",
+    "free motions of collisions",
+    """\
 Free motions of collisions of the body with itself and with what it wears. The answer is judged by all pairs in all
 frames and by sweeps between them, independently of the method; the exit code is 1 where something is left.
 
 Several motions, pieces of equipment or methods are a batch: each motion with each equipment by each method, written
 into a folder with a table (cases.csv, cases.json). What the folder holds already is not done again, so a batch that was
-ended goes on."""
-EPILOG = """\
-examples:
-  wholebody clip avoid walk.bvh --equipment pack
-  wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed"""
-METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
-WIDE = 120  # letters that a line of a batch's table needs
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "avoid", "free motions of collisions", DESCRIPTION, EPILOG, many=True)
-    parser.add_argument(
+ended goes on.""",
+    *MOTIONS,
+    option(
         "--method",
         action="append",
         default=[],
         metavar="NAME",
         help="how (default: trajectory); repeated, each in turn",
-    )
-    add_equipment(parser)
-    parser.add_argument("--no-feet", action="store_true", help="let feet slide that stand; without it they are held")
-    parser.add_argument("--keep-ends", action="store_true", help="keep the first and the last posture where free")
-    parser.add_argument(
+    ),
+    EQUIPMENT,
+    option("--no-feet", action="store_true", help="let feet slide that stand; without it they are held"),
+    option("--keep-ends", action="store_true", help="keep the first and the last posture where free"),
+    option(
         "--dynamics",
         action="store_true",
         help="keep torques within the strength of a median person, and the balance within the feet",
-    )
-    parser.add_argument(
+    ),
+    option(
         "--stretch",
         type=float,
         metavar="FACTOR",
         help="slow the motion by up to this factor where joints are too fast or, with --dynamics, too weak",
-    )
-    parser.add_argument(
-        "--out", type=Path, metavar="OUT",
+    ),
+    option(
+        "--out",
+        type=Path,
+        metavar="OUT",
         help="the file to write (default: <name>-free.npz, beside FILE); of a batch a folder (default: freed)",
-    )  # fmt: skip
-    add_jobs(parser)
-    parser.set_defaults(run=run)
-
-
+    ),
+    *JOBS,
+    epilog="""\
+examples:
+  wholebody clip avoid walk.bvh --equipment pack
+  wholebody clip avoid walk.bvh run.bvh --equipment pack --equipment vest_plate+pouches --jobs 4 --out freed""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Free the clips, write them, and say what was found."""
     methods, worn = arguments.method or [METHOD], arguments.equipment or [WORN]
@@ -159,7 +159,8 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from wholebody.motion.batch import BatchProgress, avoid_many
     from wholebody.motion.motion_bounds import MotionBounds
 
-    console, folder = Console(width=max(WIDE, Console().width)), arguments.out or Path(FOLDER)
+    # letters that a line of a batch's table needs
+    console, folder = Console(width=max(120, Console().width)), arguments.out or Path(FOLDER)
     ways = [_method(name, arguments) for name in methods]
     count = len(arguments.files) * len(methods) * len(worn)
     try:

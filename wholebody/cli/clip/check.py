@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, add_equipment, add_jobs, bar, figure_of, jobs_of
+from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
+from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -16,38 +16,33 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
     from wholebody.scene.scene import Scene
 
-DESCRIPTION = """\
+MOST = 20  # lines of a table
+WIDE = 110  # letters that its lines need
+
+
+@command(
+    "check",
+    "what overlaps in motions, when and how deep",
+    """\
 Check a motion: every pair of pieces that can touch, in every frame and in the motion from each frame to the next one;
 joint limits, joint speeds, feet that slide while they stand, jerk. Overlaps of the figure with itself, with what it
-carries and with the things around it are told apart. Several motions, or pieces of equipment, give a line each."""
-EPILOG = """\
+carries and with the things around it are told apart. Several motions, or pieces of equipment, give a line each.""",
+    *MOTIONS,
+    EQUIPMENT,
+    *JOBS,
+    option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things"),
+    option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
+    option("--json", action="store_true", help="print everything as JSON instead of tables"),
+    option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
+    epilog="""\
 examples:
   wholebody clip check walk.bvh
   wholebody clip check walk.bvh --equipment pack --html walk.html
   wholebody clip check walk.npz --scene room.toml
   wholebody clip check walk.npz --json > walk.json
   wholebody clip check *.bvh --equipment pack --equipment vest_plate --jobs 4
-exit code: 1 if something overlaps by more than the depth, or a joint is beyond its limit"""
-MOST = 20  # lines of a table
-WIDE = 110  # letters that its lines need
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(
-        commands, "check", "what overlaps in motions, when and how deep", DESCRIPTION, EPILOG, many=True
-    )
-    add_equipment(parser)
-    add_jobs(parser)
-    parser.add_argument("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things")
-    parser.add_argument("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)")
-    parser.add_argument("--json", action="store_true", help="print everything as JSON instead of tables")
-    parser.add_argument(
-        "--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"
-    )
-    parser.set_defaults(run=run)
-
-
+exit code: 1 if something overlaps by more than the depth, or a joint is beyond its limit""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Check the clip; 1 if it overlaps or is beyond joint limits."""
     import json

@@ -5,27 +5,25 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, clip_of
+from wholebody.cli.clip.arguments import ONE_MOTION, clip_of
+from wholebody.cli.command import command, option
 
-DESCRIPTION = """\
+
+@command(
+    "convert",
+    "write a motion in another format",
+    """\
 Write a motion in another format: .npz (without loss), .bvh, .csv, .txt (joint profile) or .glb (glTF animation).
-A skeleton that is not the figure's own is retargeted."""
-EPILOG = """\
+A skeleton that is not the figure's own is retargeted.""",
+    *ONE_MOTION,
+    option("out", type=Path, metavar="OUT", help="the file to write"),
+    option("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)"),
+    option("--mirror", action="store_true", help="exchange left and right"),
+    epilog="""\
 examples:
   wholebody clip convert walk.npz walk.glb
-  wholebody clip convert walk.npz slow.bvh --dt 0.04 --mirror"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "convert", "write a motion in another format", DESCRIPTION, EPILOG)
-    parser.add_argument("out", type=Path, metavar="OUT", help="the file to write")
-    parser.add_argument("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)")
-    parser.add_argument("--mirror", action="store_true", help="exchange left and right")
-    parser.set_defaults(run=run)
-
-
+  wholebody clip convert walk.npz slow.bvh --dt 0.04 --mirror""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Read, change and write."""
     from wholebody.base.files import check_writable

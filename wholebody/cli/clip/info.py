@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import argparse
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, clip_of
+from wholebody.cli.clip.arguments import ONE_MOTION, clip_of
+from wholebody.cli.command import command
 
-DESCRIPTION = """\
+
+@command(
+    "info",
+    "what a file of motion holds",
+    """\
 Say what a file of motion holds: figure, frames, time step, duration, and of the joints that move most their range and
-greatest speed."""
-MOST = 12
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "info", "what a file of motion holds", DESCRIPTION)
-    parser.set_defaults(run=run)
-
-
+greatest speed.""",
+    *ONE_MOTION,
+)
 def run(arguments: argparse.Namespace) -> int:
     """Describe the clip."""
     import numpy as np
@@ -41,7 +38,7 @@ def run(arguments: argparse.Namespace) -> int:
     values = [figure.joint_values(q) for q in clip.q]
     made = table("joints that move most", "from", "to", "greatest speed")
     ranges = {name: [frame[name] for frame in values] for name in values[0]}
-    for name in sorted(ranges, key=lambda name: min(ranges[name]) - max(ranges[name]))[:MOST]:
+    for name in sorted(ranges, key=lambda name: min(ranges[name]) - max(ranges[name]))[:12]:
         slides = figure.model.joints[figure.joint_id(name)].shortname().startswith("JointModelP")
         unit, factor = ("m", 1.0) if slides else ("deg", float(np.degrees(1.0)))
         low, high = (factor * end for end in (min(ranges[name]), max(ranges[name])))

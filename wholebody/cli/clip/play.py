@@ -6,40 +6,39 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, bar, clip_of
+from wholebody.cli.clip.arguments import ONE_MOTION, bar, clip_of
+from wholebody.cli.command import command, option
 
 if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
 
-DESCRIPTION = """\
+NOTHING = "nothing"
+PICTURES = 8
+
+
+@command(
+    "play",
+    "show a motion",
+    """\
 Show a motion. Without --out a page opens in the browser and plays it; with --out it is written as a page that opens
 without a network (.html), a movie (.mp4, .gif) or a strip of pictures (.png). A second motion is its ghost. With
---equipment the body is shown with what it wears."""
-EPILOG = """\
+--equipment the body is shown with what it wears.""",
+    *ONE_MOTION,
+    option("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent"),
+    option(
+        "--equipment",
+        default=NOTHING,
+        metavar="WHAT",
+        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
+    ),
+    option("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png"),
+    option("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)"),
+    epilog="""\
 examples:
   wholebody clip play walk.bvh
   wholebody clip play free.npz --ghost walk.npz --out before-after.html
-  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack"""
-NOTHING = "nothing"
-PICTURES = 8
-VIEW = (1.6, 1.0, 0.5)
-"""Direction from the figure to the camera: from in front, from the left and from above."""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "play", "show a motion", DESCRIPTION, EPILOG)
-    parser.add_argument("--ghost", type=Path, metavar="FILE", help="another motion of the figure, shown transparent")
-    parser.add_argument(
-        "--equipment", default=NOTHING, metavar="WHAT",
-        help="what the body wears: a ready name such as pack, names joined by +, or a mesh that is put on its back",
-    )  # fmt: skip
-    parser.add_argument("--out", type=Path, metavar="OUT", help=".html, .mp4, .gif or .png")
-    parser.add_argument("--pictures", type=int, default=PICTURES, metavar="N", help="of a strip (default: 8)")
-    parser.set_defaults(run=run)
-
-
+  wholebody clip play walk-free.npz --ghost walk.bvh --equipment pack""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Show or write the motion."""
     import math
@@ -70,7 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
         if clip.figure.root == "free":
             middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
             away = 1.3 + 0.9 * float(np.ptp(clip.q[:, :2], axis=0).max())
-            viewer.look(tuple(middle + away * np.array(VIEW)), tuple(middle))
+            # direction from the figure to the camera: from in front, from the left and from above
+            viewer.look(tuple(middle + away * np.array((1.6, 1.0, 0.5))), tuple(middle))
         if out is not None and out.suffix.lower() == ".png":
             frames = np.linspace(0, len(clip) - 1, min(arguments.pictures, len(clip))).round().astype(int)
             beside = None if ghost is None else list(ghost.q[frames])

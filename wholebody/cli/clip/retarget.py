@@ -5,34 +5,32 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from wholebody.cli.arguments import Commands
-from wholebody.cli.clip.arguments import add_command, add_jobs, bar, figure_of, jobs_of
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, bar, figure_of, jobs_of
+from wholebody.cli.command import command, option
 
-DESCRIPTION = """\
+
+@command(
+    "retarget",
+    "skeletons' motions for a figure",
+    """\
 Turn the motion of a skeleton (BVH, AMASS) into a clip of a figure of any proportions: directions of limbs as recorded,
 within joint limits and reach cones, smooth, standing feet held. The clip may collide with itself: `wholebody clip
 check` says where, `wholebody clip avoid` frees it. Several files are written into a folder; what it holds already is
-not made again."""
-EPILOG = """\
+not made again.""",
+    *MOTIONS,
+    option(
+        "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
+    ),
+    option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
+    option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
+    option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
+    *JOBS,
+    epilog="""\
 examples:
   wholebody clip retarget walk.bvh walk.npz --sex female --stature 1.62
   wholebody clip retarget walk.bvh robot.npz --figure g1.urdf --names bones.toml
-  wholebody clip retarget walk.bvh run.bvh jump.bvh clips --jobs 4"""
-
-
-def add_to(commands: Commands) -> None:
-    """Add the command."""
-    parser = add_command(commands, "retarget", "skeletons' motions for a figure", DESCRIPTION, EPILOG, many=True)
-    parser.add_argument(
-        "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
-    )
-    parser.add_argument("--names", type=Path, metavar="FILE.toml", help="which bone is which part")
-    parser.add_argument("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)")
-    parser.add_argument("--up", choices=("y", "z"), help="the axis that points up (default: recognised)")
-    add_jobs(parser)
-    parser.set_defaults(run=run)
-
-
+  wholebody clip retarget walk.bvh run.bvh jump.bvh clips --jobs 4""",
+)
 def run(arguments: argparse.Namespace) -> int:
     """Read, retarget and write."""
     if len(arguments.files) > 1:
@@ -55,9 +53,9 @@ def _many(arguments: argparse.Namespace) -> int:
     from wholebody.base.errors import InputError
     from wholebody.motion.batch import read_many
 
-    for option in ("names", "unit", "up"):
-        if getattr(arguments, option) is not None:
-            raise InputError(f"--{option} is for one file, and there are {len(arguments.files)}; give one at a time")
+    for given in ("names", "unit", "up"):
+        if getattr(arguments, given) is not None:
+            raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
     figure, count = figure_of(arguments), len(arguments.files)
     with bar("retargeting", count) as tell:
         found = read_many(

@@ -9,7 +9,7 @@ from pathlib import Path
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
-from wholebody.figures.robot_figure import check_size, geometry_of_links, robot_figure, visual_of_links
+from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import read_urdf
 from wholebody.figures.urdf.model import urdf_model
@@ -53,11 +53,11 @@ def urdf_figure(
     model, remarks = urdf_model(urdf, root)
     check_size(model, urdf.path)
     hollows = check_concavity(concavity, urdf.links)
-    geometry, notes = geometry_of_links(
+    geometry, notes, _ = geometry_of_links(
         model, urdf.shapes, hollows, urdf.path, named=extension is not None, colors=urdf.colors
     )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
     told = (*urdf.notes, *remarks, *notes)
     visual = visual_of_links(model, urdf.visuals)
-    return robot_figure(urdf.name, model, urdf.links, geometry, told, samples, seed, visual)
+    return robot_figure(Robot(urdf.name, model, urdf.links, geometry, told, visual), samples, seed)

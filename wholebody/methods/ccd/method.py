@@ -6,12 +6,14 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
+from typing import Annotated
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import posture, settle
+from wholebody.base.checks import posture
+from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import SolvingTracker, UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
@@ -20,8 +22,8 @@ from wholebody.methods.ccd.reaching import Reach
 from wholebody.methods.ccd.terms import read
 from wholebody.methods.conclusion import Ending, concluded
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
-from wholebody.methods.control import Control, Progress, check_time_limit
-from wholebody.methods.inputs import CCD_TOLERANCE, ITERATIONS, RESTARTS, SEED, check_problem, check_settings
+from wholebody.methods.control import Control, Progress
+from wholebody.methods.inputs import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit, check_problem
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution, TraceEntry
@@ -49,7 +51,7 @@ class _Trial:
 
 
 @dataclass(frozen=True)
-class CCD:
+class CCD(Checked):
     """Cyclic coordinate descent: one joint at a time, each to its best value, from the tip inwards.
 
     Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
@@ -75,20 +77,11 @@ class CCD:
             ends after four seconds of processor time.
     """
 
-    tolerance: float = 1e-4
-    iterations: int = 400
-    restarts: int = 12
-    seed: int = 0
-    time_limit: float | None = None
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-        """
-        check_settings(self, tolerance=CCD_TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
-        settle(self, "time_limit", check_time_limit(self.time_limit))
+    tolerance: Annotated[float, CCD_TOLERANCE] = 1e-4
+    iterations: Iterations = 400
+    restarts: Restarts = 12
+    seed: Seed = 0
+    time_limit: TimeLimit = None
 
     @property
     def name(self) -> str:

@@ -253,7 +253,7 @@ class Assembly(AssemblyJoints):
             UnknownNameError: no such linear algebra.
         """
         tolerance = number(tolerance, "tolerance", FINEST, TOLERANCE.high)
-        iterations = whole(iterations, "iterations", int(ITERATIONS.low), int(ITERATIONS.high))
+        iterations = int(ITERATIONS(iterations, "iterations"))
         known(algebra, NAMES, "linear algebra")
         choice(inequalities, KINDS, "inequalities")
         nearest = flag(nearest, "nearest")

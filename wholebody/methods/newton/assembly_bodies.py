@@ -10,13 +10,12 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import color as checked_color
-from wholebody.base.checks import instance, known, number, numbers, shown, text
+from wholebody.base.checks import instance, known, numbers, shown, text
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.geometry.pieces import check_length
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.geometry.shapes import Shape
+from wholebody.geometry.shapes import LENGTH, Shape
 from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.assembly_geometry import (
     LooseBodies,
@@ -31,7 +30,7 @@ from wholebody.methods.newton.assembly_geometry import (
     solids,
 )  # fmt: skip
 from wholebody.methods.newton.system import unit
-from wholebody.problem import LARGEST_CLEARANCE, Problem
+from wholebody.problem import CLEARANCE, Problem
 from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint
@@ -50,7 +49,7 @@ class AssemblyBodies:
     """Bodies, figures and things of an assembly; `wholebody.Assembly` adds joints, goals and solving."""
 
     def __init__(self, clearance: float = 0.0) -> None:
-        self.clearance = number(clearance, "Assembly: clearance", 0.0, LARGEST_CLEARANCE, "m")
+        self.clearance = CLEARANCE(clearance, "Assembly: clearance")
         self._names: dict[str, int] = {}
         self._places: list[Array] = []
         self._sizes: list[Array] = []  # (7,) weights of each body's variables in the least motion
@@ -97,7 +96,7 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a body"), "body")
         where = f"body {name!r}"
         given = solids(shape, where)
-        length = rim(given, SIZE) if size is None else check_length(size, f"{where}: size")
+        length = rim(given, SIZE) if size is None else LENGTH(size, f"{where}: size")
         placed = pin.SE3ToXYZQUAT(target_placement(at, where))
         painted = None if color is None else checked_color(color, f"{where}: color")
         self._parts.append(name)

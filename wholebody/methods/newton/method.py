@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from wholebody.base.checks import choice, known, settle
+from wholebody.base.checks import known
+from wholebody.base.fields import Checked
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.control import Control, Progress, check_time_limit
-from wholebody.methods.inputs import ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
+from wholebody.methods.control import Control, Progress
+from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.inequalities import KINDS, Kind
+from wholebody.methods.newton.inequalities import Kind
 from wholebody.methods.newton.linear_algebra.choice import NAMES
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.terms import state_equations
@@ -20,7 +21,7 @@ from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
-class Newton:
+class Newton(Checked):
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
@@ -42,13 +43,13 @@ class Newton:
             ends after four seconds of processor time.
     """
 
-    tolerance: float = 1e-5
-    iterations: int = 200
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 200
     algebra: str = "auto"
     inequalities: Kind = "slack"
-    restarts: int = 6
-    seed: int = 0
-    time_limit: float | None = None
+    restarts: Restarts = 6
+    seed: Seed = 0
+    time_limit: TimeLimit = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -57,10 +58,8 @@ class Newton:
             InputError: a setting out of range.
             UnknownNameError: no such linear algebra.
         """
-        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS, restarts=RESTARTS, seed=SEED)
+        super().__post_init__()
         known(self.algebra, NAMES, "linear algebra")
-        choice(self.inequalities, KINDS, "inequalities")
-        settle(self, "time_limit", check_time_limit(self.time_limit))
 
     @property
     def name(self) -> str:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import number, posture, time_step
+from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
@@ -107,7 +107,7 @@ class NewtonTracker(NotCopyable):
                 is within a call of this tracker.
         """
         q = posture(q, self.workspace.model.nq)
-        enough = FRAME_TOLERANCE if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
+        enough = FRAME_TOLERANCE if tolerance is None else TOLERANCE(tolerance, "tolerance")
         with self._alone:
             active_system = self._renewed()
             active_system.objective.anchor(q)

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.base.checks import choice, settle
+from wholebody.base.fields import Checked
 from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
 from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress, check_time_limit
+from wholebody.methods.control import Control, Progress
 from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError
-from wholebody.methods.inputs import ITERATIONS, TOLERANCE, check_problem, check_settings
+from wholebody.methods.inputs import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
@@ -30,7 +30,7 @@ DECAY = 0.75  # of the measures' weight from one iteration to the next; less end
 
 
 @dataclass(frozen=True)
-class Placo(SolvesAnew):
+class Placo(Checked, SolvesAnew):
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
     Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
@@ -50,20 +50,10 @@ class Placo(SolvesAnew):
             hard tasks contradict each other or what keeps pairs apart.
     """
 
-    tolerance: float = 1e-5
-    iterations: int = 200
-    time_limit: float | None = None
-    holds: str = "hard"
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-        """
-        check_settings(self, tolerance=TOLERANCE, iterations=ITERATIONS)
-        settle(self, "time_limit", check_time_limit(self.time_limit))
-        choice(self.holds, HOLDS, "holds")
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 200
+    time_limit: TimeLimit = None
+    holds: Literal["hard", "soft"] = "hard"
 
     @property
     def name(self) -> str:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from wholebody.assessment.posture import assess
-from wholebody.base.checks import flag, settle
+from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
-from wholebody.methods.control import Control, Progress, check_time_limit
-from wholebody.methods.inputs import BUDGET, ITERATIONS, RESTARTS, SEED, TOLERANCE, check_problem, check_settings
+from wholebody.methods.control import Control, Progress
+from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.qp.multistart import Budget, Multistart
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
@@ -20,7 +21,7 @@ from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
-class QP:
+class QP(Checked):
     """Quadratic programs, solved by a QP solver of your choice.
 
     These are settings alone: one object serves any number of problems and threads at the same time.
@@ -48,14 +49,14 @@ class QP:
 
     solver: str = "osqp"
     hot_start: bool = True
-    tolerance: float = 1e-5
-    iterations: int = 150
-    budget: int = 1000
-    restarts: int = 40
-    restarts_for_measure: int = 0
-    seed: int = 0
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 150
+    budget: Annotated[int, BUDGET] = 1000
+    restarts: Restarts = 40
+    restarts_for_measure: Restarts = 0
+    seed: Seed = 0
     measures: bool = True
-    time_limit: float | None = None
+    time_limit: TimeLimit = None
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -64,13 +65,7 @@ class QP:
             InputError: a setting out of range.
             UnknownNameError: no such QP solver.
         """
-        check_settings(
-            self, tolerance=TOLERANCE, iterations=ITERATIONS, budget=BUDGET, restarts=RESTARTS,
-            restarts_for_measure=RESTARTS, seed=SEED,
-        )  # fmt: skip
-        settle(self, "hot_start", flag(self.hot_start, "hot_start"))
-        settle(self, "measures", flag(self.measures, "measures"))
-        settle(self, "time_limit", check_time_limit(self.time_limit))
+        super().__post_init__()
         make_solver(self.solver)
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import flag, number, posture, time_step
+from wholebody.base.checks import flag, posture, time_step
 from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
@@ -114,9 +114,7 @@ class QPTracker(NotCopyable):
         Raises:
             InputError: as for `step`.
         """
-        enough = (
-            TRACKING.of_a_frame if tolerance is None else number(tolerance, "tolerance", TOLERANCE.low, TOLERANCE.high)
-        )
+        enough = TRACKING.of_a_frame if tolerance is None else TOLERANCE(tolerance, "tolerance")
         exact = enough < TRACKING.of_a_frame
         # a bound on speeds is one of the way of a whole frame
         most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else TRACKING.programs[exact]

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Annotated, TypeAlias
 
-import numpy as np
-
-from wholebody.base import checks
+from wholebody.base.checks import settle
 from wholebody.base.errors import InputError
+from wholebody.base.fields import Checked, Range, Vector
 from wholebody.scene.matter.joints import BallJoint, joints
 from wholebody.scene.matter.materials import DEFAULT, Material, material
 
-LIGHTEST, HEAVIEST = 1e-9, 1e9  # kg
-THINNEST, DENSEST = 1e-3, 1e6  # kg/m3: osmium has 2.3e4
-FASTEST = 1e3  # m/s and rad/s
+MASS = Range(1e-9, 1e9, "kg")
 DENSITY = 700.0  # kg/m3: of oak
+
+Three: TypeAlias = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class Body:
+class Body(Checked):
     """Mass, material and velocity of a thing that moves by itself.
 
     Attributes:
@@ -35,32 +35,21 @@ class Body:
         UnknownNameError: there is no such material.
     """
 
-    density: float | None = None
-    mass: float | None = None
-    material: Material | str = DEFAULT
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    joints: Sequence[BallJoint] = ()
+    density: Annotated[float, Range(1e-3, 1e6, "kg/m3")] | None = None  # osmium has 2.3e4
+    mass: Annotated[float, MASS] | None = None
+    material: Annotated[Material | str, material] = DEFAULT
+    velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "m/s"))] = (0.0, 0.0, 0.0)
+    angular_velocity: Annotated[Three, Vector(3, Range(-1e3, 1e3, "rad/s"))] = (0.0, 0.0, 0.0)
+    joints: Annotated[Sequence[BallJoint], joints] = ()
 
     def __post_init__(self) -> None:
         if self.density is not None and self.mass is not None:
             raise InputError("Body has both a density and a mass; give one of them")
-        if self.mass is not None:
-            mass = checks.number(self.mass, "Body mass", LIGHTEST, HEAVIEST, "kg")
-            object.__setattr__(self, "mass", mass)
-        else:
-            density = DENSITY if self.density is None else self.density
-            density = checks.number(density, "Body density", THINNEST, DENSEST, "kg/m3, such as 700 for wood")
-            object.__setattr__(self, "density", density)
-        object.__setattr__(self, "material", material(self.material, "Body material"))
-        object.__setattr__(self, "joints", joints(self.joints))
-        for name in ("velocity", "angular_velocity"):
-            values = checks.numbers(getattr(self, name), (3,), f"Body {name}")
-            if np.abs(values).max() > FASTEST or float((values**2).sum()) > FASTEST**2:
-                raise InputError(f"Body {name} is {checks.shown(getattr(self, name))}; give at most {FASTEST:g}")
-            object.__setattr__(self, name, tuple(float(x) for x in values))
+        super().__post_init__()
+        if self.mass is None and self.density is None:
+            settle(self, "density", DENSITY)
 
     @property
     def resolved_material(self) -> Material:
         """The material itself, where it was given by name."""
-        return material(self.material, "Body material")
+        return material(self.material, "Body: material")

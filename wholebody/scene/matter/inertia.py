@@ -12,6 +12,7 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.shapes import (
     Box,
     Capsule,
+    Compound,
     Cylinder,
     Ellipsoid,
     HalfSpace,
@@ -21,7 +22,7 @@ from wholebody.geometry.shapes import (
     Sphere,
     Torus,
 )
-from wholebody.scene.matter.body import HEAVIEST, LIGHTEST, Body
+from wholebody.scene.matter.body import MASS, Body
 
 
 class MassProperties(NamedTuple):
@@ -52,8 +53,7 @@ def mass_properties(shape: Shape, body: Body, name: str = "a body") -> MassPrope
     unit, note = _of_density_one(shape, name)
     density = body.density if body.mass is None else body.mass / unit.mass
     mass = float(unit.mass * density)
-    if not LIGHTEST <= mass <= HEAVIEST:
-        raise InputError(f"{name!r} has a mass of {mass:.3g} kg; give {LIGHTEST:g} to {HEAVIEST:g} kg")
+    MASS(mass, f"{name!r}: mass")
     return MassProperties(mass, np.array(unit.lever), np.array(unit.inertia) * (mass / unit.mass), note)
 
 
@@ -75,6 +75,9 @@ def _of_density_one(shape: Shape, name: str) -> tuple[pin.Inertia, str]:
         return pin.Inertia.FromCylinder(volume, shape.radius, shape.length), ""
     if isinstance(shape, Torus):
         return _of_torus(shape), ""
+    if isinstance(shape, Compound):
+        made = [(at.act(found), note) for part, at in shape.parts for found, note in (_of_density_one(part, name),)]
+        return sum((found for found, _ in made), pin.Inertia.Zero()), next((note for _, note in made if note), "")
     import trimesh
 
     if isinstance(shape, Mesh):

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-
-import numpy as np
+from typing import Annotated
 
 from wholebody.base import checks
-from wholebody.base.errors import InputError
-from wholebody.geometry.placement import FARTHEST
+from wholebody.base.fields import Checked, Range, Vector
+from wholebody.geometry.placement import FARTHEST, unit_vector
 
 Place = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
-class BallJoint:
+class BallJoint(Checked):
     """One point of a thing stays at one point of another, or of the world; the thing turns about it.
 
     A point outside of the shape makes a pendulum on a stiff rod without mass.
@@ -27,13 +26,8 @@ class BallJoint:
         InputError: `at` is not three finite numbers below 1,000 km, or `to` is no name.
     """
 
-    at: Place = (0.0, 0.0, 0.0)
-    to: str | None = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "at", _place(self.at, f"{type(self).__name__} at"))
-        if self.to is not None:
-            checks.text(self.to, f"{type(self).__name__} to")
+    at: Annotated[Place, Vector(3, Range(-FARTHEST, FARTHEST, "m"))] = (0.0, 0.0, 0.0)
+    to: Annotated[str, checks.text] | None = None
 
 
 @dataclass(frozen=True)
@@ -49,37 +43,16 @@ class Hinge(BallJoint):
         InputError: also if the axis has no direction.
     """
 
-    axis: Place = (0.0, 0.0, 1.0)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        axis = checks.numbers(self.axis, (3,), "Hinge axis")
-        largest = float(np.abs(axis).max())
-        length = float(np.linalg.norm(axis)) if largest < 1e9 else np.inf
-        if not 1e-9 < length < 1e9:
-            raise InputError(f"Hinge axis is {checks.shown(self.axis)}; give a direction such as (0, 0, 1)")
-        object.__setattr__(self, "axis", tuple(float(x) for x in axis / length))
+    axis: Annotated[Place, unit_vector] = (0.0, 0.0, 1.0)
 
 
-def _place(value: object, what: str) -> Place:
-    numbers = checks.numbers(value, (3,), what)
-    if np.abs(numbers).max() > FARTHEST:
-        raise InputError(f"{what} is {checks.shown(value)}; give at most {FARTHEST:g} m")
-    x, y, z = (float(x) for x in numbers)
-    return x, y, z
-
-
-def joints(value: object) -> tuple[BallJoint, ...]:
+def joints(value: object, what: str) -> tuple[BallJoint, ...]:
     """The joints of a body, checked.
 
     Raises:
         InputError: not a list of joints.
     """
-    given = (
-        [value]
-        if isinstance(value, BallJoint)
-        else checks.listed(value, "Body joints", "[wb.dynamics.Hinge((0, 0.4, 0))]")
-    )
+    given = [value] if isinstance(value, BallJoint) else checks.listed(value, what, "[wb.dynamics.Hinge((0, 0.4, 0))]")
     for joint in given:
-        checks.instance(joint, BallJoint, "Body joints", "give wb.dynamics.Hinge(...) or wb.dynamics.BallJoint(...)")
+        checks.instance(joint, BallJoint, what, "give wb.dynamics.Hinge(...) or wb.dynamics.BallJoint(...)")
     return tuple(given)

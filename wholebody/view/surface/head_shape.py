@@ -21,9 +21,6 @@ from wholebody.view.surface.fields import (
     without,
 )
 
-MODEL_HEIGHT = 0.228
-"""Metres from chin to vertex of the head that the numbers below were drawn for."""
-
 MODEL_BREADTH, MODEL_LENGTH = 0.153, 0.198
 """Metres; its breadth and length."""
 
@@ -41,11 +38,12 @@ class HeadShape(NamedTuple):
 
 def head_shape(size: Dimensions) -> HeadShape:
     """Return the head of a person: every shape below is of one head, and stretched to the person's."""
+    # metres from chin to vertex of the head that the numbers below were drawn for
     scale = np.array(
         [
             2.0 * size.head_half_length / MODEL_LENGTH,
             2.0 * size.head_half_breadth / MODEL_BREADTH,
-            (size.head_top - size.head_bottom) / MODEL_HEIGHT,
+            (size.head_top - size.head_bottom) / 0.228,
         ]
     )
     origin = np.array([size.head_x, 0.0, size.head_bottom])

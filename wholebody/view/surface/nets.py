@@ -17,20 +17,9 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.view.surface.fields import Field, intersection
 
-NEWTON_STEPS = 2
-"""Steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the error."""
-
-LARGEST_STEP = 0.5
-"""Of the cells' size: a vertex that moves farther could pass another one."""
-
 BLOCK = 4
 """Cells along the side of a block; blocks that the surface cannot cross are looked at in their middle alone."""
 
-EDGE_STEPS = 4
-"""Newton steps from the middle of a cell to the edge of a cut."""
-
-LARGEST_EDGE_STEP = 1.0
-"""Of the cells' size, along an axis: where the edge of a cut is farther from the middle of a cell, its vertex stays."""
 
 STEEPEST = 1.8
 """Largest slope of a field near its surface; of a distance it is 1."""
@@ -38,8 +27,6 @@ STEEPEST = 1.8
 COARSER = 1.6
 """Cells of a coarse surface, in median edges of the fine one: 2 saves no more time and loses eyes and lips."""
 
-SHARP = 0.3
-"""Cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp edge."""
 
 PROBE = 1e-5
 """Metres between the points of which the gradient is measured."""
@@ -105,7 +92,9 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
     cell = COARSER * np.median(np.linalg.norm(edges, axis=-1))
     across = np.cross(edges[:, 1], edges[:, 2])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-    turned = np.einsum("fi,fki->fk", across, surface.normals[faces]) < SHARP
+    # cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp
+    # edge
+    turned = np.einsum("fi,fki->fk", across, surface.normals[faces]) < 0.3
     sharp = np.unique(faces[turned])
     keys = np.column_stack([np.floor(vertices / cell), np.full(len(vertices), -1)]).astype(np.int64)
     keys[sharp, 3] = sharp
@@ -202,12 +191,15 @@ def _slopes(field: Field, points: Array, values: Array) -> Array:
 def _moved(field: Field, vertices: Array, cell: float) -> Array:
     """The vertices moved to the surface."""
     start, points = vertices, vertices
-    for _ in range(NEWTON_STEPS):
+    # steps of every vertex towards the surface; the fields are nearly distances, so a step removes most of the
+    # error
+    for _ in range(2):
         values = field(points)
         slopes = _slopes(field, points, values)
         step = values[:, None] * slopes / np.maximum(np.einsum("ij,ij->i", slopes, slopes), 1e-2)[:, None]
         away = points - step - start
-        far = np.maximum(np.linalg.norm(away, axis=1, keepdims=True) / (LARGEST_STEP * cell), 1.0)
+        # of the cells' size: a vertex that moves farther could pass another one
+        far = np.maximum(np.linalg.norm(away, axis=1, keepdims=True) / (0.5 * cell), 1.0)
         points = start + away / far
     return np.asarray(points)
 
@@ -234,13 +226,15 @@ def _on_edges(
     for number, cut in enumerate(cuts):
         passed = near[kinds[:, 0] & kinds[:, 1 + number]]
         points = _nearest_on_both(body, cut, middles[passed])
-        kept = np.abs(points - middles[passed]).max(axis=1) < LARGEST_EDGE_STEP * cell
+        # largest step of the cells' size, along an axis: where the edge of a cut is farther from the
+        # middle of a cell, its vertex stays
+        kept = np.abs(points - middles[passed]).max(axis=1) < cell
         yield passed[kept], points[kept]
 
 
 def _nearest_on_both(first: Field, second: Field, points: Array) -> Array:
     """The points (n, 3) moved to where both fields are zero, by Newton steps of least length."""
-    for _ in range(EDGE_STEPS):
+    for _ in range(4):  # newton steps from the middle of a cell to the edge of a cut
         values = np.column_stack([first(points), second(points)])
         rows = np.stack([_slopes(side, points, values[:, k]) for k, side in enumerate((first, second))], axis=1)
         gram = rows @ rows.transpose(0, 2, 1) + 1e-6 * np.eye(2)  # where the two are parallel there is no edge

@@ -27,9 +27,6 @@ from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
 FORMAT = "7"
 """Part of the key of kept surfaces: another one whenever a shape, a weight or the layout changes."""
 
-HALF = "/half"
-"""End of the name of a bone that turns half as much as its segment."""
-
 
 class Bone(NamedTuple):
     """What moves vertices.
@@ -156,7 +153,8 @@ def _make_person(person: Person) -> Surface:
         for part, parent in HALVES.items():
             segment, other = f"{side}_{part}", parent if parent == "pelvis" else f"{side}_{parent}"
             bind = halfway(shape.bind[other], shape.bind[segment])
-            bones[segment + HALF] = Bone(segment, other, None, bind, np.eye(4))
+            # end of the name of a bone that turns half as much as its segment
+            bones[segment + "/half"] = Bone(segment, other, None, bind, np.eye(4))
         hand, frame = hand_shape(person, side), shape.bind[f"{side}_hand"]
         for segment in _finger_segments(side):
             bones[segment] = Bone(segment, None, f"{side}_hand", frame @ hand.bind[segment], hand.rest[segment])

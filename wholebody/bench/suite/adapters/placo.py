@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 import pinocchio as pin
@@ -31,7 +31,7 @@ ROOT_SPREAD = np.array([0.15, 0.15, 0.1, 0.2, 0.2, 0.2])  # m, rad
 
 def placo_adapter(variant: str = "") -> Adapter:
     """The adapter to placo's kinematics solver; with "soft" holds, or with the pairs of a figure "pruned"."""
-    holds = "soft" if variant == "soft" else "hard"
+    holds: Literal["hard", "soft"] = "soft" if variant == "soft" else "hard"
     said = "holds and" if holds == "hard" else "holds soft with weight 100,"
     pruned = (
         f" Pairs of the figure with itself that come no nearer than {100 * OWN_WITHIN:g} cm in any of {OWN_SAMPLES:,} "

@@ -19,7 +19,7 @@ from wholebody.problem import Problem
 from wholebody.tasks import Point
 from wholebody.view import Viewer
 from wholebody.view.screenshot import Screenshots
-from wholebody.view.style import FIELD_OF_VIEW
+from wholebody.view.style import LOOK
 
 SIZE = (560, 420)  # pixels
 ROOM = 1.0  # times the radius of what is to be seen
@@ -156,7 +156,7 @@ def _camera(problem: Problem, shown: list[Array], way: Array) -> tuple[Array, Ar
     cloud = np.array(points)
     target = (cloud.min(axis=0) + cloud.max(axis=0)) / 2.0
     radius = float(np.linalg.norm(cloud - target, axis=1).max()) * ROOM
-    return target + radius / np.sin(np.radians(FIELD_OF_VIEW) / 2.0) * way / np.linalg.norm(way), target
+    return target + radius / np.sin(np.radians(LOOK.field_of_view) / 2.0) * way / np.linalg.norm(way), target
 
 
 def _jpeg(png: bytes) -> bytes:

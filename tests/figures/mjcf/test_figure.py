@@ -1,0 +1,204 @@
+"""MJCF files: kinematics, masses, limits and contacts as MuJoCo has them, and sentences on what is left out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import wholebody as wb
+from tests.figures.mjcf.random_files import mjcf
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo, which reads MJCF files, is not installed")
+
+ARM = """<mujoco model="arm"><compiler angle="radian"/>
+<asset><mesh name="wedge" vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"/></asset>
+<worldbody>
+  <geom name="floor" type="plane" size="1 1 0.1" pos="0 0 -1"/>
+  <body name="base"><geom type="box" size="0.05 0.05 0.05"/>
+    <body name="upper" pos="0 0 0.1"><joint name="swing" axis="0 1 0" range="-1 1" limited="true"/>
+      <geom type="capsule" fromto="0 0 0 0 0 0.2" size="0.02"/>
+      <body name="fore" pos="0 0 0.25"><joint name="roll" axis="1 0 0"/>
+        <geom type="cylinder" size="0.02 0.1" pos="0 0 0.1"/>
+        <geom type="ellipsoid" size="0.02 0.03 0.04" pos="0 0 0.2"/>
+        <body name="hand" pos="0 0 0.25"><joint name="slide" type="slide" axis="0 0 1" range="0 0.1" limited="true"/>
+          <geom type="mesh" mesh="wedge"/><geom type="sphere" size="0.03" contype="0" conaffinity="0"/>
+          <site name="tip" pos="0 0 0.1"/>
+</body></body></body></body></worldbody></mujoco>"""
+
+
+def written(folder: Path, text: str, name: str = "robot.xml") -> Path:
+    (folder / name).write_text(text)
+    return folder / name
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    return written(tmp_path, ARM, "arm.xml")
+
+
+def test_bodies_joints_and_geoms_are_read(arm: Path) -> None:
+    figure = wb.load(arm)
+    assert (figure.name, figure.root, figure.joints) == ("arm", "fixed", ("swing", "roll", "slide"))
+    kinds = {piece.name: type(piece.geometry).__name__ for piece in figure.geometry.geometryObjects}
+    assert kinds.pop("base:0") == "Box"
+    assert kinds == {"upper:0": "Capsule", "fore:0": "Convex", "fore:1": "Ellipsoid", "hand:0": "Convex"}
+    assert figure.limits.upper == pytest.approx([1.0, 0.1])
+    assert figure.notes == ("1 geoms of the world are no part of the robot: wb.read_scene(path) has them",)
+    scene = wb.Scene(figure)
+    data = figure.model.createData()
+    q = figure.with_joints(figure.neutral, {"swing": 0.4, "roll": -0.7, "slide": 0.06})
+    pin.framesForwardKinematics(figure.model, data, q)
+    target = data.oMf[figure.frame_id("tip")].translation.copy()
+    assert wb.solve(wb.Problem(scene, goals=[wb.Point("tip", target)])).solved
+    assert wb.load(arm, root="free").root == "free"
+
+
+def configuration(model: object, figure: wb.Figure, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """MuJoCo's random configuration, with followers where they are led to, and ours."""
+    rng, theirs = np.random.default_rng(seed), mujoco.MjData(model)
+    q = pin.neutral(figure.model)
+    for k in range(model.njnt):  # type: ignore[attr-defined]
+        joint = model.joint(k)  # type: ignore[attr-defined]
+        body = model.body(joint.bodyid[0])  # type: ignore[attr-defined]
+        kind, at = int(joint.type[0]), int(joint.qposadr[0])
+        if kind == mujoco.mjtJoint.mjJNT_FREE:
+            place = pin.SE3.Random()
+            x, y, z, qx, qy, qz, qw = pin.SE3ToXYZQUAT(place)
+            theirs.qpos[at : at + 7], q[:7] = (x, y, z, qw, qx, qy, qz), (x, y, z, qx, qy, qz, qw)
+            continue
+        siblings = [j for j in range(model.njnt) if model.jnt_bodyid[j] == body.id]  # type: ignore[attr-defined]
+        named = body.name or f"body{body.id}"
+        number = [j for j in siblings if not model.joint(j).name].index(k) if not joint.name else 0  # type: ignore[attr-defined]
+        name = joint.name or f"{named}_joint" + (f"_{number + 1}" if number else "")
+        if kind == mujoco.mjtJoint.mjJNT_BALL:
+            turn = pin.Quaternion(pin.SE3.Random().rotation)
+            theirs.qpos[at : at + 4] = (turn.w, turn.x, turn.y, turn.z)
+            made = figure.model.joints[figure.joint_id(name)]
+            q[made.idx_q : made.idx_q + 4] = turn.coeffs()
+        elif name in figure.followers:
+            theirs.qpos[at] = figure.followers[name].value(q)
+        else:
+            theirs.qpos[at] = q[figure.model.joints[figure.joint_id(name)].idx_q] = rng.uniform(-2.0, 2.0)
+    return theirs.qpos.copy(), q
+
+
+@pytest.mark.parametrize("first", range(0, 40, 10))
+def test_random_files_are_mujocos(first: int, tmp_path: Path) -> None:
+    for seed in range(first, first + 10):
+        path = written(tmp_path, mjcf(seed), f"m{seed}.xml")
+        model, figure = mujoco.MjModel.from_xml_path(str(path)), wb.load(path, samples=0)
+        theirs, data = mujoco.MjData(model), figure.model.createData()
+        theirs.qpos[:], q = configuration(model, figure, seed)
+        mujoco.mj_forward(model, theirs)
+        pin.framesForwardKinematics(figure.model, data, q)
+        table = model.body("table").id
+        for body in set(range(1, model.nbody)) - {table}:
+            place = data.oMf[figure.frame_id(model.body(body).name or f"body{body}")]
+            assert np.abs(place.translation - theirs.xpos[body]).max() < 1e-9, path
+            assert np.abs(place.rotation.ravel() - theirs.xmat[body]).max() < 1e-9, path
+        for site in range(model.nsite):
+            there = data.oMf[figure.frame_id(model.site(site).name)].translation
+            assert np.abs(there - theirs.site_xpos[site]).max() < 1e-9
+        mass = sum(float(inertia.mass) for inertia in figure.model.inertias)
+        assert mass == pytest.approx(float(model.body_mass.sum() - model.body_mass[table]), rel=1e-12)
+        led = {follower.joint for follower in figure.followers.values()}
+        for k in range(model.njnt):
+            joint = model.joint(k)
+            if not joint.name or joint.name in {*led, *figure.followers} or int(joint.type[0]) < 2:
+                continue
+            slot = figure.model.joints[figure.joint_id(joint.name)].idx_q
+            ends = (figure.model.lowerPositionLimit[slot], figure.model.upperPositionLimit[slot])
+            limited = bool(model.jnt_limited[k])
+            assert ends == (pytest.approx(tuple(joint.range), abs=1e-12) if limited else (-np.inf, np.inf))
+
+
+def test_includes_world_bodies_and_keyframes_are_kept(tmp_path: Path) -> None:
+    written(tmp_path, ARM.replace('<body name="base">', '<body name="base" pos="0.3 0 1" quat="0 0 0 1">'), "arm.xml")
+    path = written(
+        tmp_path,
+        '<mujoco><include file="arm.xml"/><worldbody><geom type="plane" size="1 1 1" pos="0 0 -2"/>'
+        '<body name="target" mocap="true"><geom type="sphere" size="0.1"/></body></worldbody>'
+        '<keyframe><key name="home" qpos="0.3 0.1 0.02"/></keyframe></mujoco>',
+        "scene.xml",
+    )
+    figure = wb.load(path)
+    assert figure.joints == ("swing", "roll", "slide")
+    assert figure.placement(figure.neutral, "base").translation == pytest.approx([0.3, 0.0, 1.0])
+    assert figure.joint_values(figure.posture("home")) == {"swing": 0.3, "roll": 0.1, "slide": 0.02}
+    assert "things beside the robot (target)" in " ".join(figure.notes)
+
+
+def test_pairs_are_those_of_the_file(tmp_path: Path) -> None:
+    bits = ARM.replace('<geom type="box"', '<geom contype="2" conaffinity="2" type="box"')
+    excluded = bits.replace("</mujoco>", '<contact><exclude body1="upper" body2="hand"/></contact></mujoco>')
+    figure = wb.load(written(tmp_path, excluded))
+    reasons = {frozenset((pair.a, pair.b)): pair.reason for pair in figure.excluded_pairs}
+    assert reasons[frozenset(("base:0", "hand:0"))] == "their contact bits do not meet"
+    assert reasons[frozenset(("upper:0", "hand:0"))] == "the file excludes them"
+
+
+def test_a_linear_equality_is_followed_and_others_are_told(tmp_path: Path) -> None:
+    linear = '<equality><joint joint1="swing" joint2="roll" polycoef="0.1 0.5 0 0 0"/></equality></mujoco>'
+    figure = wb.load(written(tmp_path, ARM.replace("</mujoco>", linear)))
+    values = figure.joint_values(figure.with_joints(figure.neutral, {"swing": 0.4}))
+    assert values["swing"] == pytest.approx(0.1 + 0.5 * values["roll"])
+    square = linear.replace("0.5 0 0 0", "0.5 1 0 0")
+    notes = wb.load(written(tmp_path, ARM.replace("</mujoco>", square))).notes
+    assert "joint 'swing': its <equality> is not linear in another joint, so it moves by itself" in notes
+
+
+def test_a_ball_keeps_the_range_of_its_swing(tmp_path: Path) -> None:
+    ball = ARM.replace(
+        '<joint name="swing" axis="0 1 0" range="-1 1" limited="true"/>',
+        '<joint name="swing" type="ball" range="0 0.8"/>',
+    )
+    figure = wb.load(written(tmp_path, ball))
+    cone = figure.cones["swing"]
+    assert cone.axis == pytest.approx([0.0, 0.0, 1.0])
+    for angle, inside in ((0.7, True), (0.9, False)):
+        assert cone.cone.contains([np.sin(angle), 0.0, np.cos(angle)]) == inside
+
+
+def test_one_of_several_robots_is_chosen(tmp_path: Path) -> None:
+    second = '<body name="other" pos="1 0 0"><joint name="turn"/><geom size="0.1"/></body></worldbody>'
+    path = written(tmp_path, ARM.replace("</worldbody>", second))
+    with pytest.raises(InputError, match=r"2 robots.*root=: base, other"):
+        wb.load(path)
+    assert wb.load(path, root="other").joints == ("turn",)
+    assert "other robots of the file (other) are not read" in " ".join(wb.load(path, root="base").notes)
+
+
+WRONG = {
+    "no bodies": ("<mujoco><worldbody/></mujoco>", "no bodies"),
+    "an unknown joint": (ARM.replace('type="slide"', 'type="screw"'), "MuJoCo cannot read it .*screw"),
+    "no mesh": (ARM.replace('vertex="0 0 0  0.1 0 0  0 0.1 0  0 0 0.1"', 'file="gone.stl"'), "gone.stl"),
+    "broken": (ARM[:-5], "XML is broken"),
+    "another file": ("<scene/>", "<scene>, not <robot>"),
+}
+
+
+@pytest.mark.parametrize("what", WRONG)
+def test_a_wrong_file_is_one_sentence(what: str, tmp_path: Path) -> None:
+    text, words = WRONG[what]
+    path = written(tmp_path, text)
+    with pytest.raises(FileFormatError, match=words) as caught:
+        wb.load(path)
+    assert str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_options_are_checked(arm: Path) -> None:
+    with pytest.raises(InputError, match="'fixed' or 'free'"):
+        wb.load(arm, root="floating")
+    with pytest.raises(UnknownNameError, match=r"'hnd'.*hand"):
+        wb.load(arm, concavity={"hnd": 0.1})
+    with pytest.raises(InputError, match="concavity of link 'hand' is 2"):
+        wb.load(arm, concavity={"hand": 2})
+
+
+def test_a_urdf_may_be_called_xml(tmp_path: Path) -> None:
+    assert wb.load(written(tmp_path, '<robot name="r"><link name="a"/></robot>')).frames == ("a",)

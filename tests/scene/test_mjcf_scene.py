@@ -1,0 +1,61 @@
+"""Scenes of MJCF files: what is around the robot, where MuJoCo has it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+
+mujoco = pytest.importorskip("mujoco", reason="MuJoCo, which reads MJCF files, is not installed")
+
+CELL = """<mujoco><worldbody>
+  <geom name="floor" type="plane" size="1 1 1" pos="0 0 -0.2"/>
+  <body name="arm" pos="0 0 0.1"><joint name="turn" axis="0 0 1"/>
+    <geom type="capsule" fromto="0 0 0 0.4 0 0" size="0.03"/></body>
+  <body name="bench" pos="0.8 0 0" euler="0 0 30"><geom type="box" size="0.2 0.3 0.05"/>
+    <body name="lamp" pos="0 0 0.1"><geom name="foot" size="0.02"/>
+      <geom name="rod" type="cylinder" size="0.01 0.1"/></body></body>
+  <body name="goal" mocap="true" pos="0 1 0"><geom type="ellipsoid" size="0.05 0.06 0.07"/></body>
+  <body name="mark"><geom size="0.5" contype="0" conaffinity="0"/></body>
+  <body name="mug" pos="0.7 0 0.2"><freejoint/><geom type="cylinder" size="0.04 0.05" mass="0.3"/>
+    <geom type="box" size="0.01 0.01 0.02" pos="0.05 0 0" mass="0.1"/></body>
+</worldbody></mujoco>"""
+
+
+@pytest.fixture
+def path(tmp_path: Path) -> Path:
+    (tmp_path / "cell.xml").write_text(CELL)
+    return tmp_path / "cell.xml"
+
+
+def test_what_is_around_the_robot_becomes_things(path: Path) -> None:
+    scene = wb.read_scene(path)
+    assert scene.figure.joints == ("turn",)
+    assert set(scene.objects) == {"floor", "bench", "foot", "rod", "goal", "mug"}
+    assert isinstance(scene.objects["floor"].shape, wb.HalfSpace)
+    mug = scene.objects["mug"].body
+    assert mug is not None
+    assert mug.mass == pytest.approx(0.4)
+
+
+def test_distances_are_mujocos(path: Path) -> None:
+    scene, model = wb.read_scene(path), mujoco.MjModel.from_xml_path(str(path))
+    theirs, q = mujoco.MjData(model), scene.figure.with_joints(scene.figure.neutral, {"turn": 0.7})
+    theirs.qpos[0] = 0.7
+    mujoco.mj_forward(model, theirs)
+    arm, ends = model.body_geomadr[model.body("arm").id], np.zeros(6)
+    contacts = scene.contacts(q, within=10.0)
+    owners = np.array(scene.piece_owner)[contacts.pair].tolist()
+    ours = dict(zip(map(frozenset, owners), contacts.distance, strict=True))
+    for name in ("floor", "foot", "rod"):
+        expected = mujoco.mj_geomDistance(model, theirs, arm, model.geom(name).id, 10.0, ends)
+        assert ours[frozenset(("arm", name))] == pytest.approx(expected, abs=2e-4), name  # a rod is a prism of 64 sides
+
+
+def test_a_urdf_is_no_scene(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").write_text('<robot name="r"><link name="a"/></robot>')
+    with pytest.raises(wb.FileFormatError, match="<mujoco>"):
+        wb.read_scene(tmp_path / "robot.xml")

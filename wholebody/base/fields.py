@@ -1,0 +1,194 @@
+"""Checks of the fields of a record, read from their annotations: a range is written once.
+
+``margin: Annotated[float, Range(0.0, 1.0, "m")] = 0.0`` states what the class accepts when it is made. Task files, the
+command line and the documentation read it there with `check_of`.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Collection, Iterator
+from contextlib import suppress
+from dataclasses import MISSING, Field, dataclass, fields
+from functools import cache
+from types import SimpleNamespace, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeAlias, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from wholebody.base import checks
+from wholebody.base.errors import InputError
+
+Check: TypeAlias = Callable[[Any, str], Any]
+"""A function of a value and its name in messages: the value in the form in which it is used, or an InputError."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """The numbers that a value may be, both ends included.
+
+    Attributes:
+        low: the least.
+        high: the greatest.
+        unit: of the numbers.
+        whole: whether they are whole.
+        endless: whether infinity is taken too, for no limit.
+        wanted: what the message asks for in place of the range.
+    """
+
+    low: float
+    high: float
+    unit: str = ""
+    whole: bool = False
+    endless: bool = False
+    wanted: str = ""
+
+    def __call__(self, value: object, what: str) -> float:
+        """The number; an InputError if the value is none of these."""
+        if self.whole:
+            return checks.whole(value, what, int(self.low), int(self.high))
+        if self.endless and isinstance(value, (float, np.floating)) and value == math.inf:
+            return math.inf
+        wanted = self.wanted or (f"a number between {self}, or math.inf for no limit" if self.endless else "")
+        return checks.number(value, what, self.low, self.high, self.unit, wanted)
+
+    def __str__(self) -> str:
+        """Both ends and the unit, such as "0 and 1 m"."""
+        return f"{self.low:g} and {self.high:g} {self.unit}".strip()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """One of a few words; the check of a field that is annotated as a Literal of them."""
+
+    options: Collection[str]
+
+    def __call__(self, value: object, what: str) -> str:
+        """The word; an InputError if the value is another."""
+        return checks.choice(value, self.options, what)
+
+
+@dataclass(frozen=True)
+class Vector:
+    """A fixed count of numbers, kept as a tuple."""
+
+    count: int
+    each: Range
+
+    def __call__(self, value: object, what: str) -> tuple[float, ...]:
+        """The numbers; an InputError if the value is of another shape, or one of them is out of range."""
+        return tuple(self.each(one, what) for one in checks.numbers(value, (self.count,), what).tolist())
+
+
+@dataclass(frozen=True)
+class Names:
+    """A list of names, kept as a tuple.
+
+    Attributes:
+        example: such a list as it is written, for messages.
+        least: how many at least.
+    """
+
+    example: str
+    least: int = 1
+
+    def __call__(self, value: object, what: str) -> tuple[str, ...]:
+        """The names; an InputError if the value is no list or empty."""
+        names = tuple(checks.listed(value, what, self.example))
+        if len(names) < self.least:
+            raise InputError(f"{what} is empty; give a list of names, such as {self.example}")
+        return names
+
+
+class _Checked(NamedTuple):
+    """A field with its check.
+
+    Attributes:
+        name: of the field.
+        check: of its values.
+        optional: whether None stands for no value.
+        kept: name of the field that keeps what the check returns.
+    """
+
+    name: str
+    check: Check
+    optional: bool
+    kept: str
+
+
+class Checked:
+    """Base of records whose fields are checked by their annotations when they are made.
+
+    `bool` and `Literal` are checked as they are, ``Annotated[T, check]`` by the check, and None passes where the
+    annotation has it. What a check returns is kept in the field `resolved_NAME` if the class has one, otherwise in the
+    field itself.
+    """
+
+    def __post_init__(self) -> None:
+        """Check the fields.
+
+        Raises:
+            InputError: a value that its field does not accept.
+        """
+        kind: Any = type(self)
+        where = called(self)
+        for field in _checked(kind):
+            value = getattr(self, field.name)
+            if value is not None or not field.optional:
+                checks.settle(self, field.kept, field.check(value, f"{where}: {field.name}"))
+
+
+def called(record: object) -> str:
+    """A record in messages: its class, and the names that it must be given."""
+    kind: Any = type(record)
+    names = ", ".join(checks.shown(getattr(record, name)) for name in _names(kind))
+    return f"{kind.__name__}({names})" if names else str(kind.__name__)
+
+
+def check_of(kind: Any, name: str) -> Check:
+    """The check of a field of a class that is `Checked`."""
+    return next(field.check for field in _checked(kind) if field.name == name)
+
+
+@cache
+def _checked(kind: Any) -> tuple[_Checked, ...]:
+    found = []
+    names = {field.name for field in fields(kind)}
+    for field, hint in _hints(kind):
+        parts = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
+        check = next(filter(None, map(_check, parts)), None)
+        if check is not None:
+            kept = f"resolved_{field.name}"
+            found.append(_Checked(field.name, check, type(None) in parts, kept if kept in names else field.name))
+    return tuple(found)
+
+
+def _check(hint: Any) -> Check | None:
+    """The check that an annotation asks for; None if it asks for none."""
+    if hint is bool:
+        return checks.flag
+    if get_origin(hint) is Literal:
+        return Choice(get_args(hint))
+    return next(filter(callable, get_args(hint)[1:]), None) if get_origin(hint) is Annotated else None
+
+
+@cache
+def _names(kind: Any) -> tuple[str, ...]:
+    """Fields without a default whose values are texts."""
+    return tuple(
+        field.name
+        for field, hint in _hints(kind)
+        if field.default is field.default_factory is MISSING and str in (hint, *get_args(hint)[:1])
+    )
+
+
+def _hints(kind: Any) -> Iterator[tuple[Field[Any], Any]]:
+    """The fields that are given, with their annotations; those of each class are read in its module."""
+    owners = {name: base for base in reversed(kind.__mro__) for name in vars(base).get("__annotations__", ())}
+    for field in fields(kind):
+        if field.init:
+            one = SimpleNamespace(__annotations__={field.name: field.type})
+            scope = getattr(sys.modules.get(owners[field.name].__module__), "__dict__", {})
+            with suppress(NameError):  # what only a type checker resolves asks for nothing
+                yield field, get_type_hints(one, scope, include_extras=True)[field.name]

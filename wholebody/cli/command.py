@@ -1,0 +1,119 @@
+"""How a command is declared: its words, its options and its function in one place."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from wholebody.base.errors import InputError
+
+Measure = Callable[[argparse.Namespace], "int | None"]
+"""Runs a command; None is the exit code 0."""
+
+Option = Callable[[argparse.ArgumentParser], object]
+"""Adds itself to a parser."""
+
+
+class Commands(Protocol):
+    """A group of commands, as `argparse` makes it by `add_subparsers`."""
+
+    def add_parser(self, name: str, /, **options: Any) -> argparse.ArgumentParser:
+        """Add a command; the options are those of `argparse.ArgumentParser`, and `help`."""
+
+
+@dataclass(frozen=True)
+class Command:
+    """A command.
+
+    Attributes:
+        name: as typed.
+        help, description, epilog: as `argparse` shows them. Where they have line breaks, these stay.
+        options: in the order of the help.
+        measure: runs it.
+    """
+
+    name: str
+    help: str
+    description: str
+    epilog: str
+    options: tuple[Option, ...]
+    measure: Measure
+
+    def add_to(self, commands: Commands) -> None:
+        """Add it to a group of commands."""
+        lines = "\n" in self.description + self.epilog
+        shape = argparse.RawDescriptionHelpFormatter if lines else argparse.HelpFormatter
+        parser = commands.add_parser(
+            self.name, help=self.help, description=self.description, epilog=self.epilog, formatter_class=shape
+        )
+        parser.set_defaults(run=self.run, counted=())
+        for add in self.options:
+            add(parser)
+
+    def run(self, arguments: argparse.Namespace) -> int:
+        """Run it, and return the exit code.
+
+        Raises:
+            InputError: an option that counts things is below one.
+        """
+        for flag in arguments.counted:
+            number = getattr(arguments, flag.removeprefix("--").replace("-", "_"))
+            if number is not None and number < 1:
+                raise InputError(f"{flag} is {number}; give 1 or more")
+        return self.measure(arguments) or 0
+
+
+def command(
+    name: str, help: str, description: str, *options: Option, epilog: str = ""
+) -> Callable[[Measure], Command]:  # fmt: skip
+    """Make the decorated function a command."""
+    return lambda measure: Command(name, help, description, epilog, options, measure)
+
+
+@dataclass(frozen=True)
+class Group:
+    """A command that has commands of its own.
+
+    Attributes:
+        name: as typed.
+        help, description: as `argparse` shows them.
+        members: its commands, in the order of the help.
+        title: of their list in the help.
+    """
+
+    name: str
+    help: str
+    description: str
+    members: tuple[Command, ...]
+    title: str = "commands"
+
+    def add_to(self, commands: Commands) -> None:
+        """Add it, with its own commands, to a group of commands."""
+        shape = argparse.RawDescriptionHelpFormatter
+        parser = commands.add_parser(self.name, help=self.help, description=self.description, formatter_class=shape)
+        kinds: Any = parser.add_subparsers(title=self.title, metavar="COMMAND", required=True)
+        for member in self.members:
+            member.add_to(kinds)
+
+
+def option(*names: str, **settings: Any) -> Option:
+    """An option or an argument, as `ArgumentParser.add_argument` takes it."""
+    return lambda parser: parser.add_argument(*names, **settings)
+
+
+def flag(name: str, help: str) -> Option:
+    """An option without a value."""
+    return option(name, action="store_true", help=help)
+
+
+def count(name: str, default: int | None, help: str) -> Option:
+    """An option that counts things to do: one or more; the help says the default."""
+
+    def add(parser: argparse.ArgumentParser) -> None:
+        said = help if default is None or "(default" in help else f"{help} (default: {default})"
+        parser.add_argument(name, type=int, default=default, metavar="N", help=said)
+        parser.set_defaults(counted=(*parser.get_default("counted"), name))
+
+    return add

@@ -1,0 +1,187 @@
+"""An MJCF file as MuJoCo compiles it, and which of its bodies are robots, which are things.
+
+MuJoCo is the reference of its format, so it reads includes, defaults, classes, angles, references, several world bodies
+and frames itself: the compiled model holds bodies in the order of the tree, joints with limits in radians, geoms in the
+frames of their bodies.
+"""
+
+from __future__ import annotations
+
+import warnings
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
+
+FREE, BALL, SLIDE, HINGE = range(4)
+"""Types of joints, as MuJoCo numbers them."""
+
+
+class Compiled:
+    """A compiled MJCF file.
+
+    Attributes:
+        path: of the file.
+        model: `mujoco.MjModel`.
+        names: "body", "joint", "geom", "site", "key" -> the name of each, made from its body and number where the file
+            has none.
+    """
+
+    def __init__(self, path: Path) -> None:
+        """Compile a file.
+
+        Raises:
+            FileFormatError: MuJoCo cannot read it.
+            MissingPackageError: MuJoCo is not installed.
+        """
+        self.path, self.model = path, _compile(path)
+        self.names = _names(self.model)
+
+    @cached_property
+    def children(self) -> list[list[int]]:
+        """Bodies that hang on each body."""
+        found: list[list[int]] = [[] for _ in range(self.model.nbody)]
+        for body in range(1, self.model.nbody):
+            found[self.model.body_parentid[body]].append(body)
+        return found
+
+    def tree(self, top: int) -> list[int]:
+        """A body and all that hang on it, parents first."""
+        found = [top]
+        for body in found:
+            found += self.children[body]
+        return sorted(found)
+
+    def joints(self, body: int) -> range:
+        """Joints between a body and its parent, from the parent outwards."""
+        first = int(self.model.body_jntadr[body])
+        return range(first, first + int(self.model.body_jntnum[body])) if first >= 0 else range(0)
+
+    def place(self, body: int) -> pin.SE3:
+        """Placement of a body in its parent, before its joints."""
+        return placement(self.model.body_pos[body], self.model.body_quat[body])
+
+    def is_free(self, body: int) -> bool:
+        """Whether a body has a free joint."""
+        return any(self.model.jnt_type[joint] == FREE for joint in self.joints(body))
+
+    @cached_property
+    def robots(self) -> tuple[int, ...]:
+        """Bodies on the world below which something turns or slides; else those that go about freely; else all."""
+        tops = self.children[0]
+        inner = [top for top in tops if any(self._moves(body) for body in self.tree(top))]
+        return tuple(inner or [top for top in tops if self.is_free(top)] or tops)
+
+    def _moves(self, body: int) -> bool:
+        return any(self.model.jnt_type[joint] != FREE for joint in self.joints(body))
+
+    def robot(self, name: str | None) -> int:
+        """The body of a robot on the world.
+
+        Args:
+            name: of the body; None where the file has one robot.
+
+        Raises:
+            FileFormatError: the file has no bodies.
+            InputError: it has several, or none of that name.
+        """
+        known = {self.names["body"][top]: top for top in self.robots}
+        if not known:
+            raise FileFormatError(f"{self.path}: there are no bodies in it; give an MJCF of a robot")
+        if name is not None:
+            if name not in known:
+                wanted = f"'fixed' or 'free', or the name of a robot in it: {', '.join(known)}"
+                raise InputError(f"{self.path}: root is {shown(name)}; give {wanted}")
+            return known[name]
+        if len(known) > 1:
+            raise InputError(
+                f"{self.path}: there are {len(known)} robots in it; choose one with root=: {', '.join(known)}"
+            )
+        return next(iter(known.values()))
+
+    def mesh(self, geom: int) -> tuple[Array, Any]:
+        """Vertices (n, 3) and faces (m, 3) of a geom's mesh, in the geom's frame."""
+        model, mesh = self.model, int(self.model.geom_dataid[geom])
+        first, count = int(model.mesh_vertadr[mesh]), int(model.mesh_vertnum[mesh])
+        face, faces = int(model.mesh_faceadr[mesh]), int(model.mesh_facenum[mesh])
+        return (
+            np.array(model.mesh_vert[first : first + count], dtype=float),
+            np.array(model.mesh_face[face : face + faces], dtype=np.int64),
+        )
+
+    def collides(self, geom: int) -> bool:
+        """Whether a geom can touch another one: its contact bits are not all zero."""
+        return bool(self.model.geom_contype[geom] or self.model.geom_conaffinity[geom])
+
+    def geoms(self, body: int) -> range:
+        """Geoms of a body."""
+        first = int(self.model.body_geomadr[body])
+        return range(first, first + int(self.model.body_geomnum[body])) if first >= 0 else range(0)
+
+
+def placement(position: Array, quaternion: Array) -> pin.SE3:
+    """A placement from MuJoCo's position and quaternion, scalar first."""
+    w, x, y, z = (float(value) for value in quaternion)
+    return pin.SE3(pin.Quaternion(w, x, y, z).normalized().matrix(), np.array(position, dtype=float))
+
+
+def _compile(path: Path) -> Any:
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingPackageError(
+            f"{path}: MJCF files are read by MuJoCo, which is not installed; run: pip install 'wholebody[mjcf]'"
+        ) from None
+    try:
+        with warnings.catch_warnings():  # they tell of simulations
+            warnings.simplefilter("ignore")
+            spec = mujoco.MjSpec.from_file(str(path))
+            _without_textures(spec)
+            return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        reason = " ".join(str(error).split()).removeprefix("Error: ").removeprefix("XML Error: ")
+        raise FileFormatError(f"{path}: MuJoCo cannot read it ({reason}); correct the file") from None
+
+
+def _without_textures(spec: Any) -> None:
+    """Leave out textures: their files are often left behind, and nothing here draws them."""
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
+    for texture in list(spec.textures):
+        spec.delete(texture)
+
+
+def _names(model: Any) -> dict[str, list[str]]:
+    import mujoco
+
+    found: dict[str, list[str]] = {}
+    for kind, count in (
+        ("body", model.nbody), ("joint", model.njnt), ("geom", model.ngeom), ("site", model.nsite), ("key", model.nkey),
+    ):  # fmt: skip
+        number = getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}")
+        given = [mujoco.mj_id2name(model, number, k) or "" for k in range(count)]
+        taken = set(given)
+        for k, name in enumerate(given):
+            if not name:
+                base = _base(kind, k, model, found)
+                name = (
+                    base
+                    if base not in taken
+                    else next(f"{base}_{n}" for n in range(2, count + 2) if f"{base}_{n}" not in taken)
+                )
+                taken.add(name)
+                given[k] = name
+        found[kind] = given
+    return found
+
+
+def _base(kind: str, number: int, model: Any, found: dict[str, list[str]]) -> str:
+    if kind in ("body", "key"):
+        return f"{kind}{number}"
+    return f"{found['body'][getattr(model, {'joint': 'jnt_bodyid'}.get(kind, f'{kind}_bodyid'))[number]]}_{kind}"

@@ -1,0 +1,171 @@
+"""A figure from an MJCF file, as MuJoCo compiles it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.figures.figure import Figure
+from wholebody.figures.link_pieces import Concavity, LinkShape, check_concavity
+from wholebody.figures.mjcf.compiled import Compiled, placement
+from wholebody.figures.mjcf.model import RobotModel, robot_model
+from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure
+from wholebody.figures.urdf.figure import SAMPLES, urdf_figure
+from wholebody.figures.urdf.xml_reading import read_xml
+
+SHAPES = ("plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf")
+"""Kinds of geoms, as MuJoCo numbers them."""
+
+
+def xml_figure(
+    path: str | PathLike[str],
+    root: str | None = None,
+    package_dirs: Iterable[str | PathLike[str]] = (),
+    concavity: Concavity = None,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> Figure:
+    """Return the figure of an ``.xml`` file: an MJCF if its outermost element is ``<mujoco>``, otherwise a URDF.
+
+    Args:
+        path: the file.
+        root: "fixed" to the world, or "free"; if left out, as in the file. Of a file with several robots the name of
+            the body of one, which keeps its root.
+        package_dirs: as for `urdf_figure`; an MJCF has no packages.
+        concavity: as for `urdf_figure`.
+        samples: as for `urdf_figure`.
+        seed: as for `urdf_figure`.
+
+    Raises:
+        FileFormatError: a file that cannot be read, with the place and the correction.
+        InputError: another root, several robots, a concavity out of range, or too many joints for the memory.
+        MissingPackageError: an MJCF, and MuJoCo is not installed.
+        UnknownNameError: `concavity` names an unknown link.
+    """
+    place = Path(path)
+    if read_xml(place, "URDF or MJCF").tag != "mujoco":
+        return urdf_figure(path, root, package_dirs, concavity, samples, seed)
+    return mjcf_figure(Compiled(place), root, concavity, samples, seed)
+
+
+def mjcf_figure(
+    compiled: Compiled, root: str | None = None, concavity: Concavity = None, samples: int = SAMPLES, seed: int = 0
+) -> Figure:
+    """Return the figure of a robot in a compiled file; arguments and errors as for `xml_figure`."""
+    named = None if root in (None, "fixed", "free") else root
+    top = compiled.robot(named)
+    robot = robot_model(compiled, top, None if named else root)
+    check_size(robot.model, compiled.path)
+    names = compiled.names
+    links = tuple(names["body"][body] for body in robot.bodies)
+    geoms = [geom for body in robot.bodies for geom in compiled.geoms(body) if compiled.collides(geom)]
+    notes = [*robot.notes, *_left_out(compiled, robot.bodies)]
+    shapes = []
+    kept = []
+    for geom in geoms:
+        shape = geom_shape(compiled, geom)
+        if shape is None:
+            kind = SHAPES[int(compiled.model.geom_type[geom])]
+            notes.append(f"geom {shown(names['geom'][geom])}: a {kind} on a body that moves is not kept")
+        else:
+            shapes.append(shape)
+            kept.append(geom)
+    if not shapes:
+        notes.append("no geom of the robot can touch another one, so nothing of it collides")
+    made = geometry_of_links(
+        robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
+    )
+    untested = _Untested(compiled, [kept[number] for number in made.shapes])
+    return robot_figure(
+        Robot(
+            str(compiled.model.names[: compiled.model.names.index(b"\0")], "utf-8") or compiled.path.stem,
+            robot.model, links, made.geometry, (*notes, *made.notes), None, robot.sites,
+            _postures(compiled, robot), robot.cones, untested,
+            compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
+        ),
+        samples,
+        seed,
+    )  # fmt: skip
+
+
+def geom_shape(compiled: Compiled, geom: int) -> LinkShape | None:
+    """The shape of a geom on its body; None for planes and height fields, which only the world has."""
+    model = compiled.model
+    link = compiled.names["body"][int(model.geom_bodyid[geom])]
+    at = placement(model.geom_pos[geom], model.geom_quat[geom])
+    size = [float(value) for value in model.geom_size[geom]]
+    kind = SHAPES[int(model.geom_type[geom])]
+    if kind in ("mesh", "sdf"):
+        return LinkShape(link, at, "triangles", (), triangles=compiled.mesh(geom))
+    sizes: dict[str, tuple[float, ...]] = {
+        "sphere": (size[0],), "capsule": (size[0], 2.0 * size[1]), "cylinder": (size[0], 2.0 * size[1]),
+        "ellipsoid": tuple(size), "box": tuple(2.0 * value for value in size),
+    }  # fmt: skip
+    return LinkShape(link, at, kind, sizes[kind]) if kind in sizes else None
+
+
+def _colors(compiled: Compiled, robot: RobotModel) -> dict[str, tuple[float, float, float, float]]:
+    """The colour of a body's first geom, or of its material, where the file gives one."""
+    model, found = compiled.model, {}
+    for body in robot.bodies:
+        for geom in compiled.geoms(body):
+            material = int(model.geom_matid[geom])
+            color = model.mat_rgba[material] if material >= 0 else model.geom_rgba[geom]
+            if not np.allclose(color, (0.5, 0.5, 0.5, 1.0)):  # MuJoCo's own, where the file has none
+                red, green, blue, alpha = (float(value) for value in color)
+                found[compiled.names["body"][body]] = (red, green, blue, alpha if alpha > 0.0 else 1.0)
+                break
+    return found
+
+
+def _postures(compiled: Compiled, robot: RobotModel) -> dict[str, Array]:
+    """The configuration that joints refer to, and the keyframes."""
+    found = {"reference": robot.posture(compiled, compiled.model.qpos0)}
+    for key, name in enumerate(compiled.names["key"]):
+        found[name] = robot.posture(compiled, compiled.model.key_qpos[key])
+    return {name: pin.normalize(robot.model, q) for name, q in found.items()}
+
+
+class _Untested:
+    """Why two pieces of the figure are never tested: contact bits, <exclude>."""
+
+    def __init__(self, compiled: Compiled, geoms: Sequence[int]) -> None:
+        model = compiled.model
+        self._type, self._affinity = np.array(model.geom_contype[geoms]), np.array(model.geom_conaffinity[geoms])
+        self._body = np.array(model.geom_bodyid[geoms])
+        signatures = {int(value) for value in model.exclude_signature}
+        self._excluded = {frozenset((value >> 16, value & 0xFFFF)) for value in signatures}
+
+    def __call__(self, first: int, second: int) -> str | None:
+        met = (self._type[first] & self._affinity[second]) | (self._type[second] & self._affinity[first])
+        if not met:
+            return "their contact bits do not meet"
+        if frozenset((int(self._body[first]), int(self._body[second]))) in self._excluded:
+            return "the file excludes them"
+        return None
+
+
+def _left_out(compiled: Compiled, mine: Sequence[int]) -> list[str]:
+    """Sentences on what of the file belongs to the world and not to the robot."""
+    names, model = compiled.names["body"], compiled.model
+    tops = [top for top in compiled.children[0] if top not in mine]
+    robots = [names[top] for top in tops if top in compiled.robots]
+    things = [names[top] for top in tops if top not in compiled.robots]
+    notes = []
+    if len(compiled.geoms(0)):
+        notes.append(
+            f"{len(compiled.geoms(0))} geoms of the world are no part of the robot: wb.read_scene(path) has them"
+        )
+    if things:
+        notes.append(f"things beside the robot ({', '.join(things)}) are no part of it: wb.read_scene(path) has them")
+    if robots:
+        notes.append(f"other robots of the file ({', '.join(robots)}) are not read: root='{robots[0]}' reads one")
+    if model.ntendon:
+        notes.append(f"{model.ntendon} tendons are not kept")
+    return notes

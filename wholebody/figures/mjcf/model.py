@@ -1,0 +1,302 @@
+"""Pinocchio's model of a robot in a compiled MJCF file.
+
+MuJoCo moves a body by its joints one after another: a hinge turns it about its anchor by ``q - ref``, a slide shifts
+it, a ball turns it about its anchor; a free joint places it in the world. So the placement of a body in its parent is
+``P T_1 ... T_n`` with ``T = Trans(anchor) R(axis, q - ref) Trans(-anchor)``.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.figures.description import ROOT_JOINT, JointCone
+from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
+from wholebody.figures.reach_cones import ReachCone
+
+
+class Law(NamedTuple):
+    """A joint's value as ``slope * leader + offset``; joints by their numbers in MuJoCo."""
+
+    leader: int
+    slope: float
+    offset: float
+
+
+class RobotModel(NamedTuple):
+    """A robot in an MJCF file.
+
+    Attributes:
+        model: Pinocchio's.
+        bodies: numbers of its bodies in MuJoCo, parents first.
+        joints: number of a joint in MuJoCo -> its index in Pinocchio.
+        sites: names of the frames of its sites.
+        cones: limits of ball joints, by joint.
+        notes: sentences on what Pinocchio's model does not have.
+    """
+
+    model: pin.Model
+    bodies: tuple[int, ...]
+    joints: dict[int, int]
+    sites: tuple[str, ...]
+    cones: dict[str, JointCone]
+    notes: tuple[str, ...]
+
+    def posture(self, compiled: Compiled, qpos: Array) -> Array:
+        """(nq,) posture of MuJoCo's (nq,) configuration."""
+        q: Array = pin.neutral(self.model)
+        for joint, index in self.joints.items():
+            made, at = self.model.joints[index], int(compiled.model.jnt_qposadr[joint])
+            if made.shortname() == "JointModelMimic":
+                continue
+            kind = compiled.model.jnt_type[joint]
+            if kind in (FREE, BALL):
+                shift = 3 if kind == FREE else 0
+                q[made.idx_q : made.idx_q + shift] = qpos[at : at + shift]
+                turned = placement(np.zeros(3), qpos[at + shift : at + shift + 4]).rotation
+                q[made.idx_q + shift : made.idx_q + shift + 4] = pin.Quaternion(turned).coeffs()
+            else:
+                q[made.idx_q] = qpos[at]
+        return q
+
+
+def robot_model(compiled: Compiled, top: int, root: str | None) -> RobotModel:
+    """Build the model of a robot.
+
+    Args:
+        compiled: the file.
+        top: the robot's body on the world.
+        root: "fixed", "free", or None as in the file.
+    """
+    return _Builder(compiled, top, root).build()
+
+
+class _Builder:
+    """One robot while it is built."""
+
+    def __init__(self, compiled: Compiled, top: int, root: str | None) -> None:
+        self._file, self._top, self._root = compiled, top, root
+        self._model = pin.Model()
+        self._joints: dict[int, int] = {}
+        self._notes: list[str] = []
+        self._bodies = compiled.tree(top)
+        self._laws = self._followers()
+
+    def build(self) -> RobotModel:
+        theirs, file, model = self._file.model, self._file, self._model
+        model.name = file.path.stem
+        at: dict[int, tuple[int, pin.SE3]] = {0: (0, pin.SE3.Identity())}
+        for body in self._bodies:
+            joint, place = self._moved(body, *at[theirs.body_parentid[body]])
+            at[body] = (joint, place)
+            inertia = _inertia(theirs, body)
+            if inertia.mass > 0.0:
+                model.appendBodyToJoint(joint, inertia, place)
+            frame = pin.Frame(file.names["body"][body], joint, 0, place, pin.FrameType.BODY, inertia)
+            model.addFrame(frame, False)
+        self._name_joints()
+        sites = self._add_sites(at)
+        return RobotModel(model, tuple(self._bodies), self._joints, sites, self._cones(), tuple(self._notes))
+
+    def _moved(self, body: int, parent: int, place: pin.SE3) -> tuple[int, pin.SE3]:
+        """The last joint of a body, and the body in the frame of this joint."""
+        theirs = self._file.model
+        place = place * self._file.place(body)
+        joints = list(self._file.joints(body))
+        free = self._file.is_free(body)
+        if body == self._top and (self._root == "free" or (free and self._root is None)):
+            parent = self._model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), ROOT_JOINT)
+            place = pin.SE3.Identity()
+            if free:
+                self._joints[joints[0]] = parent
+        for joint in joints:
+            kind = int(theirs.jnt_type[joint])
+            if kind == FREE:
+                continue
+            anchor, axis = np.array(theirs.jnt_pos[joint]), np.array(theirs.jnt_axis[joint])
+            before, after = pin.SE3(np.eye(3), anchor), pin.SE3(np.eye(3), -anchor)
+            reference = float(theirs.qpos0[theirs.jnt_qposadr[joint]])
+            if kind == HINGE:
+                after = pin.SE3(pin.exp3(-reference * axis), np.zeros(3)) * after
+            elif kind == SLIDE:
+                before, after = pin.SE3.Identity(), pin.SE3(np.eye(3), -reference * axis)
+            parent, place = self._add(joint, kind, axis, parent, place * before)
+            place = place * after
+        return parent, place
+
+    def _add(self, joint: int, kind: int, axis: Array, parent: int, place: pin.SE3) -> tuple[int, pin.SE3]:
+        """Add a joint; the frame in which the rest is placed, in the joint's own."""
+        name, theirs = self._file.names["joint"][joint], self._file.model
+        law = self._laws.get(joint)
+        if kind == BALL:
+            made = self._model.addJoint(parent, pin.JointModelSpherical(), place, name)
+            self._joints[joint] = made
+            return made, pin.SE3.Identity()
+        solid = pin.SE3(_along_z(axis), np.zeros(3))
+        if law is not None:  # a follower has the axis of its leader in its own frame: z
+            leader = self._model.joints[self._joints[law.leader]]
+            follower = pin.JointModelMimic(leader, law.slope, law.offset)
+            made = self._model.addJoint(parent, follower, place * solid, name)
+            self._joints[joint] = made
+            return made, solid.inverse()
+        model, turned = _aligned(axis, slide=kind == SLIDE)
+        if any(each.leader == joint for each in self._laws.values()):
+            model, turned = pin.JointModelPZ() if kind == SLIDE else pin.JointModelRZ(), solid
+        made = self._model.addJoint(parent, model, place * turned, name)
+        self._joints[joint] = made
+        slot, dof = self._model.joints[made].idx_q, self._model.joints[made].idx_v
+        low, high = self._range(joint)
+        for limits, value in (("lowerPositionLimit", low), ("upperPositionLimit", high)):
+            changed = np.array(getattr(self._model, limits))
+            changed[slot] = value + 0.0  # no negative zero
+            setattr(self._model, limits, changed)
+        self._fill("velocityLimit", dof, np.inf)
+        force = theirs.jnt_actfrcrange[joint]
+        limited = bool(theirs.jnt_actfrclimited[joint])
+        self._fill("effortLimit", dof, float(np.abs(force).max()) if limited else np.inf)
+        self._fill("armature", dof, float(theirs.dof_armature[theirs.jnt_dofadr[joint]]))
+        return made, turned.inverse()
+
+    def _fill(self, what: str, dof: int, value: float) -> None:
+        changed = np.array(getattr(self._model, what))
+        changed[dof] = value
+        setattr(self._model, what, changed)
+
+    def _range(self, joint: int) -> tuple[float, float]:
+        """Limits of a joint, cut by those of its followers."""
+        theirs = self._file.model
+        low, high = (float(end) for end in theirs.jnt_range[joint]) if theirs.jnt_limited[joint] else (-np.inf, np.inf)
+        for follower, law in self._laws.items():
+            if law.leader == joint and theirs.jnt_limited[follower]:
+                ends = sorted((float(end) - law.offset) / law.slope for end in theirs.jnt_range[follower])
+                low, high = max(low, ends[0]), min(high, ends[1])
+        return low, high
+
+    def _name_joints(self) -> None:
+        """Add a frame for every joint; a body of the same name keeps its own."""
+        for index in range(1, self._model.njoints):
+            name = self._model.names[index]
+            if not self._model.existFrame(name):
+                self._model.addFrame(pin.Frame(name, index, 0, pin.SE3.Identity(), pin.FrameType.JOINT))
+
+    def _add_sites(self, at: dict[int, tuple[int, pin.SE3]]) -> tuple[str, ...]:
+        theirs, made, renamed = self._file.model, [], []
+        for site, body in enumerate(theirs.site_bodyid):
+            if body not in at or body == 0:
+                continue
+            joint, place = at[body]
+            name = self._file.names["site"][site]
+            if self._model.existFrame(name):
+                renamed.append(name)
+                name = f"{name}_site"
+            there = place * placement(theirs.site_pos[site], theirs.site_quat[site])
+            self._model.addFrame(pin.Frame(name, joint, 0, there, pin.FrameType.OP_FRAME))
+            made.append(name)
+        if renamed:
+            self._notes.append(f"sites with the name of a body or joint end in _site: {', '.join(renamed)}")
+        return tuple(made)
+
+    def _followers(self) -> dict[int, Law]:
+        """Joints that follow another by an equality that is linear in it; the first in the tree leads."""
+        import mujoco
+
+        theirs = self._file.model
+        laws: dict[int, Law] = {}
+        mine = {joint for body in self._bodies for joint in self._file.joints(body)}
+        for row in range(theirs.neq):
+            if theirs.eq_type[row] != mujoco.mjtEq.mjEQ_JOINT:
+                continue
+            first, second = int(theirs.eq_obj1id[row]), int(theirs.eq_obj2id[row])
+            if first not in mine:
+                continue
+            name = self._file.names["joint"][first]
+            offset, slope, *higher = (float(value) for value in theirs.eq_data[row, :5])
+            if second < 0 or second not in mine or slope == 0.0 or any(higher) or not theirs.eq_active0[row]:
+                why = (
+                    "is switched off" if not theirs.eq_active0[row]
+                    else "is not linear in another joint"
+                )  # fmt: skip
+                self._notes.append(f"joint {shown(name)}: its <equality> {why}, so it moves by itself")
+                continue
+            if theirs.jnt_type[first] != theirs.jnt_type[second] or theirs.jnt_type[first] not in (HINGE, SLIDE):
+                self._notes.append(
+                    f"joint {shown(name)}: its <equality> joins a hinge and a slide, so it moves by itself"
+                )
+                continue
+            refs = [float(theirs.qpos0[theirs.jnt_qposadr[joint]]) for joint in (first, second)]
+            offset += refs[0] - slope * refs[1]
+            law = Law(second, slope, offset)
+            if first < second:
+                first, law = second, Law(first, 1.0 / slope, -offset / slope)
+            while law.leader in laws:
+                above = laws[law.leader]
+                law = Law(above.leader, law.slope * above.slope, law.offset + law.slope * above.offset)
+            if first in laws or first == law.leader:
+                self._notes.append(f"joint {shown(name)}: it follows more than one joint; the first <equality> is kept")
+                continue
+            laws[first] = law
+        others = sum(int(kind) != int(mujoco.mjtEq.mjEQ_JOINT) for kind in theirs.eq_type)
+        if others:
+            self._notes.append(
+                f"{others} <equality> between bodies or tendons: not kept; these parts move by themselves"
+            )
+        return laws
+
+    def _cones(self) -> dict[str, JointCone]:
+        """Limited balls: a cone about the direction of the limb, which bounds its swing and not its twist."""
+        theirs, made = self._file.model, {}
+        for joint, index in self._joints.items():
+            if theirs.jnt_type[joint] != BALL or not theirs.jnt_limited[joint]:
+                continue
+            body, angle = int(theirs.jnt_bodyid[joint]), float(theirs.jnt_range[joint][1])
+            name = self._model.names[index]
+            limb = np.array(theirs.body_ipos[body]) - np.array(theirs.jnt_pos[joint])
+            limb = limb / np.linalg.norm(limb) if np.linalg.norm(limb) > 1e-6 else np.array((0.0, 0.0, 1.0))
+            if angle >= np.pi:
+                continue
+            round_it = np.arange(16) * (2.0 * np.pi / 16)
+            frame = _along_z(limb)
+            corners = np.column_stack(
+                (np.sin(angle) * np.cos(round_it), np.sin(angle) * np.sin(round_it), np.full(16, np.cos(angle)))
+            )
+            place = self._file.place(body).rotation @ frame
+            parent = int(theirs.body_parentid[body])
+            reference = self._file.names["body"][parent] if parent in self._bodies else "universe"
+            cone = ReachCone(corners @ place.T, place[:, 2])
+            made[name] = JointCone(cone, reference, self._file.names["body"][body], limb)
+            self._notes.append(
+                f"joint {shown(name)}: its range of {np.degrees(angle):.1f} degrees is kept for the swing of its limb, "
+                "and not for the twist about it"
+            )
+        return made
+
+
+def _inertia(theirs: Any, body: int) -> pin.Inertia:
+    """Inertia of a body in its own frame."""
+    turn = placement(np.zeros(3), theirs.body_iquat[body]).rotation
+    about = turn @ np.diag(theirs.body_inertia[body]) @ turn.T
+    return pin.Inertia(float(theirs.body_mass[body]), np.array(theirs.body_ipos[body]), about)
+
+
+def _aligned(axis: Array, *, slide: bool) -> tuple[pin.JointModel, pin.SE3]:
+    """A joint about or along the coordinate axis that `axis` is, otherwise about z of a frame that is turned there."""
+    kinds = (
+        (pin.JointModelPX, pin.JointModelPY, pin.JointModelPZ) if slide
+        else (pin.JointModelRX, pin.JointModelRY, pin.JointModelRZ)
+    )  # fmt: skip
+    for k in range(3):
+        if axis[k] == 1.0:
+            return kinds[k](), pin.SE3.Identity()
+    return kinds[2](), pin.SE3(_along_z(axis), np.zeros(3))
+
+
+def _along_z(axis: Array) -> Array:
+    """A rotation whose third column is a unit direction."""
+    helper = np.eye(3)[int(np.argmin(np.abs(axis)))]
+    x = np.cross(helper, axis)
+    x /= np.linalg.norm(x)
+    return np.column_stack((x, np.cross(axis, x), axis))

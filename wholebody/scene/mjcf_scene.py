@@ -1,0 +1,142 @@
+"""A scene from an MJCF file: its robot among the geoms of the world, static, mocap and free bodies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from os import PathLike
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.checks import path as as_path
+from wholebody.base.checks import warn
+from wholebody.base.errors import FileFormatError
+from wholebody.base.files import check_file
+from wholebody.figures.link_pieces import Concavity
+from wholebody.figures.mjcf.compiled import Compiled, placement
+from wholebody.figures.mjcf.figure import SHAPES, mjcf_figure
+from wholebody.figures.urdf.xml_reading import read_xml
+from wholebody.geometry.shapes import Box, Capsule, Compound, Cylinder, Ellipsoid, HalfSpace, Mesh, Shape, Sphere
+from wholebody.scene.matter.body import Body
+from wholebody.scene.scene import Scene
+
+
+def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Concavity = None) -> Scene:
+    """Return the scene of an MJCF file, as MuJoCo compiles it.
+
+    The robot is what `wb.load` returns. The geoms of the world, of static and of mocap bodies are fixed things, at most
+    one for each geom; a body with a free joint alone is a thing that moves by itself, with the mass of the file spread
+    evenly. Geoms that can touch nothing are markers and left out; height fields are left out with a warning.
+
+    Args:
+        path: the file.
+        root: as for `wb.load`: "fixed", "free", or the name of one of several robots.
+        concavity: as for `wb.load`.
+
+    Raises:
+        FileFormatError: a file that cannot be read, with the place and the correction.
+        InputError: several robots and none chosen, or a concavity out of range.
+        MissingPackageError: MuJoCo is not installed.
+    """
+    place = as_path(path, "read_scene: path")
+    check_file(place, "scene")
+    if read_xml(place, "MJCF").tag != "mujoco":
+        raise FileFormatError(
+            f"{place}: a scene is an MJCF file, whose outermost element is <mujoco>; wb.load reads a URDF"
+        )
+    compiled = Compiled(place)
+    scene = Scene(mjcf_figure(compiled, root, concavity))
+    names, model = compiled.names, compiled.model
+    mine = compiled.tree(compiled.robot(None if root in (None, "fixed", "free") else root))
+    left: list[str] = []
+    _add_fixed(scene, compiled, 0, pin.SE3.Identity(), left)
+    for top in compiled.children[0]:
+        if top in mine or (top in compiled.robots and not compiled.is_free(top)):
+            continue
+        if not compiled.is_free(top):
+            _add_fixed_tree(scene, compiled, top, left)
+            continue
+        parts = _parts(compiled, [top, *compiled.tree(top)[1:]], left)
+        if parts:
+            shape = parts[0][0] if len(parts) == 1 else Compound(tuple(parts))
+            at = compiled.place(top) * (parts[0][1] if len(parts) == 1 else pin.SE3.Identity())
+            color = _color(compiled, compiled.geoms(top)[0])
+            mass = float(model.body_subtreemass[top])
+            scene.add(shape, name=_free_name(scene, names["body"][top]), at=at, body=Body(mass=mass), color=color)
+    if left:
+        warn(f"{place}: height fields are not kept: {', '.join(left)}")
+    return scene
+
+
+def _add_fixed_tree(scene: Scene, compiled: Compiled, top: int, left: list[str]) -> None:
+    places = {0: pin.SE3.Identity()}
+    for body in compiled.tree(top):
+        places[body] = places[int(compiled.model.body_parentid[body])] * compiled.place(body)
+        _add_fixed(scene, compiled, body, places[body], left)
+
+
+def _add_fixed(scene: Scene, compiled: Compiled, body: int, place: pin.SE3, left: list[str]) -> None:
+    """Add every geom of a body that does not move as a thing."""
+    geoms = [geom for geom in compiled.geoms(body) if compiled.collides(geom)]
+    for geom in geoms:
+        found = _shape(compiled, geom)
+        if found is None:
+            left.append(compiled.names["geom"][geom])
+            continue
+        shape, at = found
+        name = compiled.names["body" if body and len(geoms) == 1 else "geom"][
+            body if body and len(geoms) == 1 else geom
+        ]
+        scene.add(shape, name=_free_name(scene, name), at=place * at, color=_color(compiled, geom))
+
+
+def _parts(compiled: Compiled, bodies: Sequence[int], left: list[str]) -> list[tuple[Shape, pin.SE3]]:
+    """Shapes of bodies that move as one, in the frame of the first."""
+    places = {bodies[0]: pin.SE3.Identity()}
+    found = []
+    for body in bodies:
+        if body not in places:
+            places[body] = places[int(compiled.model.body_parentid[body])] * compiled.place(body)
+        for geom in filter(compiled.collides, compiled.geoms(body)):
+            made = _shape(compiled, geom)
+            if made is None or isinstance(made[0], HalfSpace):
+                left.append(compiled.names["geom"][geom])
+            else:
+                found.append((made[0], places[body] * made[1]))
+    return found
+
+
+def _shape(compiled: Compiled, geom: int) -> tuple[Shape, pin.SE3] | None:
+    """A geom's shape, and its placement on its body; None for a height field."""
+    model = compiled.model
+    at = placement(model.geom_pos[geom], model.geom_quat[geom])
+    a, b, c = (float(value) for value in model.geom_size[geom])
+    kind = SHAPES[int(model.geom_type[geom])]
+    if kind == "hfield":
+        return None
+    if kind in ("mesh", "sdf"):
+        return Mesh(compiled.mesh(geom)), at
+    shapes: dict[str, Any] = {
+        "plane": HalfSpace,
+        "sphere": lambda: Sphere(a),
+        "capsule": lambda: Capsule(a, 2.0 * b),
+        "cylinder": lambda: Cylinder(a, 2.0 * b),
+        "ellipsoid": lambda: Ellipsoid((a, b, c)),
+        "box": lambda: Box((2.0 * a, 2.0 * b, 2.0 * c)),
+    }
+    return shapes[kind](), at
+
+
+def _color(compiled: Compiled, geom: int) -> tuple[float, ...] | None:
+    material = int(compiled.model.geom_matid[geom])
+    color = compiled.model.mat_rgba[material] if material >= 0 else compiled.model.geom_rgba[geom]
+    if np.allclose(color, (0.5, 0.5, 0.5, 1.0)):
+        return None  # MuJoCo's own, where the file has none
+    return tuple(float(value) for value in color)
+
+
+def _free_name(scene: Scene, name: str) -> str:
+    """The name, with a number if the figure or another thing has it."""
+    taken = {*scene.objects, *scene.figure.segments, *scene.figure.frames}
+    return name if name not in taken else next(f"{name}-{k}" for k in range(2, 10**6) if f"{name}-{k}" not in taken)
