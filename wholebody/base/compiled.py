@@ -34,7 +34,6 @@ TOGETHER = (
         "wholebody.motion.trajectory.band",
     ),
     (
-        "wholebody.methods.qp.curved_reach",
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
         "wholebody.methods.qp.solvers.split_form",

@@ -13,7 +13,7 @@ from itertools import chain
 import numpy as np
 
 from wholebody.methods.control import Control
-from wholebody.methods.qp.curved_reach import ENDLESS
+from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP

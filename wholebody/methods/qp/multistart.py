@@ -19,7 +19,7 @@ from wholebody.methods.contradictions import NEAREST, Contradiction, contradicti
 from wholebody.methods.control import Control
 from wholebody.methods.qp.before_contact import before_contact
 from wholebody.methods.qp.cancelling import posture_apart
-from wholebody.methods.qp.curved_reach import CurvedReach
+from wholebody.methods.qp.closest import Closest
 from wholebody.methods.qp.feasibility import Feasibility
 from wholebody.methods.qp.iterates import LocalSolution, better, held
 from wholebody.methods.qp.settings import SEARCH
@@ -273,7 +273,7 @@ class Multistart:
         """
         if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
             return bool(self._out_of_reach)
-        tolerance, state, reach = self.budget.tolerance, self.lineariser.state, self._curved()
+        tolerance, state, reach = self.budget.tolerance, self.lineariser.state, self._closest()
         start = self._start
         rng = np.random.default_rng(self.budget.seed)
         self._out_of_reach = False
@@ -288,7 +288,7 @@ class Multistart:
                 restarts(self.problem, state, start, rng, SEARCH.reach_trials - 1, SEARCH.far),
             )
         for begin in chain([q], self.lineariser.defined(others)):
-            local = reach.through_everything(
+            local = reach.without_contacts(
                 begin, SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
             )
             self.spent += local.iterations
@@ -315,7 +315,7 @@ class Multistart:
 
     def _near_best(self) -> None:
         """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
-        nearest = self._curved().among_things(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
+        nearest = self._closest().with_contacts(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
         self.spent += nearest.iterations
         if not nearest.converged:
             self._accept(nearest, self.how)
@@ -326,7 +326,7 @@ class Multistart:
     def _approach(self, begin: Array) -> None:
         """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
         tolerance = self.budget.tolerance
-        local = self._curved().among_things(begin, tolerance, self._at_most(SEARCH.coming_near))
+        local = self._closest().with_contacts(begin, tolerance, self._at_most(SEARCH.coming_near))
         self.spent += local.iterations
         if not held(local, tolerance) and local.violation.total < self.best.violation.total:
             local = self._descend(local.q, note="nearest", measures=False, most=SEARCH.coming_near)
@@ -336,8 +336,8 @@ class Multistart:
         """So many programs, or what one descent may have where that is less."""
         return min(programs, self.budget.iterations)
 
-    def _curved(self) -> CurvedReach:
-        return CurvedReach(self.problem, self.lineariser, self.solver, self.control)
+    def _closest(self) -> Closest:
+        return Closest(self.problem, self.lineariser, self.solver, self.control)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
         """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""

@@ -238,4 +238,6 @@ def compiled_kernel() -> Any:
     subproblem_kernel.fill_program(one, one, np.ones((2, 1)), rows, none, step, program)
     subproblem_kernel.multipliers(program, active.elastic, one, 1.0, found)
     subproblem_kernel.work(found, rows)
+    three = np.zeros(3)
+    subproblem_kernel.add_kinematic_hessian(matrix, np.zeros((0, 6)), none, three, three, three)
     return subproblem_kernel

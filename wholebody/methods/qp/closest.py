@@ -12,9 +12,6 @@ Its positive part joins the program as soft rows. A dozen programs lead to a sta
 
 from __future__ import annotations
 
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -29,7 +26,7 @@ from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.rows import Rows
 from wholebody.methods.qp.settings import NEAREST
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Subproblem
+from wholebody.methods.qp.subproblem import Subproblem, compiled_kernel
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Lineariser
@@ -41,7 +38,7 @@ WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is ta
 SHRINK = 0.3
 
 
-class CurvedReach:
+class Closest:
     """Comes as near to a problem's goals as goes, with the curvature of what is pulled and held in every program."""
 
     def __init__(self, problem: Problem, lineariser: Lineariser, solver: QPSolver, control: Control) -> None:
@@ -54,7 +51,7 @@ class CurvedReach:
         free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
         self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
-    def through_everything(self, start: Array, enough: float, most: int) -> LocalSolution:
+    def without_contacts(self, start: Array, enough: float, most: int) -> LocalSolution:
         """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
 
         Args:
@@ -67,8 +64,8 @@ class CurvedReach:
         """
         return self._descend(self._alone, start, enough, most, 0.0, NEAREST.nearly_flat)
 
-    def among_things(self, start: Array, enough: float, most: int) -> LocalSolution:
-        """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
+    def with_contacts(self, start: Array, enough: float, most: int) -> LocalSolution:
+        """Descend from a posture (nq,) and pass through nothing; arguments as of `without_contacts`."""
         return self._descend(self._lineariser, start, enough, most, NEAREST.within, NEAREST.flat)
 
     def _descend(
@@ -193,13 +190,3 @@ def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Arra
     else:
         return
     compiled_kernel().add_kinematic_hessian(total, state.columns, state.support[part.joint], point, pull, moment)
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import kinematic_hessian_kernel
-
-    three = np.zeros(3)
-    kinematic_hessian_kernel.add_kinematic_hessian(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros(1), three, three, three)
-    return kinematic_hessian_kernel
