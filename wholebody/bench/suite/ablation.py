@@ -218,8 +218,8 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
         "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
-        "closest posture to goals that are not met": (search, "_come_nearest", lambda self: None),
-        "closest posture among things": (search, "_near_best", lambda self: None),
+        "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),
+        "closest posture among things": (search, "_closest_from_best", lambda self: None),
     }
 
 

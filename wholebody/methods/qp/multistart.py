@@ -79,9 +79,8 @@ class Multistart:
         self._least = 0.0  # what is known to be left of the goals at least, metres
         self._minima = Minima()  # where relaxed probes ended that were pushed out of things
         self._relaxed_minima = Minima()  # where the others ended
-        self._nearest: list[LocalSolution] = []  # where probes without contacts ended
-        self._through: list[Array] = []  # where one of them from another start reached the goals
-        self._out_of_reach: bool | None = None
+        self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
+        self._out_of_reach = False  # which is known
         self._best: LocalSolution | None = None
 
     @property
@@ -93,11 +92,11 @@ class Multistart:
     def run(self, begin: Array | None = None) -> LocalSolution:
         """Make one attempt after the other until the goals are met, the first from `begin` (nq,); the best posture."""
         self._search(self._start if begin is None else begin)
-        self._come_nearest()
+        self._find_closest()
         self._restart_for_measure()
         if self.best.violation.worst <= self.budget.tolerance:
             self.contradictions = ()  # by less than the tolerance
-        if self._out_of_reach:  # which is known, although a closer posture may be near
+        if self._out_of_reach:  # although a closer posture may be near
             self._best = with_values(self.best, converged=True)
         return with_values(self.best, converged=False) if self.control.reason else self.best
 
@@ -127,7 +126,8 @@ class Multistart:
         yield Attempt(hooked, self._feasibility_first, "from hooked hands")
         near = self.best.violation.left <= SEARCH.relaxation_depth  # as far as limbs in the way keep goals off
         yield Attempt(self._while_open([start] if near else []), self._relaxed, "from another start")
-        if self._known_out_of_reach(self.best.q):
+        self._out_of_reach = self._known_out_of_reach(self.best.q)
+        if self._out_of_reach:
             return
         self._least = least
         if self._proven():
@@ -241,7 +241,7 @@ class Multistart:
             self.control,
         )  # fmt: skip
 
-    def _come_nearest(self) -> None:
+    def _find_closest(self) -> None:
         """Where the goals are not reached, come as near as goes, then improve the measures from there."""
         tolerance = self.budget.tolerance
         if self.control.over:
@@ -251,7 +251,7 @@ class Multistart:
         if not held(self.best, tolerance):
             self._accept(self._stay(self.best), self.how)
         if not self._out_of_reach and self.best.violation.worst > tolerance:
-            self._near_best()
+            self._closest_from_best()
         if self.best.violation.left <= tolerance:
             return
         best = self.best
@@ -269,43 +269,35 @@ class Multistart:
         """Whether the goals are out of reach: from a posture (nq,) and other starts, even through everything.
 
         Where several descents without contacts, from postures all over the limits, come to rest at the same distance
-        and none comes nearer, it is the nearest that limits and constraints allow. Local minima differ.
+        and none comes nearer, it is the least that limits and constraints allow. Local minima differ.
         """
-        if self._out_of_reach is not None or not (self.problem.goals and self.problem.scene.model.nv):
-            return bool(self._out_of_reach)
-        tolerance, state, reach = self.budget.tolerance, self.lineariser.state, self._closest()
-        start = self._start
-        rng = np.random.default_rng(self.budget.seed)
-        self._out_of_reach = False
-        if self._moving() < SEARCH.few:
-            agreeing, others = (
-                SEARCH.agreeing_few,
-                throughout(self.problem, state, start, rng, SEARCH.reach_trials_few - 1),
-            )
-        else:
-            agreeing, others = (
-                SEARCH.agreeing,
-                restarts(self.problem, state, start, rng, SEARCH.reach_trials - 1, SEARCH.far),
-            )
+        if not (self.problem.goals and self.problem.scene.model.nv):
+            return False
+        tolerance, reach, ends = self.budget.tolerance, self._closest(), list[LocalSolution]()
+        given = (self.problem, self.lineariser.state, self._start, np.random.default_rng(self.budget.seed))
+        few = self._moving() < SEARCH.few
+        agreeing = SEARCH.agreeing_few if few else SEARCH.agreeing
+        others = (
+            throughout(*given, SEARCH.reach_trials_few - 1)
+            if few
+            else restarts(*given, SEARCH.reach_trials - 1, SEARCH.far)
+        )
+        enough, programs = SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
         for begin in chain([q], self.lineariser.defined(others)):
-            local = reach.without_contacts(
-                begin, SEARCH.reached * tolerance, self._at_most(SEARCH.reach_trial_programs)
-            )
+            local = reach.without_contacts(begin, enough, programs)
             self.spent += local.iterations
-            if local.violation.worst <= SEARCH.reached * tolerance and begin is not q:
-                self._through = [local.q]
-            if local.violation.worst <= SEARCH.reached * tolerance or self.control.over:
+            if local.violation.worst <= enough or self.control.over:
+                if local.violation.worst <= enough and begin is not q:
+                    self._through = [local.q]
                 return False
             if local.violation.hold > SEARCH.held * local.violation.left:
                 continue  # from there the constraints alone are too far
-            self._nearest.append(local)
-            self._nearest.sort(key=lambda local: local.violation.total)
-            most = SEARCH.agree * self._nearest[0].violation.total + tolerance
-            if sum(local.violation.total <= most for local in self._nearest) == agreeing:
-                self._out_of_reach = True
+            ends.append(local)
+            most = SEARCH.agree * min(end.violation.total for end in ends) + tolerance
+            if sum(end.violation.total <= most for end in ends) == agreeing:
                 return True
         near = (1.0 - SEARCH.nearer) * self.best.violation.left
-        self._without_gain = sum(local.violation.left >= near for local in self._nearest)  # as relaxed probes count
+        self._without_gain = sum(end.violation.left >= near for end in ends)  # as relaxed probes count
         return False
 
     def _moving(self) -> int:
@@ -313,7 +305,7 @@ class Multistart:
         rows = self.subproblem.rows(self.lineariser.at(self.best.q, 0.0))
         return int(rows.soft[: rows.goals].any(axis=0).sum())
 
-    def _near_best(self) -> None:
+    def _closest_from_best(self) -> None:
         """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
         nearest = self._closest().with_contacts(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
         self.spent += nearest.iterations
