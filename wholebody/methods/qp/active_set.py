@@ -86,7 +86,7 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
     """
     x = np.empty(program.size)
     program.check_shapes(active)
-    free = program._replace(linear=np.zeros(program.size), target=target).packed()
+    free = with_values(program, linear=np.zeros(program.size), target=target).packed()
     return x if compiled_kernel().minimise_with(free, active, CORRECTIONS, room_for(program).work, x) else None
 
 

@@ -21,13 +21,6 @@ def dot(a: Array, b: Array) -> float:
 
 
 @compiled(inner=True)
-def copy(source: Array, target: Array) -> None:
-    """Copy a vector into another one."""
-    for i in range(len(target)):
-        target[i] = source[i]
-
-
-@compiled(inner=True)
 def add(factor: float, row: Array, total: Array) -> None:
     """Add a multiple of a row to a vector, in place."""
     for i in range(len(total)):

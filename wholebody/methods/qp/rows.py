@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.settings import PROGRAM, Corrections, Weights
+from wholebody.methods.qp.settings import PROGRAM
 
 SAME = 0.99  # cosine of the angle between two rows from which on they count as one
 
@@ -45,13 +45,13 @@ class StepSize(NamedTuple):
     lever: float
 
 
-def step_size(scale: float, radius: float, pull: float, damping: float, gain: float, measures: bool) -> StepSize:
-    """What a program says of a step, with the numbers of the method."""
+def step_size(scale: float, radius: float, pull: float, damping: float, gain: float, measures: bool) -> Array:
+    """The fields of `StepSize`, with the numbers of the method."""
     box, overlap = PROGRAM.box * radius, PROGRAM.error_clamp * radius
-    return StepSize(
+    return np.array([
         scale, radius, pull, damping, gain, measures, box, overlap, PROGRAM.least_curvature, PROGRAM.proximal_share,
         PROGRAM.lever,
-    )  # fmt: skip
+    ])  # fmt: skip
 
 
 class Terms(NamedTuple):
@@ -62,28 +62,32 @@ class Terms(NamedTuple):
             both (3) or none (-1).
         bound: (2, c) lower and upper bounds of the values.
         share: (g,) weights of the goals' rows, as shares of the largest.
+        weights: (5,) `settings.Weights`.
     """
 
     kind: Indices
     bound: Array
     share: Array
+    weights: Array
 
 
-class TermRows(NamedTuple):
-    """Rows of the terms at a posture; see `Linearisation`."""
+class LinearRows(NamedTuple):
+    """Rows of the terms and of the contacts at a posture; see `Linearisation`.
+
+    Attributes:
+        error, error_jacobian: of the goals.
+        value, value_jacobian: of the constraints.
+        gap, gap_jacobian, gap_contact, clearance: of the contacts' rows.
+        number: (contacts,) of each contact's pair.
+    """
 
     error: Array
     error_jacobian: Array
     value: Array
     value_jacobian: Array
-
-
-class ContactRows(NamedTuple):
-    """Rows of the contacts there, and the number (contacts,) of each contact's pair."""
-
     gap: Array
-    jacobian: Array
-    contact: Indices
+    gap_jacobian: Array
+    gap_contact: Indices
     clearance: Array
     number: Indices
 
@@ -223,63 +227,26 @@ class Seen(NamedTuple):
     most: float
 
 
-class Past(NamedTuple):
-    """Where the last step of a tracker ended, and where this one does.
+class StepState(NamedTuple):
+    """What a tracker keeps from step to step.
 
     Attributes:
-        before: (nq + m + 2,) the posture, the errors of its soft rows there to first order, what it left of the goals,
-            and 1 where there was such a step.
+        terms: of the problem.
+        before: (nq + m + 2,) where the last step ended: the posture, the errors of its soft rows there to first order,
+            what it left of the goals, and 1 where there was such a step.
         after: (nq + m + 2,) the same of this step.
+        held: (2, n) bounds that held the last program's answer.
+        numbers: those of `StepSize`, in which a step replaces its damping and whether measures count; of `Corrections`;
+            damping of the pull of goals out of reach; error below which a goal rests; how far what is held is run
+            ahead of at most.
+        floats, integers, masks: room; `tracking_kernel.parts` lays it out.
     """
 
+    terms: Terms
     before: Array
     after: Array
-
-
-class Guess(NamedTuple):
-    """What held the last program's answer: bounds (2, n), and the keys of the rows that pushed, in ascending order."""
-
     held: Mask
-    pushed: Indices
-
-
-class StepRequest(NamedTuple):
-    """What is asked of the program of one step.
-
-    Attributes:
-        measures: whether they count.
-        hot: whether to solve it, not only to build it.
-        least_damping: of goals, where the last step does not ask for more.
-    """
-
-    measures: bool
-    hot: bool
-    least_damping: float
-
-
-class StepNumbers(NamedTuple):
-    """The numbers of a tracker's programs; see `step_program`.
-
-    Attributes:
-        size: of a step; what is asked of one step replaces its damping and whether measures count.
-        weights: of the rows.
-        limits: of active sets.
-        damping: of the pull of goals out of reach.
-        resting: error below which a goal rests, metres and radians.
-        curved: how far what is held is run ahead of at most, metres and radians.
-    """
-
-    size: StepSize
-    weights: Weights
-    limits: Corrections
-    damping: float
-    resting: float
-    curved: float
-
-
-class StepRoom(NamedTuple):
-    """Room for the program of a step; `tracking_kernel.parts` lays it out."""
-
+    numbers: Array
     floats: Array
     integers: Indices
     masks: Mask

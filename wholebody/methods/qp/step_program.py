@@ -20,13 +20,9 @@ from wholebody.figures.state import State
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.rows import (
     Bodies,
-    Guess,
-    Past,
     Rows,
-    StepNumbers,
     StepParts,
-    StepRequest,
-    StepRoom,
+    StepState,
     Terms,
     step_size,
 )
@@ -101,16 +97,20 @@ class StepProgram:
         self._asked = terms.bound[0, self._held]
         self._there = State(state.model)
         self._unknown = np.zeros((2, self._variables), dtype=bool)
-        self.take(dt)
         size = state.model.nq + self._soft + 2
-        self._past = Past(np.zeros(size), np.zeros(size))
+        none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+        self._state = StepState(
+            self._even, np.zeros(size), np.zeros(size), self._unknown, none, none, index, self._unknown[0]
+        )
+        self._sizes, self._laid_out = (0, 0), dict[tuple[int, int], StepParts]()
+        self.take(dt)
         self._grow(64)
 
     def take(self, seconds: float) -> None:
         """Make the next steps take so long, for what measures do meanwhile."""
         # without goals the measures are the task
         gain = min(1.0, seconds / STEP.settling) if self.goals else 1.0
-        self._numbers = numbers_of(self._subproblem.scale, gain)
+        self._state = with_values(self._state, numbers=numbers_of(self._subproblem.scale, gain))
 
     def hold(self, constraints: Sequence[Constraint]) -> bool:
         """Take others in place of the problem's constraints, with the same bounds; the last step is forgotten.
@@ -118,7 +118,7 @@ class StepProgram:
         Returns:
             Whether they are of the same classes and frames; if not, nothing is done.
         """
-        self._past.before[-1], self._curving, self._bend = 0.0, False, 0.0
+        self._state.before[-1], self._curving, self._bend = 0.0, False, 0.0
         return self._holds.take([constraints[k] for k in self._holding])
 
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
@@ -140,7 +140,7 @@ class StepProgram:
         if len(self._held) and (self._curving or abs(self._bend - bend) > STEP.bent):
             self._curving = self._foresee(at, answer.x)
             if self._curving:
-                answer, _, _ = self._once(at, given, StepRequest(measures, self._working_set.hot, damping))
+                answer, _, _ = self._once(at, measures, given, damping)
         return answer
 
     def ended(self, q: Array, displacement: Array, whole: bool) -> None:
@@ -151,7 +151,7 @@ class StepProgram:
             displacement: (nv,).
             whole: whether that is the last program's answer as it was.
         """
-        before, after = self._past
+        before, after = self._state.before, self._state.after
         if not (whole and self._settled):
             rows, program = self._parts.rows, self._parts.program
             gone = rows.soft @ displacement
@@ -159,7 +159,7 @@ class StepProgram:
             after[len(q) : -2] = rows.soft_error + gone
             after[-2], after[-1] = sqrt(left @ left), 1.0
         after[: len(q)] = q
-        self._past = Past(after, before)
+        before[:] = after
 
     @property
     def rows(self) -> Rows:
@@ -183,12 +183,11 @@ class StepProgram:
 
     def _damped(self, at: PackedLinearisation, measures: bool, given: Terms) -> tuple[Answer, float]:
         """An answer with as much damping as it asks for itself, and the damping."""
-        hot = self._working_set.hot
-        answer, damping, asked = self._once(at, given, StepRequest(measures, hot, 0.0))
+        answer, damping, asked = self._once(at, measures, given, 0.0)
         for _ in range(STEP.again):
             if asked <= STEP.worse * max(damping, STEP.little):
                 break
-            answer, damping, asked = self._once(at, given, StepRequest(measures, self._working_set.hot, asked))
+            answer, damping, asked = self._once(at, measures, given, asked)
         return answer, damping
 
     def _trades(self, x: Array) -> bool:
@@ -203,7 +202,9 @@ class StepProgram:
         even, weighted = (sqrt(by @ after**2) / max(sqrt(by @ error**2), STEP.resting) for by in shares)
         return 1.0 - weighted < STEP.traded * (1.0 - even)
 
-    def _once(self, at: PackedLinearisation, given: Terms, request: StepRequest) -> tuple[Answer, float, float]:
+    def _once(
+        self, at: PackedLinearisation, measures: bool, given: Terms, least_damping: float
+    ) -> tuple[Answer, float, float]:
         """An answer, the damping of its program, and what it asks for.
 
         Raises:
@@ -212,17 +213,19 @@ class StepProgram:
         own, working = self._subproblem, self._working_set
         own.check_rows(at.goals, len(at.value) - at.goals)
         k = own.one_sided + len(at.gap)
-        if 5 * k > len(self._room.integers):
+        if 5 * k > len(self._state.integers):
             self._grow(2 * k)
         self._sizes = (k, own.one_sided + len(at.contacts.distance))
         held = self._unknown if working.held is None else working.held
+        state = self._state
+        if state.terms is not given or state.held is not held:
+            state = self._state = with_values(state, terms=given, held=held)
         solved, count, motion, turn, worst, spare, missed, least, damping, asked = self._kernel.solve(
-            at, given, self._past, Guess(held, working.pushing), self.turning.bodies(at), self._room, self._numbers,
-            request,
-        )  # fmt: skip
+            at, state, working.pushing, self.turning.bodies(at), measures, working.hot, least_damping
+        )
         self._settled = solved
         if solved:
-            working.pushing = self._room.integers[2 * k : 2 * k + count].copy()
+            working.pushing = state.integers[2 * k : 2 * k + count].copy()
             by = working.solver.count([ACTIVE_SET])
             return Answer(self._x, motion, turn, worst, spare, missed, least, True, 0, by), damping, asked
         rows, program = self._parts.rows, self._parts.program
@@ -245,23 +248,28 @@ class StepProgram:
         there = self._holds.at(state)[self._among] - self._asked
         curved = there - (rows.soft_error + rows.soft @ displacement)[self.goals :]
         other: bool = self._kernel.run_ahead(
-            curved, rows, at.q, 2.0 * STEP.resting, STEP.curved, STEP.straight, self._past.before
+            curved, rows, at.q, 2.0 * STEP.resting, STEP.curved, STEP.straight, self._state.before
         )
         return other
 
     @property
     def _parts(self) -> StepParts:
         """The last program in its room."""
-        k, contacts = self._sizes
-        found: StepParts = self._kernel.parts(self._room, self._variables, self.goals, self._soft, k, contacts)
+        found = self._laid_out.get(self._sizes)
+        if found is None:
+            layout = self._kernel.parts.py_func  # a compiled loop would look up each record's class to return it
+            found = layout(self._state, self._variables, self.goals, self._soft, *self._sizes)
+            self._laid_out[self._sizes] = found
         return found
 
     def _grow(self, elastic: int) -> None:
         """Make room for so many elastic rows."""
         n = self._variables
         floats = np.zeros(self._kernel.floats_for(n, self._soft, elastic))
-        self._room = StepRoom(floats, np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool))
+        integers, masks = np.zeros(5 * elastic, dtype=np.intp), np.zeros(2 * (n + elastic), dtype=bool)
+        self._state = with_values(self._state, floats=floats, integers=integers, masks=masks)
         self._x = floats[:n]
+        self._laid_out.clear()
 
 
 def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[list[int], NDArray[np.intp]]:
@@ -272,15 +280,15 @@ def _holding(problem: Problem, state: State, held: NDArray[np.intp]) -> tuple[li
     return holding.tolist(), np.searchsorted(np.flatnonzero(np.isin(owner, holding)), held)
 
 
-def numbers_of(scale: float, gain: float) -> StepNumbers:
-    """The numbers of a tracker's programs.
+def numbers_of(scale: float, gain: float) -> Array:
+    """The numbers of a tracker's programs; see `StepState`.
 
     Args:
         scale: of the measures.
         gain: share of the way to the least measures that a step is to go.
     """
     size = step_size(scale, STEP.radius, PROGRAM.error_clamp * STEP.radius, 0.0, gain, True)
-    return StepNumbers(size, WEIGHTS, CORRECTIONS, STEP.damping, STEP.resting, STEP.curved)
+    return np.concatenate([size, CORRECTIONS, (STEP.damping, STEP.resting, STEP.curved)])
 
 
 @lru_cache(maxsize=1)
@@ -293,11 +301,13 @@ def compiled_kernel() -> Any:
     at = PackedLinearisation(
         none, 0, none, np.zeros((0, 1)), NO_CONTACTS, none, index, none, np.zeros((2, 2)), np.zeros((2, 1))
     )
-    past, guess = Past(np.zeros(2), np.zeros(2)), Guess(np.zeros((2, 1), dtype=bool), index)
     bodies = Bodies(np.zeros((1, 6)), one, one, one, index, np.zeros((0, 4, 3)), none, np.zeros((3, 1, 6)))
-    room = StepRoom(np.zeros(tracking_kernel.floats_for(1, 0, 0)), index, np.zeros(2, dtype=bool))
-    given, request = Terms(index, np.zeros((2, 0)), none), StepRequest(True, False, 0.0)
-    tracking_kernel.solve(at, given, past, guess, bodies, room, numbers_of(1.0, 1.0), request)
-    rows = tracking_kernel.parts(room, 1, 0, 0, 0, 0).rows
-    tracking_kernel.run_ahead(none, rows, none, 0.0, 0.0, 0.0, past.before)
+    floats, masks = np.zeros(tracking_kernel.floats_for(1, 0, 0)), np.zeros((2, 1), dtype=bool)
+    terms = Terms(index, np.zeros((2, 0)), none, np.array(WEIGHTS))
+    state = StepState(
+        terms, np.zeros(2), np.zeros(2), masks, numbers_of(1.0, 1.0), floats, index, np.zeros(2, dtype=bool)
+    )
+    tracking_kernel.solve(at, state, index, bodies, True, False, 0.0)
+    rows = tracking_kernel.parts.py_func(state, 1, 0, 0, 0, 0).rows
+    tracking_kernel.run_ahead(none, rows, none, 0.0, 0.0, 0.0, state.before)
     return tracking_kernel

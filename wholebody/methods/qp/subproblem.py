@@ -19,10 +19,9 @@ from wholebody.figures.state import State
 from wholebody.methods.qp.active_set import smallest
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
 from wholebody.methods.qp.rows import (
-    ContactRows,
+    LinearRows,
     Multipliers,
     Rows,
-    TermRows,
     Terms,
     Violation,
     room_for_rows,
@@ -98,7 +97,7 @@ class Subproblem:
         self.one_sided = int(low.sum() + high.sum())
         neither = (self._lower != self._upper) & ~low & ~high
         kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
-        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share)
+        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, np.array(WEIGHTS))
         self._kernel = compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
@@ -113,11 +112,11 @@ class Subproblem:
             len(at.gradient), goals, goals + len(self._equal), self.one_sided + len(at.gap),
             self.one_sided + len(at.contacts.distance),
         )  # fmt: skip
-        self._kernel.sort_rows(
-            TermRows(at.goal_error, at.goal_jacobian, at.value, at.value_jacobian),
-            ContactRows(at.gap, at.gap_jacobian, at.gap_contact, at.clearance, at.contacts.number),
-            self.terms, WEIGHTS, rows,
+        there = LinearRows(
+            at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
+            at.clearance, at.contacts.number,
         )  # fmt: skip
+        self._kernel.sort_rows(there, self.terms, rows)
         return rows if at.planes is None else _with_planes(rows, at.planes)
 
     def soft_row(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
@@ -230,10 +229,10 @@ def compiled_kernel() -> Any:
 
     none, one, matrix, index = np.zeros(0), np.ones(1), np.zeros((0, 1)), np.zeros(0, dtype=np.intp)
     rows, found = room_for_rows(1, 0, 0, 0, 0), Multipliers(none, none, index)
-    terms, contacts = TermRows(none, matrix, none, matrix), ContactRows(none, matrix, index, none, index)
+    there = LinearRows(none, matrix, none, matrix, none, matrix, index, none, index)
     program, active = smallest()
     step = step_size(1.0, 1.0, 1.0, 1.0, 1.0, True)
-    subproblem_kernel.sort_rows(terms, contacts, Terms(index, np.zeros((2, 0)), none), WEIGHTS, rows)
+    subproblem_kernel.sort_rows(there, Terms(index, np.zeros((2, 0)), none, np.array(WEIGHTS)), rows)
     subproblem_kernel.violation(rows, none, none)
     subproblem_kernel.fill_program(one, one, np.ones((2, 1)), rows, none, step, program)
     subproblem_kernel.multipliers(program, active.elastic, one, 1.0, found)

@@ -6,51 +6,59 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import copy, dot, sort
+from wholebody.methods.qp.dense_kernel import dot, sort
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.rows import ContactRows, Multipliers, Rows, StepSize, TermRows, Terms
+from wholebody.methods.qp.rows import LinearRows, Multipliers, Rows, StepSize, Terms
 from wholebody.methods.qp.settings import Weights
 
 MOST_ROWS = 4096  # more than one contact ever has
 
 
 @compiled()
-def sort_rows(terms: TermRows, contacts: ContactRows, given: Terms, weights: Weights, rows: Rows) -> None:
+def sort_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
     """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them, whose arrays are filled."""
+    errors, values, gaps, clearance = there.error, there.value, there.gap, there.clearance
+    error_jacobian, value_jacobian, gap_jacobian = there.error_jacobian, there.value_jacobian, there.gap_jacobian
+    number, gap_contact, kind, bound, share = there.number, there.gap_contact, given.kind, given.bound, given.share
+    elastic_weight, nv = rows.elastic_weight, rows.soft.shape[1]
+    weights = Weights(given.weights[0], given.weights[1], given.weights[2], given.weights[3], given.weights[4])
     soft, soft_error, soft_weight, elastic = rows.soft, rows.soft_error, rows.soft_weight, rows.elastic
     violated, contact, key = rows.elastic_violation, rows.contact, rows.key
-    goals, square = len(terms.error), 0.0
+    goals, square = len(errors), 0.0
     for r in range(goals):
-        square += (given.share[r] * terms.error[r]) ** 2
+        square += (share[r] * errors[r]) ** 2
     pull = min(max(weights.force / max(np.sqrt(square), 1e-12), weights.least), weights.most)
     for r in range(goals):
-        soft_error[r], soft_weight[r] = terms.error[r], pull * given.share[r]
-        copy(terms.error_jacobian[r], soft[r])
+        soft_error[r], soft_weight[r] = errors[r], pull * share[r]
+        for i in range(nv):
+            soft[r, i] = error_jacobian[r, i]
     row = goals
-    for c in range(len(terms.value)):
-        if given.kind[c] == 0:
-            soft_error[row], soft_weight[row] = terms.value[c] - given.bound[0, c], weights.hold
-            copy(terms.value_jacobian[c], soft[row])
+    for c in range(len(values)):
+        if kind[c] == 0:
+            soft_error[row], soft_weight[row] = values[c] - bound[0, c], weights.hold
+            for i in range(nv):
+                soft[row, i] = value_jacobian[c, i]
             row += 1
     row = 0
     for side in range(2):
         sign = 1.0 if side == 0 else -1.0
-        for c in range(len(terms.value)):
-            if given.kind[c] == 3 or given.kind[c] == side + 1:
-                violated[row] = sign * (given.bound[side, c] - terms.value[c])
-                contact[row], key[row] = row, -1 - row
-                for i in range(elastic.shape[1]):
-                    elastic[row, i] = sign * terms.value_jacobian[c, i]
+        for c in range(len(values)):
+            if kind[c] == 3 or kind[c] == side + 1:
+                violated[row] = sign * (bound[side, c] - values[c])
+                contact[row], key[row], elastic_weight[row] = row, -1 - row, weights.elastic
+                for i in range(nv):
+                    elastic[row, i] = sign * value_jacobian[c, i]
                 row += 1
-    first, count, place = row, len(contacts.number), 0
-    for r in range(len(contacts.gap)):
-        c = contacts.contact[r]
+    first, count, place = row, len(number), 0
+    for r in range(len(gaps)):
+        c = gap_contact[r]
         if r >= count:
-            place = place + 1 if r > count and contacts.contact[r - 1] == c else 1
-        violated[first + r] = contacts.clearance[r] - contacts.gap[r]
-        contact[first + r], key[first + r] = first + c, contacts.number[c] * MOST_ROWS + place
-        copy(contacts.jacobian[r], elastic[first + r])
-    rows.elastic_weight[:] = weights.elastic
+            place = place + 1 if r > count and gap_contact[r - 1] == c else 1
+        violated[first + r] = clearance[r] - gaps[r]
+        contact[first + r], key[first + r] = first + c, number[c] * MOST_ROWS + place
+        for i in range(nv):
+            elastic[first + r, i] = gap_jacobian[r, i]
+        elastic_weight[first + r] = weights.elastic
 
 
 @compiled()
@@ -85,12 +93,16 @@ def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, flo
 
 @compiled()
 def fill_program(
-    gradient: Array, curvature: Array, box: Array, rows: Rows, shift: Array, step: StepSize, program: QuadraticProgram
+    gradient: Array, curvature: Array, box: Array, rows: Rows, shift: Array, size: Array, program: QuadraticProgram
 ) -> None:
     """Fill in the numbers of a program that are not rows or weights, as `Subproblem.program` says.
 
-    `gradient` and `curvature` (nv,) are those of the measures, `box` (2, nv) the bounds of the step.
+    `gradient` and `curvature` (nv,) are those of the measures, `box` (2, nv) the bounds of the step, `size` (11,) the
+    fields of `StepSize`.
     """
+    step = StepSize(
+        size[0], size[1], size[2], size[3], size[4], size[5] > 0.0, size[6], size[7], size[8], size[9], size[10]
+    )
     soft_error, soft_weight, violations = rows.soft_error, rows.soft_weight, rows.elastic_violation
     diagonal, linear, target = program.diagonal, program.linear, program.target
     lower, upper, least = program.lower, program.upper, program.least

@@ -9,20 +9,8 @@ from wholebody.base.compiled import compiled
 from wholebody.methods.qp.active_set_kernel import solve_growing, work_size
 from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
-from wholebody.methods.qp.rows import (
-    Bodies,
-    ContactRows,
-    Guess,
-    Past,
-    Rows,
-    StepNumbers,
-    StepParts,
-    StepRequest,
-    StepRoom,
-    StepSize,
-    TermRows,
-    Terms,
-)
+from wholebody.methods.qp.rows import Bodies, LinearRows, Rows, StepParts, StepState
+from wholebody.methods.qp.settings import Corrections
 from wholebody.methods.qp.subproblem_kernel import fill_program, sort_rows
 from wholebody.methods.qp.turning_kernel import motion
 from wholebody.terms.linearisation import PackedLinearisation
@@ -31,114 +19,118 @@ from wholebody.terms.linearisation import PackedLinearisation
 @compiled(error_model="numpy")
 def solve(
     at: PackedLinearisation,
-    given: Terms,
-    past: Past,
-    guess: Guess,
+    state: StepState,
+    pushed: Indices,
     bodies: Bodies,
-    room: StepRoom,
-    numbers: StepNumbers,
-    request: StepRequest,
+    measures: bool,
+    hot: bool,
+    least_damping: float,
 ) -> tuple[bool, int, float, float, float, float, float, float, float, float]:
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
     Args:
         at: the linearisation.
-        given: the terms' rows.
-        past: where the last step ended; where this one does to first order, but for the posture, is written if solved.
-        guess: what held the last program's answer; its bounds become those that hold this one's where it is solved.
+        state: of the tracker; where the program is solved, its bounds become those that hold the answer, and `after`
+            is written but for the posture.
+        pushed: keys of the last program's elastic rows that pushed, in ascending order.
         bodies: what moves.
-        room: which `parts` lays out.
-        numbers: of the programs.
-        request: what is asked of this one.
+        measures: whether they count.
+        hot: whether to solve the program, not only to build it.
+        least_damping: of goals, where the last step does not ask for more.
 
     Returns:
         Whether the program is solved; how many elastic rows push; longest way and largest turn of the pieces; largest
         violation of an elastic row; least room that a contact row has after the step, and largest violation of an
         elastic row then; least clearance asked of a contact; the damping, and what the answer asks for.
     """
+    given, numbers, held = state.terms, state.numbers, state.held
     n, goals, contacts = at.box.shape[1], len(given.share), len(at.contacts.number)
     equal, one_sided = 0, 0
     for c in range(len(given.kind)):
         equal += given.kind[c] == 0
         one_sided += (given.kind[c] == 3) * 2 + (given.kind[c] == 1) + (given.kind[c] == 2)
     m, terms = goals + equal, goals + len(given.kind)
-    own = parts(room, n, goals, m, one_sided + len(at.gap), one_sided + contacts)
+    own = parts(state, n, goals, m, one_sided + len(at.gap), one_sided + contacts)
     rows, x = own.rows, own.x
-    sort_rows(
-        TermRows(at.value[:goals], at.jacobian[:goals], at.value[goals:], at.jacobian[goals:terms]),
-        ContactRows(at.gap, at.jacobian[terms:], at.gap_contact, at.clearance, at.contacts.number),
-        given,
-        numbers.weights,
-        rows,
-    )
+    there = LinearRows(
+        at.value[:goals], at.jacobian[:goals], at.value[goals:], at.jacobian[goals:terms], at.gap, at.jacobian[terms:],
+        at.gap_contact, at.clearance, at.contacts.number,
+    )  # fmt: skip
+    sort_rows(there, given, rows)
+    value, clearance, after, last, target = at.value, at.clearance, state.after, len(at.q), own.program.target
+    soft, soft_error, elastic, violations, key = (
+        rows.soft, rows.soft_error, rows.elastic, rows.elastic_violation, rows.key,
+    )  # fmt: skip
+    at_lower, at_upper = own.active.lower, own.active.upper
     error = 0.0
     for r in range(goals):
-        error += at.value[r] * at.value[r]
+        error += value[r] * value[r]
     error = max(np.sqrt(error), 1e-12)
-    damping = _run_ahead_of(past, at.q, rows, numbers, request, error, own.shift)
-    size = numbers.size
-    step = StepSize(
-        size.scale, size.radius, size.pull, damping, size.gain, request.measures, size.box, size.overlap,
-        size.least_curvature, size.proximal, size.lever,
-    )  # fmt: skip
-    fill_program(at.measure[0][:n], at.measure[1][:n], at.box, rows, own.shift, step, own.program)
+    damping = _run_ahead_of(state, at.q, rows, measures, error, least_damping, own.shift)
+    numbers[3], numbers[5] = damping, measures
+    fill_program(at.measure[0][:n], at.measure[1][:n], at.box, rows, own.shift, numbers[:11], own.program)
     least_asked, worst = np.inf, 0.0
     for c in range(contacts):
-        least_asked = min(least_asked, at.clearance[c])
-    for violated in rows.elastic_violation:
+        least_asked = min(least_asked, clearance[c])
+    for violated in violations:
         worst = max(worst, violated)
     for i in range(n):
-        own.active.lower[i], own.active.upper[i] = guess.held[0, i], guess.held[1, i]
+        at_lower[i], at_upper[i] = held[0, i], held[1, i]
     rounds = -1
-    if request.hot:
-        rounds = solve_growing(own.program, rows.key, guess.pushed, own.active, numbers.limits, own.room, x)
+    if hot:
+        limits = Corrections(
+            numbers[11], int(numbers[12]), int(numbers[13]), int(numbers[14]), int(numbers[15]), numbers[16]
+        )
+        rounds = solve_growing(own.program, rows.key, pushed, own.active, limits, own.room, x)
     if rounds < 0:
         return False, 0, 0.0, 0.0, worst, -np.inf, np.inf, least_asked, damping, 0.0
     for i in range(n):
-        guess.held[0, i], guess.held[1, i] = own.active.lower[i], own.active.upper[i]
-    count = _sorted_keys(rows.key, own.active.elastic, own.pushing)
+        held[0, i], held[1, i] = at_lower[i], at_upper[i]
+    count = _sorted_keys(key, own.active.elastic, own.pushing)
     left = 0.0
     for r in range(m):
-        gone = dot(rows.soft[r], x)
-        past.after[len(at.q) + r] = rows.soft_error[r] + gone
+        gone = dot(soft[r], x)
+        after[last + r] = soft_error[r] + gone
         if r < goals:
-            left += (gone - own.program.target[r]) ** 2
+            left += (gone - target[r]) ** 2
     left = np.sqrt(left)
-    past.after[-2], past.after[-1] = left, 1.0
+    after[-2], after[-1] = left, 1.0
     spare, missed = np.inf, 0.0
-    for j in range(len(rows.key)):
-        ahead = dot(rows.elastic[j], x) - rows.elastic_violation[j]
+    for j in range(len(key)):
+        ahead = dot(elastic[j], x) - violations[j]
         missed = max(missed, -ahead)
         if j >= one_sided:
             spare = min(spare, ahead)
-    asked = numbers.damping * min(1.0, left / error) if left > numbers.resting else 0.0
+    asked = numbers[17] * min(1.0, left / error) if left > numbers[18] else 0.0
     way, turn = motion(x, bodies)
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
 @compiled(inner=True)
 def _run_ahead_of(
-    past: Past, q: Array, rows: Rows, numbers: StepNumbers, request: StepRequest, error: float, shift: Array
+    state: StepState, q: Array, rows: Rows, measures: bool, error: float, least_damping: float, shift: Array
 ) -> float:
     """Write what is added to the errors of the soft rows, as the last step was curved; returns the damping.
 
     `error` is the norm of the goals' errors.
     """
-    last, m, goals = len(q), len(rows.soft_error), rows.goals
-    known = _is_known(past.before, q)
+    before, damping, rest, curved = state.before, state.numbers[17], state.numbers[18], state.numbers[19]
+    soft_error, goals = rows.soft_error, rows.goals
+    last, m = len(q), len(soft_error)
+    known = _is_known(before, q)
     for r in range(m):
-        shift[r] = rows.soft_error[r] - past.before[last + r] if known else 0.0
+        shift[r] = soft_error[r] - before[last + r] if known else 0.0
     for r in range(goals, m):  # what is held: a step much shorter than the last one is curved much less
-        shift[r] = min(max(shift[r], -numbers.curved), numbers.curved)
+        shift[r] = min(max(shift[r], -curved), curved)
     if not known:
-        return request.least_damping
+        return least_damping
     # what a goal that rests is missed by, because the last step was curved; a goal that moves is not run ahead of
-    resting = request.measures
+    resting = measures
     for r in range(goals):
-        resting = resting and abs(shift[r]) < numbers.resting
+        resting = resting and abs(shift[r]) < rest
     if not resting:
         shift[:goals] = 0.0
-    return max(request.least_damping, numbers.damping * min(1.0, float(past.before[last + m]) / error))
+    return max(least_damping, damping * min(1.0, float(before[last + m]) / error))
 
 
 @compiled(inner=True)
@@ -176,7 +168,7 @@ def run_ahead(curved: Array, rows: Rows, q: Array, moved: float, most: float, st
         moved: how much a goal that was not known has moved at least, so that it does not count as one that rests.
         most: how far it is run ahead at most.
         straight: see the answer.
-        before: (nq + m + 2,) see `Past`.
+        before: (nq + m + 2,) see `StepState`.
 
     Returns:
         Whether a row is to run ahead by more than `straight` farther, or less far, than it did.
@@ -204,7 +196,7 @@ def floats_for(n: int, m: int, k: int) -> int:
 
 
 @compiled()
-def parts(room: StepRoom, n: int, goals: int, m: int, k: int, contacts: int) -> StepParts:
+def parts(room: StepState, n: int, goals: int, m: int, k: int, contacts: int) -> StepParts:
     """The parts of the room for n variables, m soft rows, of which some are goals', and k elastic rows."""
     floats, integers, masks = room.floats, room.integers, room.masks
     a = 5 * n

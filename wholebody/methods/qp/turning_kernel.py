@@ -9,7 +9,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.geometry.proximity import Contacts
-from wholebody.methods.qp.dense_kernel import add, dot
+from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.rows import Bodies, Rows, Seen
 
 
@@ -21,9 +21,12 @@ def motion(displacement: Array, bodies: Bodies) -> tuple[float, float]:
     columns, parents, twist = bodies.columns, bodies.parents, bodies.twists[0]
     twist[:] = 0.0
     for k in range(len(columns)):
-        add(displacement[places[k]], columns[k], twist[column_joint[k]])
+        j, share = column_joint[k], displacement[places[k]]
+        for i in range(6):
+            twist[j, i] += columns[k, i] * share
     for j in range(1, len(parents)):
-        add(1.0, twist[parents[j]], twist[j])
+        for i in range(6):
+            twist[j, i] += twist[parents[j], i]
     longest, most = 0.0, 0.0
     for p in range(len(joint)):
         if joint[p] == 0:
@@ -105,7 +108,9 @@ def _second_order(displacement: Array, bodies: Bodies) -> None:
     twists[:] = 0.0
     twist, change, own = twists[0], twists[1], twists[2]
     for c in range(len(columns)):
-        add(displacement[place[c]], columns[c], own[column_joint[c]])
+        joint, share = column_joint[c], displacement[place[c]]
+        for i in range(6):
+            own[joint, i] += columns[c, i] * share
     for j in range(1, len(parents)):
         # the axes of a joint move with the body that carries it
         parent = parents[j]
