@@ -45,7 +45,7 @@ def work_size(variables: int, soft: int, elastic: int) -> int:
     return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def face(work: Array, n: int, m: int, k: int) -> Face:
     """Room for the faces of a program with n variables, m soft and k elastic rows, within `work` (see `work_size`)."""
     most = m + k
@@ -66,7 +66,7 @@ def face(work: Array, n: int, m: int, k: int) -> Face:
     )
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", forceinline=True)
 def solve_growing(
     program: QuadraticProgram,
     key: Indices,
@@ -124,7 +124,7 @@ def _contains(sorted_keys: Indices, key: int) -> bool:
     return low < len(sorted_keys) and sorted_keys[low] == key
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", forceinline=True)
 def primal_dual_active_set(
     program: QuadraticProgram, places: Indices, active: ActiveSet, most: int, limits: Corrections, room: Room, x: Array
 ) -> bool:

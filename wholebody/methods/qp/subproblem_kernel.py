@@ -14,7 +14,7 @@ from wholebody.methods.qp.settings import Weights
 MOST_ROWS = 4096  # more than one contact ever has
 
 
-@compiled()
+@compiled(forceinline=True)
 def sort_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
     """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them, whose arrays are filled."""
     errors, values, gaps, clearance = there.error, there.value, there.gap, there.clearance
@@ -91,7 +91,7 @@ def violation(rows: Rows, share: Array, displacement: Array) -> tuple[float, flo
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)
 
 
-@compiled()
+@compiled(forceinline=True)
 def fill_program(
     gradient: Array, curvature: Array, box: Array, rows: Rows, shift: Array, size: Array, program: QuadraticProgram
 ) -> None:

@@ -106,7 +106,7 @@ def solve(
     return True, count, way, turn, worst, spare, missed, least_asked, damping, asked
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def _run_ahead_of(
     state: StepState, q: Array, rows: Rows, measures: bool, error: float, least_damping: float, shift: Array
 ) -> float:
@@ -133,7 +133,7 @@ def _run_ahead_of(
     return max(least_damping, damping * min(1.0, float(before[last + m]) / error))
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def _is_known(before: Array, q: Array) -> bool:
     """Whether the last step ended at the posture q (nq,)."""
     known: bool = before[-1] > 0.0
@@ -142,7 +142,7 @@ def _is_known(before: Array, q: Array) -> bool:
     return known
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def _sorted_keys(key: Indices, pushing: Mask, keys: Indices) -> int:
     """Write the keys of the rows that push in ascending order; returns how many."""
     count = 0
@@ -195,7 +195,7 @@ def floats_for(n: int, m: int, k: int) -> int:
     return 5 * n + 4 * m + m * n + k * n + 3 * k + work_size(n, m, k)
 
 
-@compiled()
+@compiled(forceinline=True)
 def parts(room: StepState, n: int, goals: int, m: int, k: int, contacts: int) -> StepParts:
     """The parts of the room for n variables, m soft rows, of which some are goals', and k elastic rows."""
     floats, integers, masks = room.floats, room.integers, room.masks

@@ -13,7 +13,7 @@ from wholebody.methods.qp.dense_kernel import dot
 from wholebody.methods.qp.rows import Bodies, Rows, Seen
 
 
-@compiled()
+@compiled(forceinline=True)
 def motion(displacement: Array, bodies: Bodies) -> tuple[float, float]:
     """Longest way of any point of any piece [m], and largest turn [rad], to first order in a displacement (nv,)."""
     places, column_joint, joint = bodies.place, bodies.column_joint, bodies.joint
@@ -100,7 +100,7 @@ def linearisation_error(
     return worst
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def _second_order(displacement: Array, bodies: Bodies) -> None:
     """Write the twist of every joint, and its change at constant joint speeds, into the room of the bodies."""
     columns, place, column_joint = bodies.columns, bodies.place, bodies.column_joint
@@ -133,7 +133,7 @@ class Moved(NamedTuple):
     change: Array
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
 def _seen_from(
     piece: Moved, carrier: Array, carrier_change: Array, normal: Array, sign: float, off: float, vectors: Array
 ) -> tuple[float, float]:
