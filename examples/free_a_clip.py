@@ -14,7 +14,7 @@ from matplotlib.figure import Figure as Chart
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.motion.avoidance import Avoided
+from wholebody.motion.judging import Avoided
 from wholebody.view.filmstrip import write_filmstrip
 
 RECORDING = "mocap/cmu_35_01.bvh"

@@ -39,7 +39,9 @@ from wholebody.view.browser import Browser
 ROOT = Path(__file__).resolve().parent.parent
 
 # A failure says how to repeat it. In CI, where CI is set, the examples are the same in every run.
-settings.register_profile("default", deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True)
+settings.register_profile(
+    "default", max_examples=25, deadline=None, suppress_health_check=[HealthCheck.too_slow], print_blob=True
+)
 settings.register_profile("ci", settings.get_profile("default"), derandomize=True, database=None)
 # Tests that press Ctrl-C do so as in a terminal; what runs in the background is started with it ignored.
 signal.signal(signal.SIGINT, signal.default_int_handler)

@@ -43,6 +43,10 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         lambda scene, q: Track.of(scene.figure, [q], 0.02).check(scene.figure),
         lambda scene, q: FrameLoop(scene, scene.figure.neutral).frame(q),
         lambda scene, q: scene.figure.reduced("left_arm", q),
+        lambda scene, q: wb.QP().tracker(wb.Problem(scene), 0.02).step(q),
+        lambda scene, q: wb.Newton().tracker(wb.Problem(scene), 0.02).step(q),
+        lambda scene, q: wb.methods.CCD().tracker(wb.Problem(scene), 0.02).step(q),
+        lambda scene, q: wb.ergonomics.lift_between(scene.figure, scene.figure.neutral, q),
         lambda scene, q: wb.ergonomics.body_angles(scene.figure, q),
         lambda scene, q: scene.contacts(q),
         lambda scene, q: scene.overlapping(q),
@@ -62,6 +66,10 @@ def shown(scene: wb.Scene) -> wb.Viewer:
         "track",
         "frame",
         "reduced",
+        "qp step",
+        "newton step",
+        "ccd step",
+        "lift_between",
         "body_angles",
         "contacts",
         "overlapping",
@@ -75,6 +83,20 @@ def shown(scene: wb.Scene) -> wb.Viewer:
 def test_degrees_are_said_where_postures_come_in(scene, wrong, enter):
     with pytest.warns(UserWarning, match=SAID):
         enter(scene, wrong)
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        (lambda: wb.StepLimit(180.0), r"velocity is 180 rad/s; 180 degrees/s are 3.142"),
+        (lambda: wb.StepLimit(joints={"left_arm": 90.0}), r"left_arm is 90 rad/s"),
+        (lambda: wb.StepLimit(root_turn=90.0), r"root_turn is 90 rad/s"),
+        (lambda: wb.motion.MotionBounds(deviation=30.0), r"deviation is 30 rad; 30 degrees are 0.5236"),
+    ],
+)
+def test_degrees_in_settings_are_said(setting, said):
+    with pytest.warns(UserWarning, match=said):
+        setting()
 
 
 def test_far_out_of_the_limits_is_said_also_where_degrees_would_be(scene):
@@ -101,8 +123,8 @@ ROBOT = """<robot name="arm"><link name="base"/><link name="tip">
 @pytest.mark.parametrize(
     ("rpy", "kind", "low", "said"),
     [
-        ("0 90 0", "revolute", -1.0, r"rpy='0 90 0', more than a turn in radians; .* degrees are 0 1.571 0"),
-        ("0 0 0", "revolute", -90.0, r"limits -90 and 1 rad, more than two turns; .* degrees are -1.571"),
+        ("0 90 0", "revolute", -1.0, r"the pitch of <origin> is 90 rad; 90 degrees are 1.571"),
+        ("0 0 0", "revolute", -90.0, r"the lower limit is -90 rad; -90 degrees are -1.571"),
     ],
 )
 def test_degrees_in_the_description_of_a_robot_are_said(tmp_path, rpy, kind, low, said):
@@ -111,8 +133,18 @@ def test_degrees_in_the_description_of_a_robot_are_said(tmp_path, rpy, kind, low
         wb.load(str(tmp_path / "arm.urdf"))
 
 
+def test_degrees_in_the_limits_of_an_mjcf_are_said(tmp_path):
+    pytest.importorskip("mujoco")
+    (tmp_path / "arm.xml").write_text(
+        '<mujoco><compiler angle="radian"/><worldbody><body name="tip"><joint name="turn" range="-90 1"/>'
+        '<geom type="sphere" size="0.1"/></body></worldbody></mujoco>'
+    )
+    with pytest.warns(UserWarning, match=r"joint 'turn': the lower limit is -90 rad; -90 degrees are -1.571"):
+        wb.load(str(tmp_path / "arm.xml"))
+
+
 def test_turns_without_limits_are_said_beyond_two_turns(tmp_path):
     (tmp_path / "arm.urdf").write_text(ROBOT.format(rpy="0 0 0", kind="continuous", low=0, high=0))
     figure = wb.load(str(tmp_path / "arm.urdf"))
-    with pytest.warns(UserWarning, match=r"'turn' is 90 rad, more than two turns; 90 degrees are 1.571"):
+    with pytest.warns(UserWarning, match=r"'turn' is 90 rad; 90 degrees are 1.571"):
         figure.with_joints(figure.neutral, {"turn": 90.0})

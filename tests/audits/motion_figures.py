@@ -28,8 +28,7 @@ from wholebody.motion.checking import check
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import Worn, dressed, equipment
-from wholebody.motion.worn_equipment import Equipment
+from wholebody.motion.worn_equipment import Equipment, Worn, dressed, equipment
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze, Hold, Point

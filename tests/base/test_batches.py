@@ -76,8 +76,7 @@ for _ in run_batch((Job(k, works, (sys.argv[1], k), 0.0) for k in range(4)), int
 """
 
 
-@pytest.mark.parametrize("jobs", [1, 2])
-@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+@pytest.mark.parametrize(("how", "jobs"), [(signal.SIGINT, 2), (signal.SIGKILL, 1)])
 def test_no_process_is_left_when_a_run_is_ended(how: signal.Signals, jobs: int, tmp_path: Path) -> None:
     """SIGKILL leaves no time to end them: they see that their parent is gone."""
     command = [sys.executable, "-c", SCRIPT, str(tmp_path), str(jobs)]

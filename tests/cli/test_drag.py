@@ -39,7 +39,7 @@ def test_a_line_by_newton_prints_a_table_and_writes_all_files(
     task: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "out"
-    code = main(["drag", str(task), "--path", "line", "--method", "newton", "--frames", "40", "--out", str(out)])
+    code = main(["drag", str(task), "--path", "line", "--method", "newton", "--frames", "16", "--out", str(out)])
     printed = capsys.readouterr().out
     assert code == 0
     assert "reach" in printed
@@ -49,19 +49,18 @@ def test_a_line_by_newton_prints_a_table_and_writes_all_files(
     }
     facts, rows = read_rows(out / "reach-newton.csv", DragFrameRow)
     assert "processor" in facts
-    assert [row.frame for row in rows] == list(range(40))
+    assert [row.frame for row in rows] == list(range(16))
     assert max(row.depth_mm for row in rows) < 0.1
     assert max(row.between_mm for row in rows) < 1.0
     assert "| reach | newton" in (out / "reach-newton.md").read_text()
     assert "animation" in (out / "reach-newton.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("method", ["qp", "ccd"])
-def test_a_circle_by_the_other_methods(method: str, task: Path, tmp_path: Path) -> None:
+def test_a_circle_by_ccd(task: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    command = ["drag", str(task), "--path", "circle", "--size", "0.05", "--method", method, "--out", str(out)]
-    assert main([*command, "--frames", "60"]) == 0
-    _, rows = read_rows(out / f"reach-{method}.csv", DragFrameRow)
+    command = ["drag", str(task), "--path", "circle", "--size", "0.05", "--method", "ccd", "--out", str(out)]
+    assert main([*command, "--frames", "30"]) == 0
+    _, rows = read_rows(out / "reach-ccd.csv", DragFrameRow)
     assert rows[-1].error_mm < 1.0
     assert max(row.between_mm for row in rows) <= 1.0
 
@@ -72,7 +71,7 @@ def test_a_file_that_leads_into_the_wall_ends_there(
     (tmp_path / "way.csv").write_text("x,y,z\n0.35,-0.3,1.2\n0.75,-0.3,1.2\n")
     out = tmp_path / "out"
     command = ["drag", str(task), "--path", str(tmp_path / "way.csv"), "--method", "qp", "--out", str(out)]
-    assert main([*command, "--goal", "0", "--frames", "80"]) == 1
+    assert main([*command, "--goal", "0", "--frames", "40"]) == 1
     assert "unreachable" in "".join(capsys.readouterr().out.split())
     _, rows = read_rows(out / "reach-qp.csv", DragFrameRow)
     errors = np.array([row.error_mm for row in rows])

@@ -16,6 +16,5 @@ def test_a_changed_value_and_a_row_that_is_gone_are_written_anew(root: Path) -> 
     command = runpy.run_path(str(root / "docs/hooks/constants.py"))
     page = command["PAGE"].read_text(encoding="utf-8")
     row = next(line for line in page.splitlines() if line.startswith("| `first_radius` |"))
-    for stale in (row.replace("0.3", "0.4"), row + "\n| `gone` | 1 | nothing |"):
-        assert stale != row
-        assert command["refreshed"](page.replace(row, stale)) == page
+    stale = row.replace("0.3", "0.4") + "\n| `gone` | 1 | nothing |"
+    assert command["refreshed"](page.replace(row, stale)) == page

@@ -34,7 +34,7 @@ def still(hand: wb.Figure, *things: tuple[wb.Shape, Any, wb.Body]) -> RigidBodie
     return RigidBodies(scene, gravity=(0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_free_collisions_conserve_momentum(hand: wb.Figure, seed: int) -> None:
     engine = still(hand, *colliding(np.random.default_rng(seed), AWAY))
     momentum, energy, events = engine.momentum(), engine.energy(), 0

@@ -77,7 +77,7 @@ class Heap:
             self.inverse[6 * b + 3 : 6 * b + 6, 6 * b + 3 : 6 * b + 6] = self.inertia[b]
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_rows_are_those_of_the_definition(seed: int) -> None:
     heap = Heap(seed)
     # tangents are any two; the rows of the definition are taken along those of the loop
@@ -142,7 +142,7 @@ def test_islands_do_not_reach_through_fixed_bodies() -> None:
     assert root.tolist() == [0, 1, 1, 3, 3, 3, 6]
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(3))
 def test_islands_solved_apart_solve_the_whole_program(seed: int) -> None:
     heaps = [Heap(seed), Heap(seed + 50, joints=0), Heap(seed + 100)]  # nothing joins one to another
     parts = [len(heap.axes) for heap in heaps]
@@ -177,7 +177,7 @@ def test_islands_solved_apart_solve_the_whole_program(seed: int) -> None:
         assert twist[5 * k : 5 * k + 5] == pytest.approx(alone, abs=1e-3)
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_a_single_impact_is_that_of_the_clear_version(seed: int) -> None:
     rng = np.random.default_rng(seed)
     heap = Heap(seed, contacts=1, joints=0)
@@ -212,7 +212,7 @@ def test_a_single_impact_is_that_of_the_clear_version(seed: int) -> None:
         assert events[0, 2:] == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_free_body_turns_as_fine_steps_say(seed: int) -> None:
     rng = np.random.default_rng(seed)
     rotation, spin = pin.exp3(rng.normal(size=3)), 5.0 * rng.normal(size=3)
@@ -223,7 +223,7 @@ def test_a_free_body_turns_as_fine_steps_say(seed: int) -> None:
     assert spin == pytest.approx(expected[1], abs=2e-4)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_the_height_of_a_piece_is_that_of_its_points(seed: int) -> None:
     rng = np.random.default_rng(seed)
     points, turned, at = rng.normal(size=(9, 3)), pin.exp3(rng.normal(size=3)), rng.normal(size=3)

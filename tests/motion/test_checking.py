@@ -14,7 +14,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.motion.clip_contacts import contact, contact_as_dict
-from wholebody.motion.ready_equipment import equipment
+from wholebody.motion.worn_equipment import equipment
 
 
 def at(*places: float) -> Array:

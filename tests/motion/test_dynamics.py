@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.load_change import LoadChange
+from wholebody.motion.clip_torques import LoadChange
 from wholebody.motion.trajectory.loads import standing_frames
 
 WHEEL = """<robot name="wheel"><link name="base"/>
@@ -66,9 +66,8 @@ def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def recorded(shared_data: Path) -> wb.Clip:
     """The first frames of a man who crouches for a jump."""
-    return wb.retarget(wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 50), wb.load("human"))[
-        :45
-    ]
+    motion = wb.motion.read_skeleton(shared_data / "mocap" / "cmu_02_04.bvh").part(0, 40)
+    return wb.retarget(motion, wb.load("human"))[:35]
 
 
 def test_a_recording_that_is_freed_stays_within_strength(recorded: wb.Clip) -> None:

@@ -7,8 +7,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.ready_equipment import READY, equipment
-from wholebody.motion.worn_equipment import Equipment, bounds, group_of
+from wholebody.motion.worn_equipment import READY, Equipment, bounds, equipment, group_of
 
 
 @pytest.fixture(scope="module", params=["capsules", "spheres"])
@@ -114,14 +113,6 @@ def test_bounds_of_a_mesh_are_those_of_its_vertices() -> None:
     low, high = bounds(mesh)
     assert np.allclose(low, 0.0, atol=1e-9)
     assert np.allclose(high, (0.3, 0.2, 0.1), atol=1e-9)
-
-
-def test_real_props_are_filled_and_worn(capsules: Figure, shared_data: object) -> None:
-    quiver = wb.Mesh(f"{shared_data}/props/quiver.obj", up="y", scale=0.5)
-    worn = Equipment.worn(quiver, capsules, name="quiver", to="thorax", side="back").filled(6, envelope=True)
-    assert worn.filling is not None
-    assert worn.filling.uncovered < 0.1
-    assert "quiver" in worn.attach(wb.Scene(capsules)).objects
 
 
 def test_mistakes_are_named(capsules: Figure) -> None:

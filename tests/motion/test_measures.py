@@ -10,16 +10,14 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion.feet import slid, sliding
 from wholebody.motion.measures import (
     deviation,
     foot_sliding,
     hand_error,
     hand_off_weapon,
     jerk_ratio,
-    share_deeper,
 )
-from wholebody.motion.stance import foot_points
+from wholebody.motion.stance import foot_points, slid, sliding
 
 
 def test_deviation_of_an_arm(planar_arm: Callable[..., Any]) -> None:
@@ -111,16 +109,6 @@ def test_hands_on_a_weapon() -> None:
     shaft = palms[0] / np.linalg.norm(palms[0])
     assert across == pytest.approx(float(np.linalg.norm(np.cross(palms[1], shaft))))
     assert 0.01 < across < 0.9 * error
-
-
-def test_share_deeper(free_bodies: Callable[..., Any]) -> None:
-    figure = free_bodies(wb.Sphere(0.1))
-    q = [[x, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0] for x in (0.0, 0.405, 0.42, 0.45)]
-    scene = wb.Scene(figure)
-    scene.add(wb.HalfSpace((-1.0, 0.0, 0.0)), name="wall", at=(0.5, 0.0, 0.0))
-    found = wb.check(wb.Clip(figure, q, 0.1), scene)  # type: ignore[arg-type]
-    assert share_deeper(found) == 0.5
-    assert share_deeper(found, 0.03) == 0.25
 
 
 def test_clips_of_different_lengths_are_refused(planar_arm: Callable[..., Any]) -> None:

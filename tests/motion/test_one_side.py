@@ -7,10 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 import wholebody as wb
+from tests.freeing import begun
 from wholebody.figures.figure import Figure
-from wholebody.motion.avoider import Watch
-from wholebody.motion.following import Follower
-from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.one_side import one_sided
 
 DT = 1 / 30
@@ -30,16 +28,9 @@ def with_post(figure: Figure) -> wb.Scene:
 
 
 def kept(clip: wb.Clip, scene: wb.Scene, q: np.ndarray) -> tuple[np.ndarray, int]:
-    """The postures, and how often a follower was asked for."""
-    made = list[Follower]()
-    with scene.borrow() as workspace:
-        terms = frame_terms(scene, clip.q, clip.dt, ())
-
-        def follower() -> Follower:
-            made.append(Follower(terms, 0.0))
-            return made[-1]
-
-        return one_sided(terms, follower, workspace, q, Watch(None)), len(made)
+    """The postures, and how many programs they took."""
+    with begun(clip, scene) as run:
+        return one_sided(run, q), run.work.programs
 
 
 def test_frames_on_alternate_sides_of_a_post_come_to_one_side(planar_arm: Callable[..., Figure]) -> None:
@@ -60,9 +51,9 @@ def test_postures_of_one_side_stay_as_they_are(planar_arm: Callable[..., Figure]
     figure = planar_arm((0.5, 0.5), radius=0.02)
     clip, scene = waving(figure), with_post(figure)
     q = np.minimum(clip.q, [-0.12, 0.0])
-    found, asked = kept(clip, scene, q)
+    found, programs = kept(clip, scene, q)
     np.testing.assert_array_equal(found, q)
-    assert asked == 0
+    assert programs == 0
 
 
 def test_few_frames_take_the_side_of_most_at_both_ends_too(planar_arm: Callable[..., Figure]) -> None:

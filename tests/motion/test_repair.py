@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.freeing import begun
 from wholebody.figures.figure import Figure
-from wholebody.motion.avoider import AvoidProgress, Watch
-from wholebody.motion.frame_terms import frame_terms
-from wholebody.motion.repair import Repairer
+from wholebody.motion.avoider import AvoidProgress
+from wholebody.motion.repair import repaired
 
 DT = 1 / 30
 
@@ -20,10 +20,9 @@ def swing(figure: Figure, frames: int = 40) -> wb.Clip:
     return wb.Clip(figure, np.stack([np.linspace(-1.45, 0.95, frames), np.full(frames, 0.5)], axis=1), DT)
 
 
-def repaired(clip: wb.Clip, scene: wb.Scene, q: np.ndarray, *terms: wb.Hold) -> tuple[np.ndarray, int]:
-    with scene.borrow() as workspace:
-        repairer = Repairer(frame_terms(scene, clip.q, clip.dt, terms), workspace)
-        return repairer.repair(q, Watch(None)), repairer.programs
+def mended(clip: wb.Clip, scene: wb.Scene, q: np.ndarray, *terms: wb.Hold) -> tuple[np.ndarray, int]:
+    with begun(clip, scene, terms) as run:
+        return repaired(run, q), run.work.programs
 
 
 def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar_arm: Callable[..., Figure]) -> None:
@@ -32,7 +31,7 @@ def test_a_needle_between_two_frames_is_passed_beside_and_far_frames_stay(planar
     scene.add(wb.Sphere(0.002), name="needle", at=(0.971, 0.0, 0.0))
     before = wb.check(clip, scene)
     assert (before.colliding, before.dips) == (0, 1)
-    q, programs = repaired(clip, scene, clip.q)
+    q, programs = mended(clip, scene, clip.q)
     assert programs > 0
     assert wb.check(clip.with_q(q), scene).free
     gap = int(np.argmax(before.between))
@@ -52,7 +51,7 @@ def test_a_limb_that_goes_right_through_is_kept_on_one_side_before_rows_are_trie
     before = wb.check(clip, scene)
     assert (before.colliding, before.dips) == (0, 1)
     assert before.deepest_between > 0.06
-    q, _ = repaired(clip, scene, clip.q)
+    q, _ = mended(clip, scene, clip.q)
     assert wb.check(clip.with_q(q), scene).free
 
 
@@ -68,17 +67,16 @@ def test_the_caller_ends_it_while_frames_are_kept_on_one_side(planar_arm: Callab
         told.append(progress.note)
         return len(told) == 3
 
-    with scene.borrow() as workspace:
-        repairer = Repairer(frame_terms(scene, clip.q, clip.dt, ()), workspace)
-        repairer.repair(clip.q, Watch(stop))
+    with begun(clip, scene, progress=stop) as run:
+        repaired(run, clip.q)
     assert len(told) == 3
-    assert told[-1] == "what passes after frame 99 is kept on one side"
-    assert repairer.programs < 100
+    assert told[-1].endswith("is kept on one side")
+    assert run.work.programs < 100
 
 
 def test_where_nothing_is_wrong_nothing_is_computed(planar_arm: Callable[..., Figure]) -> None:
     clip = swing(planar_arm((0.5, 0.5)))
-    q, programs = repaired(clip, wb.Scene(clip.figure), clip.q)
+    q, programs = mended(clip, wb.Scene(clip.figure), clip.q)
     np.testing.assert_array_equal(q, clip.q)
     assert programs == 0
 
@@ -88,7 +86,7 @@ def test_what_is_held_holds_again_in_a_frame_that_left_it(planar_arm: Callable[.
     tip = clip.figure.segments[-1]
     left = clip.q.copy()
     left[20] += 0.05
-    q, _ = repaired(clip, wb.Scene(clip.figure), left, wb.Hold(tip, orientation=False))
+    q, _ = mended(clip, wb.Scene(clip.figure), left, wb.Hold(tip, orientation=False))
     state = wb.Scene(clip.figure).state(q[0])
     number = clip.figure.frame_id(tip)
     for frame in range(len(clip)):

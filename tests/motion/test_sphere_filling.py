@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.ready_equipment import torus_mesh
 from wholebody.motion.sphere_filling import Spheres, fill_with_spheres
+from wholebody.motion.worn_equipment import torus_mesh
 
 RADIUS, TUBE = 0.13, 0.03
 

@@ -10,8 +10,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.clip_torques import smoothed, torques
-from wholebody.motion.ground_forces import ground_forces
-from wholebody.motion.strength import FEMALE, MALE, Strength
+from wholebody.motion.soles import ground_forces
+from wholebody.motion.strength import Strength
 
 GRAVITY = 9.81
 
@@ -164,10 +164,14 @@ def test_noise_of_recordings_is_filtered_and_slow_motion_is_not(human: wb.Figure
     assert smoothed(clip, None) is clip
 
 
-@pytest.mark.parametrize(("sex", "table"), [("male", MALE), ("female", FEMALE)])
+@pytest.mark.parametrize(
+    ("sex", "flexion", "extension"),
+    [("male", (58, 100, 157), (84, 168, 318)), ("female", (22, 62, 104), (52, 106, 219))],
+)
 def test_strength_is_the_table_at_its_percentiles_and_grows_between(
-    human: wb.Figure, sex: str, table: dict[str, tuple[float, ...]]
+    human: wb.Figure, sex: str, flexion: tuple[float, ...], extension: tuple[float, ...]
 ) -> None:
+    """Knees, N m, of Stobbe (1982)."""
     knee = human.model.joints[human.joint_id("left_knee_flexion")].idx_v
     before = 0.0
     for percentile in (5, 20, 50, 80, 95):
@@ -176,8 +180,8 @@ def test_strength_is_the_table_at_its_percentiles_and_grows_between(
         before = upper[knee]
         if percentile in (5, 50, 95):
             place = (5, 50, 95).index(percentile)
-            assert upper[knee] == pytest.approx(table["knee flexion"][place])
-            assert -lower[knee] == pytest.approx(table["knee extension"][place])
+            assert upper[knee] == pytest.approx(flexion[place])
+            assert -lower[knee] == pytest.approx(extension[place])
     wrist = human.model.joints[human.joint_id("left_wrist_flexion")].idx_v
     assert np.isinf(Strength(50, sex).limits(human)[1][wrist])
 

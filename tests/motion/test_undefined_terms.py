@@ -39,4 +39,4 @@ def test_the_clip_stays_and_the_term_is_named(method: str, part: str) -> None:
     assert not freed.report.solved
     assert np.array_equal(freed.clip.q, clip.q)
     if method != "fade":  # which may find nothing better before it asks
-        assert f"Near: its {part} has nan" in freed.report.message
+        assert f"Near: its {part} has nan at a posture near frame " in freed.report.message

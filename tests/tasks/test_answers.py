@@ -121,8 +121,12 @@ def test_the_assessment_names_a_term_that_is_not_finite(scene, kind, part, bad):
 @pytest.mark.parametrize(
     ("kind", "part", "bad", "method"),
     [
-        *((*term, method) for term in TERMS for method in ("qp", "dls")),
-        *((*term, "newton") for term in TERMS if term[1] in ("error", "gradient") and np.isnan(term[2]).all()),
+        (Reach, "jacobian", np.full((3, 6), np.nan), "dls"),
+        (Keep, "jacobian", rows(1, np.nan), "qp"),
+        *((Reach, "error", np.full(3, np.nan), method) for method in ("qp", "newton", "dls")),
+        (Keep, "value", np.full(1, -np.inf), "qp"),
+        (Bend, "value", np.nan, "qp"),
+        *((Bend, "gradient", np.full(55, np.nan), method) for method in ("qp", "newton")),
     ],
 )
 def test_methods_step_back_and_end_with_the_name(scene, kind, part, bad, method):
@@ -153,7 +157,7 @@ def test_trackers_stay_where_terms_are_finite(scene, method, term):
         pytest.skip("the method takes no such term")
     tracker, q = method.tracker(problem, 0.05), problem.start
     notes = set()
-    for _ in range(15):
+    for _ in range(8):
         step = tracker.step(q)
         q = step.q
         notes.add(getattr(step, "note", ""))
@@ -191,21 +195,20 @@ class Odd(_Own, wb.Goal):
 
 
 LATE = 4
-SHAPES = [np.zeros(2), np.zeros(4), np.zeros((3, 3))]
-ODD = ["far", None, np.ones(3) * 1j, object(), *SHAPES, [None] * 3, {}, [[1], [1, 2]]]
+ODD = ["far", None, np.ones(3) * 1j, np.zeros(2), [[1], [1, 2]]]
 
 
 @pytest.mark.parametrize("part", ["error", "jacobian"])
 @pytest.mark.parametrize("bad", ODD, ids=lambda bad: repr(bad)[:20])
 def test_odd_answers_are_one_sentence(scene, part, bad):
     def assess_often(problem):
-        for _ in range(12):
+        for _ in range(6):
             judged = wb.assess(problem, problem.start)
             judged.optimality, judged.blockers  # noqa: B018
 
     def track(problem):
         tracker = wb.QP().tracker(problem, 0.05)
-        for _ in range(12):
+        for _ in range(6):
             tracker.step(problem.start)
 
     for use in (
@@ -234,6 +237,13 @@ def test_fractions_are_numbers(scene):
 def test_a_figure_is_no_scene_to_stand_on(scene):
     with pytest.raises(wb.InputError, match="give a scene of this figure"):
         scene.figure.grounded(scene.figure.neutral, scene.figure)
+
+
+def test_a_method_that_is_set_on_an_object_is_checked_too(scene):
+    term = Reach("", 0).resolve(scene, scene.figure.neutral)
+    term.error = lambda state: np.full(3, np.nan)
+    with pytest.raises(UndefinedTermError, match="Reach: its error has nan"):
+        term.error(scene.state(scene.figure.neutral))
 
 
 class Near(_Own, wb.Constraint):

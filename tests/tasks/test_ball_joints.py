@@ -172,7 +172,7 @@ def test_another_order_of_axes_would_be_farther_from_singular(scene: wb.Scene, a
 
 def test_in_everyday_tasks_the_sum_differs_by_an_eighth(scene: wb.Scene) -> None:
     figure = scene.figure
-    for name, made in human_tasks.tasks(figure).items():
+    for name, made in list(human_tasks.tasks(figure).items())[::3]:
         problem = made()
         q = wb.solve(problem).q
         pairs = np.array([both(figure, q, problem.start, ball) for ball in BALLS])

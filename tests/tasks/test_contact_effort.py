@@ -13,11 +13,8 @@ from wholebody.figures.state import State
 AS_CHEAP = 1.02  # times the effort at the place
 STATIONARY = 1e-2  # rad, m
 CASES = {
-    "frame on a box": (wb.Touch("right_index_tip", "thing"), 8),
     "frame on an edge": (wb.Touch("right_index_tip", "thing"), 3),
-    "frame on a rotated box": (wb.Touch("right_index_tip", "thing"), 25),
     "segment on a box": (wb.Touch("right_hand", "thing"), 3),
-    "piece on a box": (wb.Touch("right_hand:2", "thing"), 6),
     "palm on a box": (wb.Grasp("right", "thing"), 5),
 }
 
@@ -46,7 +43,7 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY
     scene, touch = problem.scene, problem.goals[0]
-    frame = {"right_hand:2": "right_hand"}.get(term.frame, term.frame)
+    frame = term.frame
     place = scene.state(solution.q).frame(scene.figure.frame_id(frame))
     point = touch.nearest_points(scene.state(solution.q)) if isinstance(touch, wb.Touch) else place.translation
     goal: wb.Goal = wb.Point(frame, point, offset=place.actInv(point))
@@ -55,14 +52,13 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
 
 
-@pytest.mark.parametrize("back", [False, True])
 @pytest.mark.filterwarnings("ignore:nothing holds the figure")
-def test_a_seat_is_sat_on_where_it_is_cheapest(back: bool) -> None:
+def test_a_seat_is_sat_on_where_it_is_cheapest() -> None:
     """The pelvis ends at the edge of its room over the seat, where the rows of that room have a kink."""
     scene = wb.Scene(wb.load("human", sex="male"))
     scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.05, 0.40))
     scene.add(wb.Box((0.03, 0.48, 0.36)), name="back", at=(-0.57, 0.05, 0.84))
-    solution = wb.solve(wb.Problem(scene, goals=[wb.Sit("seat", "back") if back else wb.Sit("seat")]))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Sit("seat", "back")]))
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY
 

@@ -255,11 +255,11 @@ def random_term(rng, scene):
 
 
 def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
-    """Random terms at random postures: 30 problems, 3 postures each, with and without a time step."""
+    """Random terms at random postures: 15 problems, 3 postures each, with and without a time step."""
     rng, rows = np.random.default_rng(3), 0
     pin.seed(3)
     scene = problem.scene
-    for number in range(30):
+    for number in range(15):
         terms = [random_term(rng, scene) for _ in range(int(rng.integers(1, 7)))]
         asked = wb.Problem(
             scene,
@@ -277,7 +277,7 @@ def test_the_compiled_pass_is_the_plain_one_entry_by_entry(problem):
             found = lineariser.at(q, 0.08)
             assert_same(found, plain.at(q, 0.08))
             rows += len(found.gap) + len(found.goal_error) + len(found.value)
-    assert rows > 2500
+    assert rows > 1200
 
 
 def test_reach_cones_roots_and_heights_are_in_the_plan(problem):

@@ -80,7 +80,7 @@ def test_the_viewer_takes_an_assembly(tmp_path: object) -> None:
         viewer.show(made.q[:7])
 
 
-@pytest.mark.parametrize("speed", [1.0, 5.0, 12.0, 20.0])
+@pytest.mark.parametrize("speed", [1.0, 20.0])
 def test_a_plate_that_flies_by_pushes_a_ball_or_is_named(speed: float) -> None:
     dt = 1.0 / 60.0
     made = wb.Assembly().body("ball", (0, 0, 0), shape=wb.Sphere(0.05))
@@ -106,8 +106,8 @@ def test_a_plate_through_a_body_that_cannot_give_way_is_named() -> None:
     assert [{one.first, one.second} for one in frame.collisions] == [{"ball", "plate"}]
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_bodies_that_are_pushed_about_are_in_nothing_and_pass_through_nothing(seed: int) -> None:
+def test_bodies_that_are_pushed_about_are_in_nothing_and_pass_through_nothing() -> None:
+    seed = 0
     made = (
         wb.Assembly().add(wb.HalfSpace(), name="floor").add(wb.Box((0.3, 0.3, 0.3)), name="block", at=(0.5, 0.1, 0.15))
     )

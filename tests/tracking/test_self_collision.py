@@ -70,8 +70,9 @@ def through_each_other(avatar: wb.Figure) -> list[Any]:
     return [front, avatar.with_joints(front, crossed), front]
 
 
-@pytest.mark.parametrize(("overlap", "allowed"), [("ccd", 1e-3), ("qp", 1e-4)])
-@pytest.mark.parametrize("limbs", [through_the_torso, through_each_other])
+@pytest.mark.parametrize(
+    ("limbs", "overlap", "allowed"), [(through_the_torso, "ccd", 1e-3), (through_each_other, "qp", 1e-4)]
+)
 def test_no_limb_enters_the_body(avatar: wb.Figure, limbs: Callable[..., Any], overlap: str, allowed: float) -> None:
     scene = wb.Scene(avatar)
     there, inside, back = limbs(avatar)

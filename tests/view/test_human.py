@@ -19,11 +19,8 @@ from wholebody.view.surface import surface_of
 pytestmark = pytest.mark.browser
 
 
-@pytest.mark.parametrize("detail", ["capsules", "hulls"])
-def test_the_human_in_a_scene_is_where_pinocchio_says(
-    detail: str, browser: Browser, as_pinocchio_says: Any, nodes: Any
-) -> None:
-    figure = load("human", detail=detail)
+def test_the_human_in_a_scene_is_where_pinocchio_says(browser: Browser, as_pinocchio_says: Any, nodes: Any) -> None:
+    figure = load("human", detail="hulls")
     scene = Scene(figure)
     scene.add(HalfSpace((0.0, 0.0, 1.0)), name="floor")
     scene.add(Box((0.5, 1.2, 0.03)), name="table", at=(0.6, 0.0, 0.75))

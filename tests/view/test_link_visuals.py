@@ -102,6 +102,16 @@ def test_large_meshes_are_thinned_by_at_most_a_cell(tmp_path: Path) -> None:
     assert color is None
 
 
+def test_a_mirrored_mesh_keeps_its_outer_side(tmp_path: Path) -> None:
+    path = tmp_path / "cone.stl"
+    trimesh.creation.cone(0.1, 0.2).export(path)
+    for scale in ((1.0, 1.0, 1.0), (1.0, -1.0, 1.0), (-1.0, -1.0, -1.0)):
+        ((vertices, faces, _),) = mesh_parts(str(path), scale)
+        corners = vertices[faces]
+        signed = np.einsum("ni,ni->n", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])).sum() / 6.0
+        assert signed == pytest.approx(np.pi * 0.01 * 0.2 / 3.0, rel=0.02)
+
+
 def test_a_link_in_contact_is_tinted(robot: wb.Figure) -> None:
     scene = wb.Scene(robot)
     bodies, graph = Bodies(scene, (), False), SceneGraph()

@@ -39,6 +39,15 @@ TIME_STEP_ASKED = f"give one between {TIME_STEP[0]:g} and {TIME_STEP[1]:g} s"
 LONGEST_LIKELY = 10.0
 """Seconds of a step beyond which a number of frames a second was probably meant."""
 
+MOST_TURNED = 4.0 * math.pi
+"""Radians, two turns, beyond which degrees were probably meant."""
+
+FASTEST_TURN = 50.0
+"""Radians a second beyond which a limit was probably meant in degrees a second."""
+
+UNLIMITED = 1e4
+"""Radians, radians a second or metres from which on a limit stands for none: some files write 1e16."""
+
 LONGEST = 200
 """Characters of a name or a title."""
 
@@ -114,6 +123,13 @@ def warn(told: str) -> None:
     while frame is not None and frame.f_code.co_filename.startswith(_INSIDE):
         frame, level = frame.f_back, level + 1
     warnings.warn(told, stacklevel=level)
+
+
+def warn_of_degrees(value: float, what: str, likely: float = MOST_TURNED, unit: str = "rad") -> None:
+    """Warn where an angle [rad], or a speed [rad/s], is beyond what is likely, so that degrees were probably meant."""
+    if likely < abs(value) < UNLIMITED:
+        degrees = unit.replace("rad", "degrees")
+        warn(f"{what} is {value:g} {unit}; {value:g} {degrees} are {math.radians(value):.4g} {unit}")
 
 
 def unit_hint(value: float, low: float, high: float, unit: str) -> str:

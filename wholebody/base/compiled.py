@@ -31,7 +31,7 @@ TOGETHER = (
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
         "wholebody.methods.newton.linear_algebra.normal_equations",
-        "wholebody.motion.trajectory.band",
+        "wholebody.motion.trajectory.banded_kernel",
     ),
     (
         "wholebody.methods.qp.escaping",

@@ -78,13 +78,18 @@ class TermError(InputError):
 
 
 class UndefinedTermError(TermError):
-    """A term of one's own has a value or derivative that is not finite at a posture; it may be at others."""
+    """A term of one's own has a value or derivative that is not finite at a posture; it may be at others.
+
+    Attributes:
+        q: (nq,) the posture; None where it is not known, as in another process.
+    """
 
     WHERE = "at a posture"
+    q: Any = None
 
-    def of_iteration(self, number: int) -> str:
-        """The sentence, of the posture of an iteration."""
-        return str(self).replace(self.WHERE, f"{self.WHERE} of iteration {number}", 1)
+    def told_of(self, which: str) -> str:
+        """The sentence, with which posture it is, such as "of iteration 3"."""
+        return str(self).replace(self.WHERE, f"{self.WHERE} {which}", 1)
 
 
 class UnknownNameError(WholebodyError, KeyError):

@@ -6,6 +6,7 @@ one sentence each. All code that writes files uses it too.
 
 from __future__ import annotations
 
+import csv
 import fcntl
 import os
 import re
@@ -87,6 +88,29 @@ def read_text(path: str | PathLike[str], kind: str = "file", largest: int = LARG
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
         raise FileFormatError(f"{kind} {_named(path)}, line {line}: is no UTF-8 text; save it in UTF-8") from None
+
+
+def read_foreign_text(path: str | PathLike[str], kind: str = "file", largest: int = LARGEST_TEXT) -> str:
+    """Read a text of another program: UTF-8, UTF-16 with its mark, or else Latin-1, without an end mark of DOS.
+
+    Raises:
+        FileFormatError: as for `read_bytes`, or the text in UTF-16 is cut.
+    """
+    data = read_bytes(path, kind, largest)
+    try:
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            return data.decode("utf-16").rstrip("\x1a\0")
+        return data.decode("utf-8-sig").rstrip("\x1a\0")
+    except UnicodeDecodeError:
+        if data.startswith((b"\xff\xfe", b"\xfe\xff")):
+            raise FileFormatError(f"{kind} {_named(path)}: its text in UTF-16 is cut; get it whole") from None
+        return data.decode("latin-1").rstrip("\x1a\0")
+
+
+def packaged_table(path: Path) -> tuple[dict[str, str], ...]:
+    """The rows of a CSV file of the package, each a mapping from column to text; a line that begins with # is none."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
 
 
 def parsed_toml(text: str, name: str) -> dict[str, Any]:

@@ -122,9 +122,11 @@ def lift_between(
     """
     person = check_person(figure, "lift_between: figure")
     floor = checks.number(floor, "lift_between: floor", -100.0, 100.0, "m")
-    found = [
-        _hands(person, checks.posture(q, person.model.nq, "lift_between: a posture")) for q in (origin, destination)
-    ]
+    found = []
+    for name, q in (("origin", origin), ("destination", destination)):
+        posture = checks.posture(q, person.model.nq, f"lift_between: {name}")
+        person.warn_of_angles(posture, f"lift_between: {name}")
+        found.append(_hands(person, posture))
     travel = abs(found[1][1] - found[0][1])
     first, second = (
         Lift(h, max(v - floor, 0.0), travel, a, frequency, duration, coupling, load) for h, v, a in found

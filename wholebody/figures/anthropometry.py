@@ -8,7 +8,6 @@ of every column.
 
 from __future__ import annotations
 
-import csv
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -22,6 +21,7 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.fields import Range
+from wholebody.base.files import packaged_table
 
 STATURE = Range(1.3, 2.2, "m")
 """The fits come from adults of 1.4 to 2.0 m; beyond this range they are invalid."""
@@ -238,7 +238,8 @@ def table(name: str) -> tuple[Row, ...]:
 
     Args:
         name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones", "coupled_ranges", "hand", "fit", "residuals", "dimensions", "correlations" or "age_ranges".
+            "reach_cones", "coupled_ranges", "hand", "fit", "residuals", "dimensions", "correlations", "age_ranges" or
+            "strength".
 
     Raises:
         UnknownNameError: there is no such table.
@@ -246,8 +247,7 @@ def table(name: str) -> tuple[Row, ...]:
     path = FOLDER / f"{name}.csv"
     if not path.is_file():
         raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
-    with path.open(encoding="utf-8", newline="") as file:
-        return tuple(csv.DictReader(line for line in file if not line.startswith("#")))
+    return packaged_table(path)
 
 
 @cache

@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import warn
+from wholebody.base.checks import MOST_TURNED, warn
 
 FAR_OUT = 1.0
 """Radians beyond a limit from which a value was probably meant in degrees."""
-
-MOST_TURNED = 4.0 * np.pi
-"""Radians, two turns: a joint without limits that is turned farther was probably meant in degrees."""
 
 SLIDING = "JointModelP"
 """How the names of Pinocchio's prismatic joints begin."""
@@ -36,13 +33,18 @@ class Turning:
 
     def warn(self, q: Array, what: str) -> bool:
         """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
-        values = np.atleast_2d(q)[:, self._places]
-        beyond = np.maximum(self._low - values, values - self._high)
-        if not beyond.size or not float(beyond.max()) > FAR_OUT:
+        rows = np.atleast_2d(q)
+        if not len(rows) or not len(self._places):
             return False
-        frame, column = (int(k) for k in np.unravel_index(int(np.argmax(beyond)), beyond.shape))
+        least, most = rows.min(axis=0)[self._places], rows.max(axis=0)[self._places]  # no copy of a clip of hours
+        beyond = np.maximum(self._low - least, most - self._high)
+        column = int(np.argmax(beyond))
+        if not float(beyond[column]) > FAR_OUT:
+            return False
+        values = rows[:, self._places[column]]
+        frame = int(np.argmax(np.maximum(self._low[column] - values, values - self._high[column])))
         where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
-        self._say(where, float(values[frame, column]), column)
+        self._say(where, float(values[frame]), column)
         return True
 
     def warn_of(self, name: str, value: float, place: int, q: Array) -> None:
@@ -53,12 +55,6 @@ class Turning:
 
     def _say(self, where: str, value: float, column: int) -> None:
         warn(_as_degrees(where, value, float(self._limits[0][column]), float(self._limits[1][column])))
-
-
-def warn_of_turns(name: str, value: float) -> None:
-    """Warn where the value of a joint without limits is more than two turns."""
-    if abs(value) > MOST_TURNED:
-        warn(_as_degrees(f"joint {name!r}", value, -np.inf, np.inf))
 
 
 def _as_degrees(what: str, value: float, low: float, high: float) -> str:

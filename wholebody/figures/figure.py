@@ -15,7 +15,7 @@ from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.base.pool import Pool
 from wholebody.base.records import as_dict
 from wholebody.figures.body_spec import geometry_of
-from wholebody.figures.degrees import Turning, warn_of_turns
+from wholebody.figures.degrees import Turning
 from wholebody.figures.description import ROOT_JOINT, Description, followers_of, limits_of
 from wholebody.figures.grounding import SceneLike, grounded
 from wholebody.figures.model_check import LARGEST, check_model
@@ -289,7 +289,7 @@ class Figure(checks.FixedAttributes):
                 q[joint.idx_q] = value
                 self._turning.warn_of(name, value, joint.idx_q, q)
             elif (joint.nq, joint.nv) == (2, 1):
-                warn_of_turns(name, value)
+                checks.warn_of_degrees(value, f"joint {name!r}")
                 q[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             else:
                 raise InputError(

@@ -26,7 +26,7 @@ from wholebody.geometry.pieces import LARGEST, SMALLEST
 CYLINDER_SIDES = 32
 """A cylinder becomes a prism around it with this many sides; its corners protrude by 0.5 % of the radius."""
 
-WHOLE_IN_ONE_FILE = (".obj", ".stl", ".glb", ".dae")
+WHOLE_IN_ONE_FILE = (".obj", ".stl", ".ply", ".glb", ".dae")
 """Kinds of mesh files whose triangles are all in the file itself, so that its content identifies them."""
 
 _log = logging.getLogger(__name__)

@@ -34,7 +34,8 @@ def load(spec: str | PathLike[str], **options: Any) -> Figure:
             for "hand": `side` ("left", "right"), `sex`, `stature`, `mass`, `percentile`;
             for a file: `root` ("fixed", "free"), `package_dirs`, folders for ``package://`` names, and `concavity`,
             a number or a mapping from link to number, which asks for the decomposition of meshes into convex pieces
-            (0.01 is close, 1 is a hull); without it every mesh becomes its convex hull.
+            (0.01 is close, 1 is a hull); without it every mesh becomes its convex hull; for a URDF: `srdf`, the path of
+            its SRDF.
 
     Raises:
         UnknownNameError: an unknown name or option.
@@ -74,7 +75,9 @@ def _check_options(builder: Callable[..., Figure], options: dict[str, Any], wher
     for option, value in options.items():
         if option not in known:
             raise UnknownNameError("option", option, known, where)
-        if option == "package_dirs":
+        if option == "srdf" and value is not None:
+            check_file(str(path(value, f"{where}: {option}")), "SRDF")
+        elif option == "package_dirs":
             folders = (
                 [value] if isinstance(value, (str, PathLike)) else listed(value, f"{where}: {option}", "['share']")
             )

@@ -44,6 +44,7 @@ class Robot(NamedTuple):
         frames: names of more frames for goals.
         postures: named postures of the file, (nq,).
         cones: limits of ball joints.
+        groups: named groups of joints; "all" is added.
         untested: why two pieces, by their numbers, are never tested by the file; None where it does not say.
         place: of a free root in the first posture.
     """
@@ -57,6 +58,7 @@ class Robot(NamedTuple):
     frames: tuple[str, ...] = ()
     postures: Mapping[str, Array] = MappingProxyType({})
     cones: Mapping[str, JointCone] = MappingProxyType({})
+    groups: Mapping[str, tuple[str, ...]] = MappingProxyType({})
     untested: Callable[[int, int], str | None] | None = None
     place: pin.SE3 | None = None
 
@@ -85,7 +87,7 @@ def robot_figure(robot: Robot, samples: int, seed: int) -> Figure:
         postures["zero"] = partial(_copied, q=rest.zero)
     postures |= {name: partial(_copied, q=q) for name, q in robot.postures.items() if name not in postures}
     description = Description(
-        groups={"all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
+        groups={**robot.groups, "all": tuple(name for name in list(model.names)[1:] if name != ROOT_JOINT)},
         chains=link_chains(model, links),
         frames=(*links, *robot.frames),
         segments=tuple(link for link in links if link in carrying) or links,

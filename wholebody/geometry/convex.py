@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.base.records import with_values
+from wholebody.geometry.closing import closed_up
 from wholebody.geometry.components import Component, enclosed_volume, split_components
 from wholebody.geometry.convexity import is_convex, passes_through_itself
 from wholebody.geometry.hull import hull_piece, thickened
@@ -50,9 +51,9 @@ def convex_pieces(
     A mesh whose triangles cover its convex hull, in whatever order and orientation and however often, is that hull.
     Another one is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
     another closed part (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
-    and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part with holes
-    in its surface has no inside, so its hull is used. A flat part is thickened to twice `SMALLEST`. `notes` reports
-    this.
+    and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part that lacks
+    faces is closed first; of a shell, which encloses nothing, every triangle is thickened (see `geometry.closing`). A
+    flat part is thickened to twice `SMALLEST`. `notes` reports this.
 
     Args:
         vertices: (n, 3), metres.
@@ -138,7 +139,7 @@ def check_mesh(vertices: ArrayLike, faces: ArrayLike, what: str) -> tuple[Array,
 
 @lru_cache(maxsize=DECOMPOSED_AT_MOST)
 def _decomposed(vertices: bytes, faces: bytes, max_vertices: int, threshold: float, what: str) -> ConvexPieces:
-    settings = f"decomposed {max_vertices} {threshold!r} {coacd_version()}"
+    settings = f"decomposed and closed {max_vertices} {threshold!r} {coacd_version()}"
     return cached((vertices, faces), settings, what, lambda: _decompose(vertices, faces, max_vertices, threshold, what))
 
 
@@ -168,7 +169,9 @@ def _decompose(vertices: bytes, faces: bytes, max_vertices: int, threshold: floa
     child = Child()  # begins to run at the first part that needs it
     try:
         for number, part in enumerate(split_components(cloud, triangles)):
-            made = _part_pieces(part, max_vertices, threshold, f"{what}, part {number}", notes, child)
+            name = f"{what}, part {number}"
+            part = part if part.closed else _closed(part, name, notes)
+            made = _part_pieces(part, max_vertices, threshold, name, notes, child)
             pieces += made
             if part.closed:
                 before += part.volume
@@ -188,8 +191,7 @@ def _part_pieces(
     except InputError:
         return _thickened(part.vertices, name, notes)
     if not part.closed:
-        notes.append(f"{name}: its surface is not closed ({len(part.faces)} triangles), so its convex hull is taken")
-        return [whole]
+        return _shell(part, name, notes)
     if whole.volume - part.volume <= CONVEX_VOLUME * part.volume:
         return [whole]
     pieces: list[Piece] = []
@@ -199,6 +201,29 @@ def _part_pieces(
         except InputError:
             pieces += _thickened(corners, name, notes)
     return pieces
+
+
+def _closed(part: Component, name: str, notes: list[str]) -> Component:
+    """The part with what it lacks of its surface; the same if it is a shell."""
+    found = closed_up(part)
+    if found is None:
+        return part
+    if found.loops:
+        notes.append(f"{name}: its surface is not closed: {found.loops} hole{'s' * (found.loops > 1)} closed")
+    return found.part
+
+
+def _shell(part: Component, name: str, notes: list[str]) -> list[Piece]:
+    """Every triangle of a surface that encloses nothing, thickened; those without an area are left out."""
+    a, b, c = (part.vertices[part.faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    length = np.linalg.norm(across, axis=1)
+    longest = np.linalg.norm(np.stack([b - a, c - b, a - c]), axis=2).max(axis=0)
+    solid = np.flatnonzero(length >= SMALLEST * longest)
+    corners = np.stack([a, b, c], axis=1)
+    offsets = SMALLEST * across / np.maximum(length, 1e-300)[:, None]
+    notes.append(f"{name}: its surface is not closed and encloses nothing, so its {len(solid)} triangles are thickened")
+    return [hull_piece(np.vstack([corners[k] + offsets[k], corners[k] - offsets[k]]), name) for k in solid]
 
 
 def _thickened(points: Array, name: str, notes: list[str]) -> list[Piece]:

@@ -1,8 +1,8 @@
 """Geometry models of thousands of pieces.
 
 Pinocchio keeps an n x n table of pair numbers and copies it whenever a piece is added: 1000 pieces take 0.6 s, 5000
-more than a minute. A model of n empty entries with its pairs can be read from text at once, and its pieces be filled in
-afterwards. The table alone takes 1.6 GB for 20,000 pieces, so models of more than `TABLED` have none.
+more than a minute. A model that counts n pieces, with its pairs, can be read from text at once, and its list of pieces
+be filled afterwards. The table alone takes 1.6 GB for 20,000 pieces, so models of more than `TABLED` have none.
 """
 
 from __future__ import annotations
@@ -32,11 +32,10 @@ def geometry_model(pieces: Sequence[pin.GeometryObject], pairs: Indices | None =
     pairs = np.zeros((0, 2), dtype=np.intp) if pairs is None else pairs
     if len(pieces) < MANY:
         return _one_by_one(pieces, pairs)
-    geometry = _places(len(pieces), None if tabled else pairs)
+    geometry = _counted(len(pieces), None if tabled else pairs)
     if geometry is None:
         return _one_by_one(pieces, pairs)
-    for index, piece in enumerate(pieces):
-        geometry.geometryObjects[index] = piece
+    geometry.geometryObjects.extend(pieces)
     if tabled:
         add_pairs(geometry, pairs)
     return geometry
@@ -58,36 +57,33 @@ def _one_by_one(pieces: Sequence[pin.GeometryObject], pairs: Indices) -> pin.Geo
     return geometry
 
 
-def _places(count: int, given: Indices | None) -> pin.GeometryModel | None:
-    """A model of empty entries; None if this Pinocchio serialises its models in another way.
+def _counted(count: int, given: Indices | None) -> pin.GeometryModel | None:
+    """A model that counts this many pieces and has none yet; None if this Pinocchio serialises in another way.
 
-    With pairs it has these, and no table; otherwise it has a table of no pairs. Each further piece adds the same text
-    to a model's text, and each further pair its two numbers; only counts change.
+    With pairs it has these, and no table; otherwise it has a table of no pairs. In the text of a model its number of
+    pieces comes first; its pairs are their number, what stands before the first of them, and two numbers each.
     """
-    one, two, joined = (_tokens(count, paired) for count, paired in ((1, False), (2, False), (2, True)))
+    none, two, joined = _tokens(0, False), _tokens(2, False), _tokens(2, True)
     pairs = np.zeros((0, 2), dtype=np.intp) if given is None else given
-    added = len(two) - len(one)
-    common = 0
-    while common < len(one) and one[-1 - common] == two[-1 - common]:
-        common += 1
-    at = len(one) - common
-    head = [str(count) if (a, b) == ("1", "2") else a for a, b in zip(one[:at], two[:at], strict=True)]
-    entry = [_ZEROS.get(word, word) for word in two[at : at + added]]  # short numbers are read faster
-    words = [*head, *entry * (count - 1), *one[at:]]
-    if len(pairs):  # their number, then what stands before the first of them
-        number = next((k for k, (a, b) in enumerate(zip(two, joined, strict=False)) if a != b), len(two))
+    words = list(none)
+    words[_first_other(none, two)] = str(count)
+    if len(pairs):
+        number = _first_other(two, joined)
         before = len(joined) - len(two) - 2
         rest = len(two) - number - 1  # words after the number of pairs in a model without pairs
         where = len(words) - rest
         words[where - 1] = str(len(pairs))
-        words[where + 1 : where + 1] = [*joined[number + 2 : number + 2 + before], *map(str, pairs.ravel().tolist())]
+        names = np.array([str(index) for index in range(count)], dtype=object)  # many pairs share them
+        words[where + 1 : where + 1] = [*joined[number + 2 : number + 2 + before], *names[pairs.ravel()].tolist()]
     table = f"{count} {count}{' -1' * count**2}" if given is None else "0 0"
     geometry = pin.GeometryModel()
     try:
         geometry.loadFromString(f"{' '.join(words)} {table}\n")
     except Exception:  # boost's own, of several kinds
         return None
-    whole = geometry.ngeoms == len(geometry.geometryObjects) == count and len(geometry.collisionPairs) == len(pairs)
+    whole = (
+        geometry.ngeoms == count and not len(geometry.geometryObjects) and len(geometry.collisionPairs) == len(pairs)
+    )
     if not whole or any(
         (geometry.collisionPairs[k].first, geometry.collisionPairs[k].second) != tuple(pairs[k].tolist())
         for k in (0, len(pairs) // 2, len(pairs) - 1)
@@ -97,7 +93,9 @@ def _places(count: int, given: Indices | None) -> pin.GeometryModel | None:
     return geometry if geometry.collisionPairMapping.size == (count**2 if given is None else 0) else None
 
 
-_ZEROS = {"0.00000000000000000e+00": "0", "1.00000000000000000e+00": "1"}
+def _first_other(words: list[str], others: list[str]) -> int:
+    """Index of the first word that two texts do not share."""
+    return next((k for k, (a, b) in enumerate(zip(words, others, strict=False)) if a != b), len(words) - 1)
 
 
 def _tokens(count: int, paired: bool) -> list[str]:

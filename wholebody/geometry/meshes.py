@@ -1,4 +1,4 @@
-"""Mesh files: OBJ, STL, glTF, GLB and COLLADA, read through trimesh."""
+"""Mesh files: OBJ, STL, PLY, glTF, GLB and COLLADA, read through trimesh."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from wholebody.base.errors import FileFormatError, InputError, MissingPackageErr
 from wholebody.base.files import check_file
 from wholebody.geometry.convex import check_mesh
 
-SUFFIXES = (".obj", ".stl", ".gltf", ".glb", ".dae")
+SUFFIXES = (".obj", ".stl", ".ply", ".gltf", ".glb", ".dae")
 
 Y_UP: Array = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 """Rotation for files whose y points up (glTF by its standard, and most modelling programs): a quarter turn about x."""
@@ -29,7 +29,7 @@ def read_mesh(path: str | Path) -> tuple[Array, NDArray[np.int64]]:
     """Read all triangles of a file, every object at its placement.
 
     Args:
-        path: an OBJ, STL, glTF, GLB or COLLADA (.dae) file; polygons are cut into triangles.
+        path: an OBJ, STL, PLY, glTF, GLB or COLLADA (.dae) file; polygons are cut into triangles.
 
     Returns:
         vertices (n, 3) in the file's units and axes, faces (m, 3). A COLLADA file that names its unit is converted to
@@ -102,8 +102,7 @@ def _read_scene(path: Path) -> tuple[Any, float]:
         raise FileFormatError(
             f"mesh {path}: {path.suffix or 'no suffix'} is not among {', '.join(SUFFIXES)}; convert the file"
         )
-    if path.stat().st_size == 0:
-        raise FileFormatError(f"mesh {path}: the file is empty")
+    _check_content(path)
     if path.suffix.lower() == ".dae" and find_spec("collada") is None:
         raise MissingPackageError(f"mesh {path}: reading COLLADA files needs pycollada: pip install pycollada")
     quiet = logging.getLogger("trimesh")
@@ -116,6 +115,28 @@ def _read_scene(path: Path) -> tuple[Any, float]:
         raise _unreadable(path, error) from error
     finally:
         quiet.setLevel(level)
+
+
+def _check_content(path: Path) -> None:
+    """Refuse what is no mesh whatever its name says: an empty file, a pointer of Git LFS, a web page, a cut STL."""
+    size = path.stat().st_size
+    if size == 0:
+        raise FileFormatError(f"mesh {path}: the file is empty")
+    with path.open("rb") as file:
+        head = file.read(512)
+    if head.startswith(b"version https://git-lfs"):
+        raise FileFormatError(f"mesh {path}: the file is a pointer of Git LFS, not the mesh; run: git lfs pull")
+    if head.lstrip()[:14].lower().startswith((b"<!doctype html", b"<html")):
+        raise FileFormatError(f"mesh {path}: the file is a web page, not the mesh; download the file itself")
+    if path.suffix.lower() == ".stl" and len(head) >= 84 and not _is_text_stl(head):
+        wanted = 84 + 50 * int.from_bytes(head[80:84], "little")
+        if size < wanted:
+            raise FileFormatError(f"mesh {path}: the file has {size} bytes of {wanted}; it is cut: get it whole")
+
+
+def _is_text_stl(head: bytes) -> bool:
+    """Whether an STL is text: some binary ones begin with "solid" too, and have bytes that no text has."""
+    return head.lstrip().startswith(b"solid") and b"\0" not in head
 
 
 def _unreadable(path: Path, error: Exception) -> FileFormatError:

@@ -18,7 +18,7 @@ from wholebody.base.checks import number
 from wholebody.geometry.guesses import Guesses
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields, placement_view, read_result, result_view
 from wholebody.geometry.single_pairs import KEPT, SinglePairs, pair_data
-from wholebody.geometry.swept_points import SweptPoints, swept_points
+from wholebody.geometry.swept_points import swept_points
 
 COAL_ACCURACY = 1e-6  # m: of coal's distances
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
@@ -110,22 +110,6 @@ class _ContactBuffer:
         return known
 
 
-def _half_boxes(swept: list[SweptPoints], reach: Array) -> Array:
-    """The `half_box` (n, 3) of every piece; that of a ball is its radius."""
-    found = np.repeat(np.minimum(reach, ENDLESS)[:, None], 3, axis=1)
-    for k, piece in enumerate(swept):
-        if len(piece.points) > 1:
-            found[k] = half_box(piece)
-    return found
-
-
-def half_box(swept: SweptPoints) -> Array:
-    """Half the size (3,) of a box about a piece's origin, along the piece's axes, that holds the piece."""
-    if not len(swept.points):
-        return np.full(3, min(swept.reach, ENDLESS))
-    return np.asarray(np.abs(swept.points).max(axis=0) + swept.radius)
-
-
 class PairTable:
     """The pieces and pairs of a geometry model as arrays: what is the same at every posture, and never changes.
 
@@ -163,7 +147,7 @@ class PairTable:
         self.pairs: Indices = pairs
         self.joint: Indices = np.array([piece.parentJoint for piece in geometry.geometryObjects], dtype=np.intp)
         self.reach = np.array([swept.reach for swept in self.swept]).reshape(-1)
-        self.half = _half_boxes(self.swept, self.reach)
+        self.half = np.minimum(np.array([swept.half for swept in self.swept]).reshape(-1, 3), ENDLESS)
         width = np.array([swept.width for swept in self.swept]).reshape(-1)
         self.widths: Array = width[self.pairs].sum(axis=1)
         radius = self.radius = np.array([swept.radius for swept in self.swept]).reshape(-1)

@@ -14,7 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import array, path, shown
+from wholebody.base.checks import array, listed, path, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Checked, Range, Vector
 from wholebody.geometry.convex import check_mesh, convex_pieces
@@ -265,10 +265,25 @@ class Compound(Shape):
     """Shapes that are one thing.
 
     Attributes:
-        parts: each shape, and its placement.
+        parts: each shape, and its placement as a pin.SE3.
+
+    Raises:
+        InputError: other parts, or none.
     """
 
     parts: tuple[tuple[Shape, pin.SE3], ...]
+
+    def __post_init__(self) -> None:
+        wanted = "[(wb.Box((0.1, 0.1, 0.1)), pin.SE3.Identity())]"
+        parts = tuple(listed(self.parts, "Compound parts", wanted))
+        for part in parts:
+            pair = isinstance(part, (tuple, list)) and len(part) == 2
+            placed = pair and isinstance(part[0], Shape) and isinstance(part[1], pin.SE3)
+            if not (placed and np.isfinite(part[1].homogeneous).all()):
+                raise InputError(f"Compound: a part is {shown(part)}; give pairs such as {wanted}")
+        if not parts:
+            raise InputError(f"Compound: there are no parts; give pairs such as {wanted}")
+        object.__setattr__(self, "parts", tuple((shape, pin.SE3(at)) for shape, at in parts))
 
     def pieces(self) -> tuple[Piece, ...]:
         """The pieces of all shapes."""
@@ -297,10 +312,11 @@ class Mesh(Shape):
     """A triangle mesh, split into convex pieces when they are first needed.
 
     Attributes:
-        source: path of an OBJ, STL, glTF, GLB or COLLADA file, a pair of arrays (vertices (n, 3), faces (m, 3)), or
-            an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
+        source: path of an OBJ, STL, PLY, glTF, GLB or COLLADA file, a pair of arrays (vertices (n, 3), faces (m, 3)),
+            or an object that has them as `vertices` and `faces`, such as a trimesh.Trimesh; kept as a pair of arrays.
         scale: metres for each unit of the file: 0.001 for millimetres.
-        up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y.
+        up: axis of the file that points up; with "y" the mesh is rotated: y to z, and the file's z to -y. If left out,
+            "y" for glTF and GLB files, as their standard says, and "z" for everything else.
         max_vertices: most vertices of a piece of a decomposition; convex parts keep all of theirs.
         threshold: concavity of the pieces of a decomposition, as a share of the part's size: smaller is closer, with
             more pieces.
@@ -315,7 +331,7 @@ class Mesh(Shape):
 
     source: str | PathLike[str] | tuple[ArrayLike, ArrayLike] | HasTriangles
     scale: Annotated[float, Range(1e-12, 1e12, wanted="metres for each unit of the file, such as 0.001")] = 1.0
-    up: Literal["z", "y"] = "z"
+    up: Literal["z", "y"] | None = None
     max_vertices: Annotated[int, Range(8, 256, whole=True)] = 32
     threshold: Annotated[float, Range(0.01, 1.0)] = 0.05
     vertices: Array = field(init=False, repr=False)
@@ -323,6 +339,9 @@ class Mesh(Shape):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        if self.up is None:
+            gltf = isinstance(self.source, (str, PathLike)) and str(self.source).lower().endswith((".gltf", ".glb"))
+            object.__setattr__(self, "up", "y" if gltf else "z")
         if not isinstance(self.source, (str, PathLike, tuple, list)) and isinstance(self.source, HasTriangles):
             object.__setattr__(self, "source", (self.source.vertices, self.source.faces))
         if isinstance(self.source, (str, PathLike)):

@@ -7,6 +7,7 @@ next when the posture changes; one witness point cannot show that (see `wholebod
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import coal
@@ -26,6 +27,7 @@ class SweptPoints(NamedTuple):
         reach: radius about the piece's origin that contains the piece; inf for a half-space.
         axis: unit direction of a capsule, zero for everything else.
         width: least distance between two parallel planes that enclose the piece; inf for a half-space.
+        half: (3,) half the size of a box about the piece's origin, along its axes, that contains it.
     """
 
     points: Array
@@ -34,12 +36,16 @@ class SweptPoints(NamedTuple):
     reach: float
     axis: Array
     width: float
+    half: Array
 
 
 _NONE = np.zeros((0, 3))
 _NO_FACES = np.zeros((0, 4))
 _NO_AXIS = np.zeros(3)
+_CENTER = np.zeros((1, 3))
+_ALONG = np.array([0.0, 0.0, 1.0])
 _CORNERS = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)])
+_SIDES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
 def swept_points(geometry: Any) -> SweptPoints:
@@ -49,29 +55,31 @@ def swept_points(geometry: Any) -> SweptPoints:
         InputError: another kind of geometry, which has no exact distance here.
     """
     if isinstance(geometry, coal.Sphere):
-        return SweptPoints(
-            np.zeros((1, 3)), geometry.radius, _NO_FACES, geometry.radius, _NO_AXIS, 2.0 * geometry.radius
-        )
+        radius = geometry.radius
+        return SweptPoints(_CENTER, radius, _NO_FACES, radius, _NO_AXIS, 2.0 * radius, np.full(3, radius))
     if isinstance(geometry, coal.Capsule):
-        half = geometry.halfLength
+        half, radius = geometry.halfLength, geometry.radius
         points = np.array([[0.0, 0.0, -half], [0.0, 0.0, half]])
         caps = np.array([[0.0, 0.0, 1.0, half], [0.0, 0.0, -1.0, half]])
-        along = np.array([0.0, 0.0, 1.0])
-        return SweptPoints(points, geometry.radius, caps, half + geometry.radius, along, 2.0 * geometry.radius)
+        box = np.array([radius, radius, half + radius])
+        return SweptPoints(points, radius, caps, half + radius, _ALONG, 2.0 * radius, box)
     if isinstance(geometry, coal.Box):
-        half = np.array(geometry.halfSide)
-        faces = np.vstack([np.column_stack([np.eye(3), half]), np.column_stack([-np.eye(3), half])])
-        return SweptPoints(_CORNERS * half, 0.0, faces, float(np.linalg.norm(half)), _NO_AXIS, 2.0 * float(half.min()))
+        box = np.array(geometry.halfSide)
+        faces = np.empty((6, 4))
+        faces[:, :3], faces[:3, 3], faces[3:, 3] = _SIDES, box, box
+        return SweptPoints(_CORNERS * box, 0.0, faces, math.hypot(*box), _NO_AXIS, 2.0 * min(box.tolist()), box)
     if isinstance(geometry, coal.Ellipsoid):
-        radii = geometry.radii
-        return SweptPoints(_NONE, 0.0, _NO_FACES, float(np.max(radii)), _NO_AXIS, 2.0 * float(np.min(radii)))
+        radii = np.array(geometry.radii)
+        return SweptPoints(_NONE, 0.0, _NO_FACES, float(radii.max()), _NO_AXIS, 2.0 * float(radii.min()), radii)
     if isinstance(geometry, coal.Halfspace):
-        return SweptPoints(_NONE, 0.0, np.array([[*geometry.n, geometry.d]]), np.inf, _NO_AXIS, np.inf)
+        face = np.array([[*geometry.n, geometry.d]])
+        return SweptPoints(_NONE, 0.0, face, np.inf, _NO_AXIS, np.inf, np.full(3, np.inf))
     if isinstance(geometry, coal.Convex):
         points = np.array(geometry.points())
         faces = _convex_faces(geometry, points)
         width = float((faces[:, 3] - (points @ faces[:, :3].T).min(axis=0)).min())
-        return SweptPoints(points, 0.0, faces, float(np.linalg.norm(points, axis=1).max()), _NO_AXIS, width)
+        reach = float(np.linalg.norm(points, axis=1).max())
+        return SweptPoints(points, 0.0, faces, reach, _NO_AXIS, width, np.abs(points).max(axis=0))
     raise InputError(
         f"{type(geometry).__name__} is not a convex piece; use Box, Sphere, Capsule, Ellipsoid, HalfSpace, Hull or Mesh"
     )

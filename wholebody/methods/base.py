@@ -203,6 +203,7 @@ class SolvingTracker(NotCopyable):
 
     def step(self, q: Array) -> SolvedStep:
         """A whole solve from the posture q (nq,); what things that moved meanwhile met is named."""
+        q = begun(self.problem, q)
         self.workspace.refresh()
         motion, step = self.workspace.next_frame(q), self.frame(q)
         if motion is None:
@@ -255,6 +256,17 @@ class SolvesAnew:
             InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
         return SolvingTracker(self, problem, dt)
+
+
+def begun(problem: Problem, q: Array) -> Array:
+    """The posture (nq,) at which a step begins; an angle that was probably meant in degrees is said.
+
+    Raises:
+        InputError: q is no posture.
+    """
+    q = posture(q, problem.scene.model.nq)
+    problem.scene.figure.warn_of_angles(q, "step: q")
+    return q
 
 
 def judged(workspace: Workspace, motion: FrameMotion, before: Array, after: Array) -> tuple[Collision, ...]:

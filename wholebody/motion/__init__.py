@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING
 from wholebody.base.lazy import exported
 
 if TYPE_CHECKING:
-    from wholebody.motion.avoidance import AvoidanceReport, Avoided
     from wholebody.motion.batch import BatchProgress, avoid_many, read_many
     from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip_torques import Torques, torques
     from wholebody.motion.fade import Fade
+    from wholebody.motion.judging import AvoidanceReport, Avoided
     from wholebody.motion.motion_bounds import MotionBounds
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_skeleton
-    from wholebody.motion.ready_equipment import equipment
     from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.motion.stance import StanceFeet
     from wholebody.motion.strength import Strength
     from wholebody.motion.trajectory.method import Trajectory
-    from wholebody.motion.worn_equipment import Equipment
+    from wholebody.motion.worn_equipment import Equipment, equipment
 
 __all__ = [
     "AvoidanceReport",
@@ -50,7 +49,7 @@ __all__ = [
 __getattr__, __dir__ = exported(
     __name__,
     {
-        "wholebody.motion.avoidance": "AvoidanceReport Avoided",
+        "wholebody.motion.judging": "AvoidanceReport Avoided",
         "wholebody.motion.batch": "BatchProgress avoid_many read_many",
         "wholebody.motion.batch_table": "AvoidedCase",
         "wholebody.motion.bisection.method": "Bisection",
@@ -60,11 +59,10 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.motion_bounds": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",
-        "wholebody.motion.ready_equipment": "equipment",
         "wholebody.motion.skeleton": "SkeletonMotion",
         "wholebody.motion.stance": "StanceFeet",
         "wholebody.motion.strength": "Strength",
         "wholebody.motion.trajectory.method": "Trajectory",
-        "wholebody.motion.worn_equipment": "Equipment",
+        "wholebody.motion.worn_equipment": "Equipment equipment",
     },
 )

@@ -1,42 +1,40 @@
-"""`wb.avoid`: free a clip of collisions, by any method, judged independently of it."""
+"""`wb.avoid`: free a clip of collisions, by any method, with one repair of what it leaves and one judge.
+
+clip -> check -> method -> repair -> judge -> smoothing of what is too rough -> judge -> report
+"""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
+import pinocchio as pin
 
-from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
-from wholebody.base.checks import a, flag, instance, listed, shown
+from wholebody.base.checks import a, flag, function, instance, listed, shown
 from wholebody.base.errors import InputError, UndefinedTermError, UnknownNameError
 from wholebody.base.records import with_values
 from wholebody.methods.control import ctrl_c_ends_all
-from wholebody.motion.avoider import Avoider, MethodResult, Progress, Watch, check_input, has_setting
-from wholebody.motion.checking import ClipCheck, check
+from wholebody.motion.avoider import Avoider, MethodResult, Progress, Run, Watch, has_setting
+from wholebody.motion.checking import ClipCheck, check, same_joints
 from wholebody.motion.clip import Clip
-from wholebody.motion.clip_torques import torques
+from wholebody.motion.clip_torques import load_change, torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
-from wholebody.motion.load_change import LoadChange, load_change
-from wholebody.motion.motion_bounds import MotionBounds, excess, resolved
+from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
+from wholebody.motion.motion_bounds import MotionBounds, resolved
 from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
-from wholebody.tasks.base import Bound, filled
-
-COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
-FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
-HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
-ROUNDING = 1e-6  # rad, m: by which limits may be missed
-SAME = 1e-9  # rad, m: a posture that is no farther from another one is the same
+from wholebody.tasks import Freeze
+from wholebody.tasks.base import Bound
 
 METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
     {
@@ -47,93 +45,6 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
     }
 )
 """Methods by name: module and class of the settings."""
-
-
-@dataclass(frozen=True, repr=False)
-class AvoidanceReport:
-    """What a method did to a clip, and what it left.
-
-    Attributes:
-        solved: whether the clip is free, limits hold and what is held is missed by at most 1 mm or 1 mrad, by a check
-            that shares nothing with the methods.
-        message: one sentence that says what is left, or that all is free.
-        method: name of the method.
-        seconds: wall time of the method, without the judgement.
-        posture_solves: how many postures were solved for on their own.
-        programs: how many quadratic programs were solved.
-        frames_changed: how many postures are others than those of the clip before at the same place of its timing.
-        missed: largest miss of a constraint in any frame, metres or radians.
-        stretch: factor by which the clip was slowed most, anywhere; 1 where its timing is as it was.
-        duration: of the answer, seconds.
-        times: (m,) seconds of the clip as it was at which each frame of the answer is.
-        before: the check of the clip as it was.
-        after: the check of the answer.
-        loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
-        beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
-            held at there, metres; 0 where nothing does.
-        jerk: largest root mean square jerk over half a second, in parts of the original's; see `MotionBounds`.
-        speed: largest speed of a joint, in parts of the original's nearby; see `wb.motion.MotionBounds`.
-        deviation: largest change of a posture that was free, radians or metres.
-        smoothed: windows of frames that were too rough and were made smooth after the method.
-        rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
-    """
-
-    solved: bool
-    message: str
-    method: str
-    seconds: float
-    posture_solves: int
-    programs: int
-    frames_changed: int
-    missed: float
-    stretch: float
-    duration: float
-    times: Array
-    before: ClipCheck
-    after: ClipCheck
-    loads: LoadChange | None = None
-    beside: float = 0.0
-    jerk: float = 1.0
-    speed: float = 1.0
-    deviation: float = 0.0
-    smoothed: int = 0
-    rough: bool = False
-
-    def __str__(self) -> str:
-        """Three lines: what is left, before and after, and what it took."""
-        was, now = self.before, self.after
-        return (
-            f"{'free' if self.solved else 'not free'}: {self.message}\n"
-            f"frames in collision {was.colliding} before, {now.colliding} after; deepest {1e3 * was.deepest:.2f} mm "
-            f"before, {1e3 * now.deepest:.2f} mm after; {now.dips} dips between frames\n"
-            f"{self.method}: {self.seconds:.2f} s, {self.programs} programs, {self.posture_solves} postures; "
-            f"{self.frames_changed} of {len(now.clip)} frames changed"
-        )
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"AvoidanceReport({self.method!r}, solved={self.solved}, {self.message!r})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Avoided:
-    """The answer of `avoid`.
-
-    Attributes:
-        clip: the clip that the method made.
-        report: what is known of it.
-    """
-
-    clip: Clip
-    report: AvoidanceReport
-
-    def __str__(self) -> str:
-        """The name of the clip, and the three lines of its report."""
-        return f"{self.clip.name}, {self.report}"
-
-    def __repr__(self) -> str:
-        """One line."""
-        return f"Avoided({self.clip.name!r}, {self.report!r})"
 
 
 def avoider_named(name: str) -> Avoider:
@@ -209,65 +120,108 @@ def avoid(
     """
     instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
     scene = Scene(clip.figure) if scene is None else scene
-    check_input(clip, scene, progress)
-    chosen = as_avoider(method)
+    instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
+    same_joints(clip, scene.figure, "avoid")
+    function(progress, "avoid: progress")
+    chosen = _with_strength(as_avoider(method), dynamics)
     given: tuple[Given, ...] = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
     if flag(hold_feet, "avoid: hold_feet") and not any(isinstance(term, StanceFeet) for term in given):
         given = (*given, StanceFeet()) if has_feet(scene.figure) else given
-    strong = _strength(dynamics)
-    if strong is not None:
-        if not has_setting(chosen, "dynamics"):
-            raise InputError(f"avoid: the method {chosen.name} does not take dynamics; give method='trajectory'")
-        chosen = replace(chosen, dynamics=strong)  # type: ignore[type-var]
-    strong = chosen.dynamics
-    feet = usual_feet(scene.figure, given)
-    loads = None if strong is None else torques(_carried(clip, scene), feet=feet, strength=strong)
     flag(keep_ends, "avoid: keep_ends")
-    was = check(clip, scene, depth=COLLISION)
-    asked, given = _bounds(clip, given, was, frame_terms(scene, clip.q, clip.dt, given, chosen.clearance), keep_ends)
-    terms = frame_terms(scene, clip.q, clip.dt, given, chosen.clearance)
-    watch = Watch(progress)
-    told = None if progress is None else lambda now: watch.tell(now.share, now.note)
-    began = time.perf_counter()
-
-    def reported(result: MethodResult) -> AvoidanceReport:
-        change = None
-        if strong is not None and loads is not None:
-            places = None if result.times is None else result.times / clip.dt
-            change = load_change(loads, _carried(clip.with_q(result.q), scene), places, strong, feet)
-        return _report(was, clip.with_q(result.q), terms, result, chosen.name, asked, change)
-
-    try:
-        with ctrl_c_ends_all():
-            result = chosen.avoid(clip, scene, given, told)
-        seconds, report = time.perf_counter() - began, reported(result)
-    except UndefinedTermError as error:  # terms of one's own are finite at the original postures, if nowhere else
-        result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {error}")
-        seconds, report = time.perf_counter() - began, replace(reported(result), solved=False)
-    # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
-    if report.rough and result.times is None and strong is None and not watch.ended:
-        from wholebody.motion.smoothing import smoothed  # it loads scipy.sparse
-
+    judge = _Judge(clip, scene, chosen, given, keep_ends)
+    with scene.borrow() as workspace:
+        run = Run(clip, judge.terms, workspace, chosen.clearance, Watch(progress), judge.feet)
         began = time.perf_counter()
-        with ctrl_c_ends_all(), suppress(UndefinedTermError):  # what it was before stays
-            found = smoothed(clip, result.q, asked, terms, chosen.clearance, watch)
-            smooth = with_values(result, q=found.q, programs=result.programs + found.programs)
-            other = reported(smooth)
-            if found.windows and (other.solved or other.rough):
-                result, report = smooth, replace(other, smoothed=found.windows)
-        seconds += time.perf_counter() - began
+        try:
+            with ctrl_c_ends_all():
+                result = freed(chosen, run)
+            seconds, report = time.perf_counter() - began, judge.report(result, run)
+        except UndefinedTermError as error:  # terms of one's own are finite at the original postures, if nowhere else
+            why = str(error) if error.q is None else error.told_of(f"near frame {_nearest(clip, error.q)}")
+            result = MethodResult(clip.q.copy(), message=f"the postures stay as they were: {why}")
+            seconds, report = time.perf_counter() - began, replace(judge.report(result, run), solved=False)
+        # what is not free, or held, is not worth the time; a new timing, or loads, would be others after it
+        if report.rough and result.times is None and chosen.dynamics is None and not run.ended:
+            from wholebody.motion.repair import smoothed  # it loads scipy.sparse
+
+            began = time.perf_counter()
+            with ctrl_c_ends_all(), suppress(UndefinedTermError):  # what it was before stays
+                found = smoothed(run, result.q, judge.asked)
+                smooth = with_values(result, q=found.q)
+                other = judge.report(smooth, run)
+                if found.windows and (other.solved or other.rough):
+                    result, report = smooth, replace(other, smoothed=found.windows)
+            seconds += time.perf_counter() - began
     return Avoided(clip.with_q(result.q), replace(report, seconds=seconds))
 
 
-def _carried(clip: Clip, scene: Scene) -> Clip:
-    """A clip of the scene's figure, with what it carries."""
-    return Clip(scene.figure, clip.q, clip.dt, clip.name)
+def _nearest(clip: Clip, q: Array) -> int:
+    """The frame whose posture is nearest to one (nq,)."""
+    return int(np.argmin([np.linalg.norm(pin.difference(clip.figure.model, frame, q)) for frame in clip.q]))
 
 
-def _bounds(
-    clip: Clip, given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool
-) -> tuple[MotionBounds, tuple[Given, ...]]:
-    """The bounds on jerk, speed and deviation, resolved for a clip, and the terms with them in place of others.
+class _Judge:
+    """What a clip is before it is freed, and what is asked of the answer.
+
+    Attributes:
+        feet: segments or frames on which the figure stands.
+        terms: what holds in each frame.
+        asked: bounds on jerk, speed and deviation, resolved for the clip.
+    """
+
+    def __init__(self, clip: Clip, scene: Scene, method: Avoider, given: tuple[Given, ...], keep_ends: bool) -> None:
+        self._name, self._strength, self.feet = method.name, method.dynamics, usual_feet(scene.figure, given)
+        self._clip = Clip(scene.figure, clip.q, clip.dt, clip.name)  # with what the figure carries
+        self._loads = None
+        if self._strength is not None:
+            self._loads = torques(self._clip, feet=self.feet, strength=self._strength)
+        self._was = check(clip, scene, depth=COLLISION)
+        terms = frame_terms(scene, clip.q, clip.dt, given, method.clearance)
+        self.asked = _bounds(given, self._was, terms, keep_ends)
+        self.terms = replace(terms, largest=self.asked.largest)
+
+    def report(self, result: MethodResult, run: Run) -> AvoidanceReport:
+        """What a method made of the clip."""
+        said = [result.message, "the caller ended it" if run.ended else "", run.work.left_out]
+        result, change = with_values(result, message="; ".join(part for part in said if part)), None
+        if self._loads is not None and self._strength is not None:
+            places = None if result.times is None else result.times / self._clip.dt
+            change = load_change(self._loads, self._clip.with_q(result.q), places, self._strength, self.feet)
+        return judged(self._was, self.terms, self.asked, result, run.work, self._name, change)
+
+
+def freed(method: Avoider, run: Run) -> MethodResult:
+    """What a method makes of a clip, with the shared repair of what it leaves to it."""
+    result = method.avoid(run)
+    if not result.repair or run.ended:
+        return result
+    from wholebody.motion.repair import repaired  # it loads scipy.sparse
+
+    terms, frozen = run.terms, [Freeze(*result.frozen)] if result.frozen else []
+    kept = run.of(replace(terms, given=(*terms.given, *frozen))) if frozen else run
+    q = repaired(kept, result.q)
+    for frame in np.flatnonzero((q != result.q).any(axis=1)).tolist():
+        q[frame] = kept.terms.within(frame, q[frame])
+    return with_values(result, q=q)
+
+
+def _with_strength(method: Avoider, dynamics: object) -> Avoider:
+    """The method with what `dynamics=` asks for.
+
+    Raises:
+        InputError: it does not take dynamics.
+    """
+    strength = dynamics if isinstance(dynamics, Strength) else Strength()
+    if not isinstance(dynamics, Strength) and not flag(dynamics, "avoid: dynamics"):
+        return method
+    if not has_setting(method, "dynamics"):
+        raise InputError(f"avoid: the method {method.name} does not take dynamics; give method='trajectory'")
+    made: Avoider = replace(method, dynamics=strength)  # type: ignore[type-var]
+    return made
+
+
+def _bounds(given: tuple[Given, ...], was: ClipCheck, terms: FrameTerms, keep_ends: bool) -> MotionBounds:
+    """The bounds on jerk, speed and deviation, resolved for a clip.
 
     Raises:
         InputError: two are given.
@@ -275,7 +229,7 @@ def _bounds(
     stated = [term for term in given if isinstance(term, MotionBounds)]
     if len(stated) > 1:
         raise InputError("avoid: constraints has two wb.motion.MotionBounds; give one")
-    asked = stated[0] if stated else MotionBounds()
+    asked, clip = stated[0] if stated else MotionBounds(), was.clip
     asked = replace(asked, keep_ends=True) if keep_ends else asked
     limits, state = terms.scene.figure.limits, terms.scene.state(clip.q[0])
     values = clip.q[:, limits.idx_q]
@@ -286,84 +240,7 @@ def _bounds(
     passed = np.zeros(len(clip), dtype=bool)
     for gap in np.flatnonzero(was.between > was.tolerance):
         passed[gap : gap + 2] = True
-    for gap, pair in enumerate(pairwise(clip.q)):
-        if any(isinstance(term, Bound) for term in terms.given) and terms.past_speed(gap, *pair, state) > 0.0:
+    for gap, pair in enumerate(pairwise(clip.q)) if any(isinstance(term, Bound) for term in terms.given) else ():
+        if terms.past_speed(gap, *pair) > 0.0:
             passed[gap : gap + 2] = True
-    asked = resolved(asked, free, passed)
-    return asked, (*(term for term in given if not isinstance(term, MotionBounds)), asked)
-
-
-def _strength(dynamics: object) -> Strength | None:
-    """What `dynamics=` asks for."""
-    if isinstance(dynamics, Strength):
-        return dynamics
-    return Strength() if flag(dynamics, "avoid: dynamics") else None
-
-
-def _report(
-    was: ClipCheck, after: Clip, terms: FrameTerms, result: MethodResult, method: str, asked: MotionBounds,
-    loads: LoadChange | None,
-) -> AvoidanceReport:  # fmt: skip
-    scene, before = terms.scene, was.clip
-    now = check(after, scene, depth=COLLISION)
-    times = before.times if result.times is None else result.times
-    timed = terms if result.times is None else terms.at(times)
-    seen = excess(before.with_q(timed.q), after, filled(asked, largest=timed.largest))
-    state = scene.state(after.q[0])
-    misses = [timed.worst(frame, state.update(q)) for frame, q in enumerate(after.q)]
-    past = [timed.past_speed(frame, q, following, state) for frame, (q, following) in enumerate(pairwise(after.q))]
-    faster = max(past, default=0.0)
-    at = max(range(len(misses)), key=lambda frame: misses[frame].by)
-    missed = misses[at].by
-    beyond = limit_violation(scene.figure, after.q)
-    left = [] if not result.message else [result.message]
-    if now.colliding:
-        frame = int(np.argmax(now.depth))
-        where = f"{_deepest_pair(now, frame, between=False)} at {frame * after.dt:.2f} s"
-        left.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most: {where}")
-    if now.dips:
-        ends = np.maximum(now.depth[:-1], now.depth[1:])
-        gap = int(np.argmax(np.where(ends <= now.tolerance, now.between, 0.0)))
-        where = f"{_deepest_pair(now, gap, between=True)} from {gap * after.dt:.2f} s on"
-        left.append(f"{now.dips} motions between frames dip, {1e3 * now.between[gap]:.3g} mm deep at most: {where}")
-    if beyond > ROUNDING:
-        left.append(f"a joint limit is missed by {beyond:.3g} rad or m")
-    if missed > HELD:
-        left.append(f"{misses[at].name} is missed by {missed:.3g} m or rad, at {at * after.dt:.2f} s")
-    if faster > FASTER:
-        left.append(
-            f"a speed that was given is exceeded by {faster:.1%} of it, at {past.index(faster) * after.dt:.2f} s"
-        )
-    left += seen.said
-    held = faster <= FASTER and beyond <= ROUNDING and missed <= HELD and (loads is None or loads.kept)
-    held = held and now.free
-    solved = held and not seen.said
-    if loads is not None and not loads.kept:
-        left.append("loads are beyond their bounds")
-    if not (solved or left):
-        left = ["something collides between two frames that collide"]
-    message = "; ".join(left)
-    if solved:
-        said = f"; {method} says: {result.message}" if result.message else ""
-        message = f"nothing collides, in the frames and between them, to 0.1 mm{said}"
-    if result.times is not None:
-        message += f"; slowed from {before.duration:.2f} to {after.duration:.2f} s, by {result.stretch:.3g} at most"
-        fast = now.speeds[0] if now.speeds else None
-        if fast is not None:
-            message += f"; {fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s"
-    if terms.beside:
-        away = f"{1e3 * terms.beside:.3g} mm"
-        message += f"; parts held at each other are too near in the clip: they are held up to {away} beside"
-    if loads is not None:
-        message += f"; {loads}"
-    changed = int((np.abs(after.q - timed.q) > SAME).any(axis=1).sum())
-    return AvoidanceReport(
-        solved, message, method, 0.0, result.posture_solves, result.programs, changed, missed, result.stretch,
-        after.duration, times, was, now, loads, terms.beside, seen.jerk, seen.speed, seen.deviation,
-        rough=held and not solved,
-    )  # fmt: skip
-
-
-def _deepest_pair(found: ClipCheck, place: int, *, between: bool) -> str:
-    """The pair that is deepest in a frame, or in the gap after it."""
-    return max(found.contacts, key=lambda each: (each.between if between else each.depth)[place]).names
+    return resolved(asked, free, passed)

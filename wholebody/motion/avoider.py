@@ -1,17 +1,24 @@
-"""The protocol of methods that free a clip, and what they return."""
+"""The protocol of methods that free a clip: what each of them gets, and what it returns.
+
+`avoid` sets up one `Run`, has the method make postures of it, repairs what the method leaves to the shared repair, and
+judges the answer. So a method has no judge, repair or report of its own.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
+from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
-from wholebody.base.arrays import Array
-from wholebody.base.checks import function, instance
-from wholebody.motion.checking import same_joints
+from wholebody.base.arrays import Array, Mask
 from wholebody.motion.clip import Clip
-from wholebody.motion.frame_terms import Given
+from wholebody.motion.faults import Faults, faults
+from wholebody.motion.following import Follower, Work, freed_posture
+from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.strength import Strength
+from wholebody.motion.windows import Window, windows
 from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
 
 
 class AvoidProgress(NamedTuple):
@@ -30,21 +37,100 @@ Progress = Callable[[AvoidProgress], Any]
 """Called now and then; if it returns True, the method ends with what it has."""
 
 
+class Watch:
+    """Tells the caller how far a method is, and remembers whether the caller ended it.
+
+    Attributes:
+        ended: whether the caller ended it.
+    """
+
+    def __init__(self, progress: Progress | None) -> None:
+        """Take what is called, or None."""
+        self._progress, self.ended = progress, False
+
+    def tell(self, share: float, note: str) -> bool:
+        """Report; whether to end now."""
+        if self._progress is not None and self._progress(AvoidProgress(min(max(share, 0.0), 1.0), note)) is True:
+            self.ended = True
+        return self.ended
+
+    def teller(self, begun: float, share: float, note: str) -> Callable[[float], bool]:
+        """Reports how far a part of the clip is, by the share of it; looking for collisions counts for a tenth."""
+        return lambda part: self.tell(0.1 + 0.9 * (begun + share * part), note)
+
+
+class Run:
+    """One clip while it is freed.
+
+    Attributes:
+        clip: the original.
+        terms: original postures, what holds in each of them, figure and things.
+        workspace: of this run alone.
+        clearance: least distance of every pair, metres.
+        watch: is told how far it is.
+        feet: segments or frames on which the figure stands.
+        work: counts programs and postures.
+    """
+
+    def __init__(
+        self, clip: Clip, terms: FrameTerms, workspace: Workspace, clearance: float, watch: Watch,
+        feet: tuple[str, ...] = (), work: Work | None = None,
+    ) -> None:  # fmt: skip
+        """Take what is needed; nothing is computed yet."""
+        self.clip, self.terms, self.workspace, self.clearance = clip, terms, workspace, clearance
+        self.watch, self.feet, self.work = watch, feet, Work() if work is None else work
+
+    @property
+    def scene(self) -> Scene:
+        """Figure and things."""
+        return self.terms.scene
+
+    @property
+    def ended(self) -> bool:
+        """Whether the caller ended it."""
+        return self.watch.ended
+
+    @cached_property
+    def follower(self) -> Follower:
+        """Follows the original postures, one after the other."""
+        return Follower(self.terms, self.clearance, self.work)
+
+    def of(self, terms: FrameTerms) -> Run:
+        """The same run of other postures, or with something else held."""
+        return Run(self.clip, terms, self.workspace, self.clearance, self.watch, self.feet, self.work)
+
+    def frames(self, seconds: float, least: int) -> int:
+        """How many frames a time has, at least so many."""
+        return max(least, round(seconds / self.terms.dt))
+
+    def faults(self, q: Array, first: int = 0) -> Faults:
+        """What is wrong with postures (n, nq) of the frames from `first` on."""
+        return faults(self.workspace, self.terms, q, self.clearance, first)
+
+    def windows(self, marked: Mask, seconds: float, least: int = 3) -> list[Window]:
+        """Windows around marked frames (n,), with so many seconds and at least so many frames on both sides."""
+        return windows(marked, self.frames(seconds, least))
+
+    def freed_posture(self, frame: int, q: Array) -> Array:
+        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap."""
+        return freed_posture(self.terms, frame, q, self.clearance, self.work)
+
+
 class MethodResult(NamedTuple):
     """What a method makes of a clip.
 
     Attributes:
         q: (n, nq) postures.
-        posture_solves: how many postures were solved for, each on its own.
-        programs: how many quadratic programs were solved.
-        message: what did not succeed, one sentence; empty where all did.
+        repair: whether the shared repair puts right what is left.
+        frozen: joints and groups that the repair keeps as they are in the original postures.
+        message: what did not succeed, one sentence; empty where all did, or where the judge sees it by itself.
         times: (n,) seconds of the clip as it was at which each frame is; None where the timing stays.
         stretch: factor by which the clip was slowed most, anywhere.
     """
 
     q: Array
-    posture_solves: int = 0
-    programs: int = 0
+    repair: bool = False
+    frozen: tuple[str, ...] = ()
     message: str = ""
     times: Array | None = None
     stretch: float = 1.0
@@ -65,53 +151,15 @@ class Avoider(Protocol):
     def dynamics(self) -> Strength | None:
         """The strength within which it keeps torques; None where it looks at none."""
 
-    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
-        """Free a clip.
-
-        Args:
-            clip: original postures; they stay as they are.
-            scene: its figure with equipment, and the things around.
-            constraints: what holds in every frame; see `wholebody.motion.frame_terms`.
-            progress: called with the share done; where it returns True, the method ends with what it has.
+    def avoid(self, run: Run) -> MethodResult:
+        """Free a clip; where the caller ends the run, with what there is then.
 
         Raises:
-            InputError: clip and scene are none or of different figures, or a constraint is none.
-            UnknownNameError: a constraint names what the figure does not have.
+            InputError: a setting does not fit the clip.
+            UnknownNameError: a setting names what the figure does not have.
         """
 
 
 def has_setting(method: Avoider, name: str) -> bool:
     """Whether a method has a setting of a name, such as "dynamics", so that `dataclasses.replace` changes it."""
     return name in getattr(method, "__dataclass_fields__", {})
-
-
-def check_input(clip: object, scene: object, progress: object) -> None:
-    """Check what a method gets.
-
-    Raises:
-        InputError: no clip, no scene, a scene of a figure with other joints, or progress that cannot be called.
-    """
-    instance(clip, Clip, "avoid: clip", "read one with wb.read_clip(path, figure)")
-    instance(scene, Scene, "avoid: scene", "make one with wb.Scene(clip.figure)")
-    assert isinstance(clip, Clip)
-    assert isinstance(scene, Scene)
-    same_joints(clip, scene.figure, "avoid")
-    function(progress, "avoid: progress")
-
-
-class Watch:
-    """Tells the caller how far a method is, and remembers whether the caller ended it.
-
-    Attributes:
-        ended: whether the caller ended it.
-    """
-
-    def __init__(self, progress: Progress | None) -> None:
-        """Take what is called, or None."""
-        self._progress, self.ended = progress, False
-
-    def tell(self, share: float, note: str) -> bool:
-        """Report; whether to end now."""
-        if self._progress is not None and self._progress(AvoidProgress(min(max(share, 0.0), 1.0), note)) is True:
-            self.ended = True
-        return self.ended

@@ -16,20 +16,19 @@ from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import is_file, read_bytes
 from wholebody.base.runner import Job
 from wholebody.figures.figure import Figure
-from wholebody.motion.avoidance import Avoided, as_avoider, avoid
+from wholebody.motion.avoidance import as_avoider, avoid
 from wholebody.motion.avoider import Avoider
 from wholebody.motion.batch_table import AvoidedCase, BatchTable, first_twice
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given, frame_terms
+from wholebody.motion.judging import Avoided
 from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import NOTHING, Worn, dressed, label
+from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
 from wholebody.tracking.tracks import check_figure
 from wholebody.version import __version__
 
 MOST_JOBS = 4096
-ENDLESS = 0.0  # s: no deadline
-DT = 1.0 / 30.0  # s: of the frame with which constraints are tried
 
 Source = Clip | str | os.PathLike[str]
 
@@ -123,9 +122,9 @@ def avoid_many(
     owners = [source.figure if isinstance(source, Clip) else figure for source in sources.values()]
     for owner in {id(owner): owner for owner in owners if owner is not None}.values():
         for one in pieces:  # what does not fit is said before anything is computed
-            frame_terms(dressed(owner, one), owner.neutral[None], DT, tuple(given))
-    table = BatchTable(checks.path(folder, f"{what}: folder"))
-    marks, faults = _originals(sources, figure, table, jobs, cluster)
+            frame_terms(dressed(owner, one), owner.neutral[None], 1.0 / 30.0, tuple(given))
+    batch = _Batch(sources, figure, BatchTable(checks.path(folder, f"{what}: folder")), jobs, cluster)
+    marks, faults = batch.originals()
     held = _Held(tuple(given), hold_feet)
     asked = [
         _Asked(AvoidedCase(name, wears, way, asked=_fingerprint(marks[name], one, method, held)), one, method)
@@ -133,49 +132,80 @@ def avoid_many(
         for wears, one in worn.items()
         for way, method in ways.items()
     ]
-    return _freed(asked, sources, faults, table, held, figure, jobs, cluster, progress)
+    return batch.freed(asked, faults, held, progress)
 
 
-def _freed(
-    asked: Sequence[_Asked], sources: Mapping[str, Clip | Path], faults: Mapping[str, str], table: BatchTable,
-    held: _Held, figure: Figure | None, jobs: int, cluster: str | None,
-    progress: Callable[[BatchProgress], Any] | None,
-) -> tuple[AvoidedCase, ...]:  # fmt: skip
-    rows = {each.row.stem: row for each in asked if (row := table.done(each.row.asked)) is not None}
+class _Batch(NamedTuple):
+    """Clips and files by name, the figure of the files, the folder, and where jobs run."""
 
-    def keep(row: AvoidedCase, clip: Clip | None) -> None:
-        rows[row.stem] = table.add(row, clip)
+    sources: Mapping[str, Clip | Path]
+    figure: Figure | None
+    table: BatchTable
+    jobs: int
+    cluster: str | None
+
+    def originals(self, progress: Callable[[int, str], Any] | None = None) -> tuple[dict[str, str], dict[str, str]]:
+        """Make the clips of files; fingerprints of all clips, and the sentences with which files were refused."""
+        marks = {name: _mark(source, self.figure) for name, source in self.sources.items()}
+        waiting = [
+            (name, source)
+            for name, source in self.sources.items()
+            if isinstance(source, Path) and not self.table.has_original(name, marks[name])
+        ]
+        faults, done = {}, len(self.sources) - len(waiting)
+        work = (Job(name, _read, (str(source.absolute()), self.figure), 0.0) for name, source in waiting)  # no deadline
+        for outcome in run_batch(work, self.jobs, self.cluster) if waiting else ():
+            name, done = outcome.job.name, done + 1
+            if progress is not None:
+                progress(done, name)
+            if outcome.error is not None or isinstance(outcome.answer, str):
+                faults[name] = outcome.answer or str(outcome.error)
+                continue
+            assert self.figure is not None
+            q, dt = outcome.answer
+            self.table.add_original(name, Clip(self.figure, q, dt, name), marks[name])
+        return marks, faults
+
+    def freed(
+        self, asked: Sequence[_Asked], faults: Mapping[str, str], held: _Held,
+        progress: Callable[[BatchProgress], Any] | None,
+    ) -> tuple[AvoidedCase, ...]:  # fmt: skip
+        """The rows of the cases that were asked; those that the folder has not are done, if their file was read."""
+        rows = {each.row.stem: row for each in asked if (row := self.table.done(each.row.asked)) is not None}
+
+        def keep(row: AvoidedCase, clip: Clip | None) -> None:
+            rows[row.stem] = self.table.add(row, clip)
+            if progress is not None:
+                progress(BatchProgress(len(rows), len(asked), row))
+
         if progress is not None:
-            progress(BatchProgress(len(rows), len(asked), row))
+            progress(BatchProgress(len(rows), len(asked), None))
+        missing = [each for each in asked if each.row.stem not in rows]
+        for each in missing:
+            if each.row.clip in faults:
+                keep(replace(each.row, outcome="refused", message=faults[each.row.clip]), None)
+        waiting = [each for each in missing if each.row.clip not in faults]
 
-    if progress is not None:
-        progress(BatchProgress(len(rows), len(asked), None))
-    missing = [each for each in asked if each.row.stem not in rows]
-    for each in missing:
-        if each.row.clip in faults:
-            keep(replace(each.row, outcome="refused", message=faults[each.row.clip]), None)
-    waiting = [each for each in missing if each.row.clip not in faults]
+        def work() -> Iterator[Job]:
+            for each in waiting:
+                yield Job(each, _case, (self._clip(each.row.clip), each.worn, each.method, held), 0.0)
 
-    def clip_of(name: str) -> Clip:
-        source = sources[name]
+        for outcome in run_batch(work(), self.jobs, self.cluster) if waiting else ():
+            each = outcome.job.name
+            if outcome.error is not None:
+                keep(replace(each.row, message=str(outcome.error)), None)
+                continue
+            found, q, dt = outcome.answer
+            clip = outcome.job.arguments[0]
+            keep(replace(each.row, **found), None if q is None else Clip(clip.figure, q, dt, clip.name))
+        return tuple(rows[each.row.stem] for each in asked)
+
+    def _clip(self, name: str) -> Clip:
+        source = self.sources[name]
         if isinstance(source, Clip):
             return source
-        assert figure is not None
-        return read_clip(table.original(name), figure)
-
-    def work() -> Iterator[Job]:
-        for each in waiting:
-            yield Job(each, _case, (clip_of(each.row.clip), each.worn, each.method, held), ENDLESS)
-
-    for outcome in run_batch(work(), jobs, cluster) if waiting else ():
-        each = outcome.job.name
-        if outcome.error is not None:
-            keep(replace(each.row, message=str(outcome.error)), None)
-            continue
-        found, q, dt = outcome.answer
-        clip = outcome.job.arguments[0]
-        keep(replace(each.row, **found), None if q is None else Clip(clip.figure, q, dt, clip.name))
-    return tuple(rows[each.row.stem] for each in asked)
+        assert self.figure is not None
+        return read_clip(self.table.original(name), self.figure)
 
 
 def _case(clip: Clip, worn: Worn, method: Avoider, held: _Held) -> tuple[dict[str, Any], Array | None, float]:
@@ -252,34 +282,8 @@ def read_many(
     checks.function(progress, f"{what}: progress")
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
-    faults = _originals(sources, figure, table, jobs, cluster, progress)[1]
+    faults = _Batch(sources, figure, table, jobs, cluster).originals(progress)[1]
     return {name: faults.get(name) or table.original(name) for name in sources}
-
-
-def _originals(
-    sources: Mapping[str, Clip | Path], figure: Figure | None, table: BatchTable, jobs: int, cluster: str | None,
-    progress: Callable[[int, str], Any] | None = None,
-) -> tuple[dict[str, str], dict[str, str]]:  # fmt: skip
-    """Make the clips of files; fingerprints of all clips, and the sentences with which files were refused."""
-    marks = {name: _mark(source, figure) for name, source in sources.items()}
-    waiting = [
-        (name, source)
-        for name, source in sources.items()
-        if isinstance(source, Path) and not table.has_original(name, marks[name])
-    ]
-    faults, done = {}, len(sources) - len(waiting)
-    work = (Job(name, _read, (str(source.absolute()), figure), ENDLESS) for name, source in waiting)
-    for outcome in run_batch(work, jobs, cluster) if waiting else ():
-        name, done = outcome.job.name, done + 1
-        if progress is not None:
-            progress(done, name)
-        if outcome.error is not None or isinstance(outcome.answer, str):
-            faults[name] = outcome.answer or str(outcome.error)
-            continue
-        assert figure is not None
-        q, dt = outcome.answer
-        table.add_original(name, Clip(figure, q, dt, name), marks[name])
-    return marks, faults
 
 
 def _read(path: str, figure: Figure) -> tuple[Array, float] | str:

@@ -16,7 +16,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_contacts import Contact, ContactTable, contact_as_dict
-from wholebody.motion.feet import Sliding, sliding
+from wholebody.motion.stance import Sliding, sliding
 from wholebody.scene.scene import Scene
 
 DEPTH = 1e-4
@@ -25,7 +25,6 @@ DEPTH = 1e-4
 SMALLEST = 1e-5  # m: ten times coal's own accuracy
 LARGEST = 1.0  # m
 ROUNDING = 1e-9  # rad, m: by which a limit may be missed; share by which a speed may be
-EVERY = 16  # frames after which progress is told
 
 Progress = Callable[[int], object]
 """Called with the number of frames that are done."""
@@ -202,7 +201,7 @@ def check(
             found, passing = swept.advance(clip.q[frame])
             table.add(frame, found, between=False)
             table.add(frame - 1, passing, between=True)
-            if tell is not None and frame % EVERY == 0:
+            if tell is not None and frame % 16 == 0:
                 tell(frame)
     if tell is not None:
         tell(len(clip))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -10,16 +11,99 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.checks import array, instance, number, shown, text, time_step
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
-from wholebody.motion.mirroring import mirrored
 from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_frames
+
+MIRROR = np.diag([1.0, -1.0, 1.0])
+"""Reflection at the plane y = 0."""
+
+PLACE, DIRECTION = 0.01, 0.05
+"""Metres and radians by which a figure may be off symmetry: descriptions of robots have their digits cut off."""
+
+SIDES = (
+    ("left", "right"),
+    ("Left", "Right"),
+    ("LEFT", "RIGHT"),
+    (r"(?<![A-Za-z])l(?![A-Za-z])", r"(?<![A-Za-z])r(?![A-Za-z])"),
+    (r"(?<![A-Za-z])L(?![A-Za-z])", r"(?<![A-Za-z])R(?![A-Za-z])"),
+    (r"(?<![A-Za-z])[lL](?=[A-Z])", r"(?<![A-Za-z])[rR](?=[A-Z])"),
+)
+"""How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
+
+_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+_OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
+
+
+def other_side(name: str) -> str:
+    """The name of the same part on the other side; the name itself if it names no side."""
+    for left, right in SIDES:
+        both = re.compile(f"{left}|{right}")
+        if both.search(name):
+            return both.sub(lambda found: _OTHER[found.group()], name, count=1)
+    return name
+
+
+def mirrored(figure: Figure, q: Array) -> Array:
+    """Postures (n, nq) with left and right exchanged, mirrored at the plane y = 0 of the world.
+
+    Raises:
+        InputError: the figure is not symmetric to y = 0 of its root, or has joints of more than one degree of freedom.
+    """
+    source, sign = _exchange(figure)
+    found: Array = q[:, source] * sign
+    if figure.root == "free":  # (x, -y, z), and the rotation M R M: the axis's x and z change their signs
+        found[:, :7] = q[:, :7] * (1.0, -1.0, 1.0, -1.0, 1.0, -1.0, 1.0)
+    return found
+
+
+def _exchange(figure: Figure) -> tuple[Indices, Array]:
+    """For each value of a posture: the value of which it takes the place, and the sign that it gets."""
+    model = figure.model
+    data = model.createData()
+    q = pin.neutral(model)
+    pin.computeJointJacobians(model, data, q)
+    source, sign = np.arange(model.nq), np.ones(model.nq)
+    for name in figure.joints:
+        joint = model.joints[figure.joint_id(name)]
+        if name in figure.followers:
+            continue
+        partner = other_side(name)
+        if partner not in figure.joints:
+            raise InputError(f"{figure.name} cannot be mirrored: {name!r} has no partner {partner!r}")
+        other = model.joints[figure.joint_id(partner)]
+        if joint.nv != 1 or joint.nq != other.nq:
+            raise InputError(f"{figure.name} cannot be mirrored: {name!r} is no joint of one degree of freedom")
+        here = MIRROR @ data.oMi[joint.id].translation
+        if np.linalg.norm(here - data.oMi[other.id].translation) > PLACE:
+            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
+        along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
+        if abs(along) < np.cos(DIRECTION):
+            raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
+        for k in range(joint.nq):  # an unlimited joint holds cosine and sine; the sine alone changes its sign
+            source[joint.idx_q + k] = other.idx_q + k
+            sign[joint.idx_q + k] = np.sign(along) if k == joint.nq - 1 else 1.0
+    return source, sign
+
+
+def _along(own: Array, other: Array) -> float:
+    """Cosine between the mirrored axis of a joint and that of its partner, from their columns (6,) of the Jacobian.
+
+    An axis of rotation is an axial vector: its mirror image turns the other way round.
+    """
+    if np.linalg.norm(own[3:]) > 0.5:
+        return float(-(MIRROR @ own[3:]) @ other[3:])
+    return float((MIRROR @ own[:3]) @ other[:3]) if np.linalg.norm(other[3:]) < 0.5 else 0.0
+
 
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
+
+BLOCK = 10_000
+"""Frames that are normalised at once: an array for each of a million takes more than their values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,24 +141,26 @@ class Clip:
                 f"{self.figure.name}"
             )
         check_frames(q, self.name, lambda column: column_name(self.figure, column))
-        q = self._normalised(q)
+        self._normalise(q)
         self.figure.warn_of_angles(q, self.name)
         q.setflags(write=False)
         object.__setattr__(self, "q", q)
 
-    def _normalised(self, q: Array) -> Array:
-        """The postures with quaternions, and cosines and sines of unlimited joints, of unit length."""
+    def _normalise(self, q: Array) -> None:
+        """Make quaternions, and cosines and sines of unlimited joints, of unit length."""
         model = self.figure.model
-        unit = np.array([pin.normalize(model, frame) for frame in q])
-        off = ~(np.abs(unit - q) <= UNIT_TOLERANCE)
-        off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
-        if off.any():
-            frame, column = (int(k) for k in np.argwhere(off)[0])
-            raise InputError(
-                f"{self.name}: frame {frame}, {column_name(self.figure, column)} belongs to a quaternion or a "
-                "direction that is not of unit length; normalise it"
-            )
-        return unit
+        for first in range(0, len(q), BLOCK):
+            block = q[first : first + BLOCK]
+            unit = np.array([pin.normalize(model, frame) for frame in block])
+            off = ~(np.abs(unit - block) <= UNIT_TOLERANCE)
+            off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
+            if off.any():
+                frame, column = (int(k) for k in np.argwhere(off)[0])
+                raise InputError(
+                    f"{self.name}: frame {first + frame}, {column_name(self.figure, column)} belongs to a quaternion "
+                    "or a direction that is not of unit length; normalise it"
+                )
+            block[:] = unit
 
     @property
     def names(self) -> tuple[str, ...]:

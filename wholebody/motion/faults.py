@@ -1,17 +1,130 @@
-"""What is wrong with the frames of a clip, as the methods see it: with culled distances, which are fast."""
+"""What is wrong with the frames of a clip and the motions between them, by culled distances, as methods see it."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
+
+import coal
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.motion.dips import dipping
+from wholebody.geometry.continuous.swept_depth import Depths
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.scene.workspace import Workspace
 
+DIP = 8e-5  # m: a deeper overlap between two frames is a dip; `wb.check` allows 0.1 mm and may add 0.01 mm
+FEW = tuple(float(k) / 6.0 for k in range(1, 6))  # shares of a gap at which it is looked at
 DEPTH = 5e-5  # m: of an overlap that is to go; half of what counts as a collision
-MISSED = 1e-4  # m, rad: by which a held constraint is missed
-BEYOND = 1e-6  # rad, m: by which a joint is beyond its limit
+
+
+def dipping(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[int]]:
+    """Gaps that dip, and the numbers of the pairs that do so in each, the deepest first.
+
+    Args:
+        workspace: of this run alone.
+        q: (n, nq) postures.
+        gaps: frames whose motion to the next frame is looked at, however thin the things in its way.
+    """
+    found = dict[int, list[int]]()
+    for gap, passing in _swept(workspace, q, gaps):
+        if passing.depth.max(initial=0.0) > DIP:
+            deepest_first = np.argsort(-passing.depth, kind="stable")
+            found[gap] = [int(passing.number[place]) for place in deepest_first if passing.depth[place] > DIP]
+    return found
+
+
+def depths_between(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, float]:
+    """How deep motions between frames dip, metres; see `dipping`."""
+    return {gap: float(passing.depth.max(initial=0.0)) for gap, passing in _swept(workspace, q, gaps)}
+
+
+def _swept(workspace: Workspace, q: Array, gaps: Iterable[int]) -> Iterator[tuple[int, Depths]]:
+    """Pairs that overlap in each gap, and how deep."""
+    swept, last = workspace.depths(DIP), -1
+    for gap in sorted(gaps):
+        if gap != last:
+            swept.start(q[gap])
+        last = gap + 1
+        yield gap, swept.advance(q[last])[1]
+
+
+def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
+    """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
+    swept = workspace.depths(DIP)
+    swept.start(before)
+    return float(swept.advance(after)[1].depth.max(initial=0.0))
+
+
+def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:
+    """Gaps that dip, and the shares of each at which its pairs are deepest; see `dipping`.
+
+    Pairs that are deepest at nearly the same share are told once: a share has rows of all that is near there.
+    """
+    found = dipping(workspace, q, gaps)
+    return {gap: _deepest(workspace, q[gap], q[gap + 1], numbers[:6]) for gap, numbers in found.items()}
+
+
+def sampled_dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> list[tuple[int, float]]:
+    """Places between frames that overlap, or nearly so, if some of them dip.
+
+    Looks at a few places of each gap, so it may miss dips. What nearly overlaps is told too, because what pushes one
+    gap out pushes its neighbours in.
+    """
+    near, dipping = [], False
+    for gap in gaps:
+        depths = _depths(workspace, q[gap], q[gap + 1], FEW, 2e-4)
+        place = int(np.argmax(depths))
+        dipping |= depths[place] > 0.5 * DIP  # the deepest place may be elsewhere
+        if depths[place] > -2e-4:
+            near.append((gap, FEW[place]))
+    return near if dipping else []
+
+
+def _deepest(workspace: Workspace, before: Array, after: Array, numbers: Sequence[int]) -> list[float]:
+    """Shares of the way between two postures (nq,) at which pairs are nearest, by their numbers.
+
+    A corner dips in a hundredth of a gap, so many places are looked at, and between the nearest ones by golden section.
+    """
+    model, data = workspace.model, workspace.model.createData()
+    request, result = coal.DistanceRequest(), coal.DistanceResult()
+    pairs = [[workspace.geometry.geometryObjects[int(piece)] for piece in workspace.table.pairs[k]] for k in numbers]
+    joints = {piece.parentJoint for pieces in pairs for piece in pieces}
+    posed: dict[float, dict[int, pin.SE3]] = {}
+
+    def distance(pieces: list[pin.GeometryObject], share: float) -> float:
+        if share not in posed:
+            pin.forwardKinematics(model, data, pin.interpolate(model, before, after, share))
+            posed[share] = {joint: data.oMi[joint].copy() for joint in joints}
+        at = [posed[share][piece.parentJoint] * piece.placement for piece in pieces]
+        places = [coal.Transform3s(one.rotation, one.translation) for one in at]
+        result.clear()
+        found = coal.distance(pieces[0].geometry, places[0], pieces[1].geometry, places[1], request, result)
+        return float(found) if np.isfinite(found) else 0.1  # m, in place of a distance that coal does not find
+
+    contact = workspace.sweep.first_contact(before, after, tolerance=DIP)
+    begun: tuple[float, ...] = () if contact is None else (contact.fraction, contact.fraction + 2e-3)
+    shares = sorted({*(k / 64.0 for k in range(65)), *begun})
+    told, golden = list[float](), 0.5 * (5.0**0.5 - 1.0)
+    for pieces in pairs:
+        place = 1 + int(np.argmin([distance(pieces, share) for share in shares[1:-1]]))
+        low, high = shares[place - 1], shares[place + 1]
+        for _ in range(8):  # to a fiftieth of what is between two places
+            first, second = high - golden * (high - low), low + golden * (high - low)
+            low, high = (low, second) if distance(pieces, first) < distance(pieces, second) else (first, high)
+        deepest = float(0.5 * (low + high))
+        if all(abs(deepest - other) > 0.01 for other in told):
+            told.append(deepest)
+    return told
+
+
+def _depths(
+    workspace: Workspace, before: Array, after: Array, shares: Sequence[float], within: float = 0.0
+) -> list[float]:
+    """Depth of the deepest overlap at shares of the way between two postures (nq,), metres; at least minus `within`."""
+    between = (np.asarray(pin.interpolate(workspace.model, before, after, share)) for share in shares)
+    return [-float(workspace.near(q, within).distance.min(initial=within)) for q in between]
 
 
 def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:
@@ -19,9 +132,33 @@ def depth(workspace: Workspace, q: Array, clearance: float = 0.0) -> float:
     return clearance - float(workspace.near(q, clearance).distance.min(initial=clearance))
 
 
-def faults(
-    workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0
-) -> tuple[Array, Mask, list[int]]:
+class Faults(NamedTuple):
+    """What is wrong with postures of a clip.
+
+    Attributes:
+        depths: (n,) of the deepest overlap, or of what is nearer than the clearance, metres.
+        wrong: (n,) frames that overlap, miss a limit or miss what is held.
+        gaps: frames whose motion to the next one dips, where neither is wrong.
+    """
+
+    depths: Array
+    wrong: Mask
+    gaps: list[int]
+
+    @property
+    def frames(self) -> Mask:
+        """(n,) frames that are wrong, or beside a motion that dips."""
+        marked: Mask = self.wrong.copy()
+        marked[[gap + end for gap in self.gaps for end in (0, 1)]] = True
+        return marked
+
+    @property
+    def number(self) -> int:
+        """How many frames and gaps are wrong."""
+        return int(self.wrong.sum()) + len(self.gaps)
+
+
+def faults(workspace: Workspace, terms: FrameTerms, q: Array, clearance: float = 0.0, first: int = 0) -> Faults:
     """What is wrong with postures (n, nq) of a clip.
 
     Args:
@@ -32,18 +169,15 @@ def faults(
         first: frame of the clip that the first posture belongs to.
 
     Returns:
-        (n,) depths in metres; (n,) frames that overlap, miss a limit or miss what is held; gaps between other frames
-        that dip.
+        Frames deeper than 0.05 mm, beyond a limit by 1e-6 rad or m, or that miss what is held by 1e-4 m or rad; gaps.
     """
     limits = terms.scene.figure.limits
     depths = np.array([depth(workspace, posture, clearance) for posture in q])
     values = q[:, limits.idx_q]
     beyond = np.maximum(limits.lower - values, values - limits.upper).max(axis=1, initial=0.0)
-    wrong = (depths > DEPTH) | (beyond > BEYOND)
+    wrong = (depths > DEPTH) | (beyond > 1e-6)
     if terms.holds:
         state = workspace.state
-        wrong |= np.array(
-            [terms.missed(frame, state.update(posture)) > MISSED for frame, posture in enumerate(q, first)]
-        )
+        wrong |= np.array([terms.missed(frame, state.update(posture)) > 1e-4 for frame, posture in enumerate(q, first)])
     quiet = [frame for frame in range(len(q) - 1) if not (wrong[frame] or wrong[frame + 1])]
-    return depths, wrong, list(dipping(workspace, q, quiet))
+    return Faults(depths, wrong, list(dipping(workspace, q, quiet)))

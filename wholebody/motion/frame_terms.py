@@ -20,14 +20,12 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.grips import grip_shifts
 from wholebody.motion.motion_bounds import MotionBounds
-from wholebody.motion.stance import StanceFeet, held_feet, standing
-from wholebody.motion.stance_places import shifts
+from wholebody.motion.stance import StanceFeet, held_feet, shifts, standing
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
 from wholebody.tasks.base import Bound, Constraint, Goal
 from wholebody.tasks.checks import check_rows
 
-STILL = 1e-6  # rad, m in a time step: a smaller motion is rounding
 HeldTerm = Constraint | Goal
 Given = Constraint | Goal | Bound | StanceFeet | MotionBounds
 
@@ -42,6 +40,20 @@ class Miss(NamedTuple):
 
     by: float
     name: str
+
+
+class FrameBounds(NamedTuple):
+    """Bounds of a frame, radians and metres; infinite for none.
+
+    Attributes:
+        lower, upper: (nv,) least and greatest deviation from the original posture.
+        slowest, fastest: (nv,) least and greatest motion to the next frame.
+    """
+
+    lower: Array
+    upper: Array
+    slowest: Array
+    fastest: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +82,7 @@ class FrameTerms:
     largest: Array | None = None
     _held: dict[int, tuple[HeldTerm, ...]] = field(default_factory=dict, init=False, repr=False)
     _feet: dict[int, tuple[Hold, ...]] = field(default_factory=dict, init=False, repr=False)
-    _left_out: dict[str, set[int]] = field(default_factory=dict, init=False, repr=False)
+    _bounds: dict[int, FrameBounds] = field(default_factory=dict, init=False, repr=False)
     _state: State = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -112,20 +124,6 @@ class FrameTerms:
             self._feet[frame] = tuple(found)
         return self._feet[frame]
 
-    def leave_out(self, frame: int, said: str) -> None:
-        """Keep what a problem of a frame says of a default that makes no sense there; see `Problem.left_out`."""
-        if said:
-            self._left_out.setdefault(said, set()).add(frame)
-
-    @property
-    def left_out(self) -> str:
-        """Which defaults were left out in postures that were solved for, and in which frames; "" where none was."""
-        found = []
-        for said, frames in self._left_out.items():
-            more = f" and {len(frames) - 1} others" if len(frames) > 1 else ""
-            found.append(f"{said} (frame {min(frames)}{more})")
-        return "; ".join(found)
-
     def shift(self, frame: int, joint: int) -> Array:
         """(3,) by how much what stands on a joint, or on those after it, is held beside where it was, metres."""
         model = self.scene.model
@@ -134,39 +132,46 @@ class FrameTerms:
                 return shift
         return np.zeros(3)
 
-    def bounds(self, frame: int, state: State) -> tuple[Array, Array, Array, Array]:
-        """Bounds of a frame.
+    def bounds(self, frame: int) -> FrameBounds:
+        """Bounds of the deviation of a frame, and of its change to the next one."""
+        if frame not in self._bounds:
+            nv = self.scene.model.nv
+            most = np.inf if self.largest is None else self.largest[frame]
+            low, high, slow, fast = (np.full(nv, value) for value in (-most, most, -np.inf, np.inf))
+            for term in self.given:
+                if isinstance(term, Bound):
+                    bound, state = term.resolve(self.scene, self.q[frame]), self._state.update(self.q[frame])
+                    least, most = bound.bounds(state, None)
+                    low, high = np.maximum(low, least), np.minimum(high, most)
+                    slower, faster = bound.bounds(state, self.dt)
+                    slow = np.maximum(slow, np.where(np.isfinite(least), -np.inf, slower))
+                    fast = np.minimum(fast, np.where(np.isfinite(most), np.inf, faster))
+            self._bounds[frame] = FrameBounds(low, high, slow, fast)
+        return self._bounds[frame]
 
-        Args:
-            frame: which.
-            state: of the run; it is moved to the original posture.
-
-        Returns:
-            Least and greatest deviation, and least and greatest change of the posture in one frame, each (nv,).
-        """
-        nv = self.scene.model.nv
-        most = np.inf if self.largest is None else self.largest[frame]
-        low, high, slow, fast = (np.full(nv, value) for value in (-most, most, -np.inf, np.inf))
-        bounds = [term.resolve(self.scene, self.q[frame]) for term in self.given if isinstance(term, Bound)]
-        if bounds:
-            state.update(self.q[frame])
-        for bound in bounds:
-            least, most = bound.bounds(state, None)
-            low, high = np.maximum(low, least), np.minimum(high, most)
-            slower, faster = bound.bounds(state, self.dt)
-            slow = np.maximum(slow, np.where(np.isfinite(least), -np.inf, slower))
-            fast = np.minimum(fast, np.where(np.isfinite(most), np.inf, faster))
-        return low, high, slow, fast
+    def within(self, frame: int, q: Array) -> Array:
+        """A copy (nq,) of a posture of a frame, within its bounds and the joint limits; frozen joints are exact."""
+        model, original, bounds = self.scene.model, self.q[frame], self.bounds(frame)
+        q = np.array(q)
+        if np.isfinite(bounds.lower).any() or np.isfinite(bounds.upper).any():
+            away = pin.difference(model, original, q)
+            if ((away < bounds.lower) | (away > bounds.upper)).any():
+                q = np.array(pin.integrate(model, original, np.clip(away, bounds.lower, bounds.upper)))
+            still = (bounds.lower == 0.0) & (bounds.upper == 0.0)
+            for joint in model.joints[1:] if still.any() else ():
+                if still[joint.idx_v : joint.idx_v + joint.nv].all():
+                    values = slice(joint.idx_q, joint.idx_q + joint.nq)
+                    q[values] = original[values]
+        return self.scene.figure.clamp(q)
 
     def kept(self, frame: int) -> bool:
         """Whether the posture of a frame is to stay as it is."""
         return self.largest is not None and self.largest[frame] == 0.0
 
-    def step_bounds(self, frame: int, state: State) -> tuple[Array, Array]:
+    def step_bounds(self, frame: int) -> tuple[Array, Array]:
         """Least and greatest motion (nv,) from a frame to the next one that speed limits allow; see `bounds`."""
-        fastest = speed_limits(self.scene, self.dt)
-        _, _, slow, fast = self.bounds(frame, state)
-        return np.maximum(slow, -fastest), np.minimum(fast, fastest)
+        fastest, bounds = speed_limits(self.scene, self.dt), self.bounds(frame)
+        return np.maximum(bounds.slowest, -fastest), np.minimum(bounds.fastest, fastest)
 
     def at(self, times: Array) -> FrameTerms:
         """The same of postures at other times of the clip, as many seconds apart as before.
@@ -195,26 +200,24 @@ class FrameTerms:
         found = [Miss(_miss(term, state), _label(term)) for term in self.held(frame)]
         terms = [term for term in self.given if isinstance(term, Bound)]
         if terms:
-            q = state.q.copy()
-            away = np.asarray(pin.difference(self.scene.model, self.q[frame], q))
-            state.update(self.q[frame])
+            away = np.asarray(pin.difference(self.scene.model, self.q[frame], state.q))
+            original = self._state.update(self.q[frame])
             for term in terms:
-                low, high = term.resolve(self.scene, self.q[frame]).bounds(state, None)
+                low, high = term.resolve(self.scene, self.q[frame]).bounds(original, None)
                 past = np.maximum(low - away, away - high)
                 found.append(Miss(float(past.max(initial=0.0)), _label(term)))
-            state.update(q)
         return max(found, key=lambda each: each.by, default=Miss(0.0, ""))
 
-    def past_speed(self, frame: int, q: Array, following: Array, state: State) -> float:
+    def past_speed(self, frame: int, q: Array, following: Array) -> float:
         """By what share the motion from a posture (nq,) of a frame to the following one is faster than was given.
 
         The figure's own speed limits do not count.
         """
-        _, _, slow, fast = self.bounds(frame, state)
+        _, _, slow, fast = self.bounds(frame)
         step = np.asarray(pin.difference(self.scene.model, q, following))
         past, most = np.maximum(slow - step, step - fast), np.where(step < 0.0, -slow, fast)
-        over = past > STILL
-        return float((past[over] / np.maximum(most[over], STILL)).max(initial=0.0))
+        over = past > 1e-6  # rad, m in a time step: more than rounding
+        return float((past[over] / np.maximum(most[over], 1e-6)).max(initial=0.0))
 
     @property
     def holds(self) -> bool:
@@ -264,11 +267,6 @@ def frame_terms(scene: Scene, q: Array, dt: float, constraints: Iterable[Given],
     }
     grips = {number: shift for number, shift in found.items() if shift.any()}
     return FrameTerms(scene, q, dt, plain, stands, shifts(scene.figure, q, stands), grips, largest)
-
-
-def said(terms: FrameTerms, *parts: str) -> str:
-    """The message of a method: what did not succeed, and which defaults were left out; "" where there is neither."""
-    return "; ".join(part for part in (*parts, terms.left_out) if part)
 
 
 def _try(term: HeldTerm, scene: Scene, q: Array, where: str) -> None:

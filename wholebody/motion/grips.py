@@ -23,8 +23,9 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.motion.trajectory.banded_qp import BandedQP, banded_solver
-from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.banded_program import BandedQP
+from wholebody.motion.trajectory.banded_qp import banded_solver
+from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.windows import Window, windows
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
@@ -32,13 +33,7 @@ from wholebody.tasks import Hold
 OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
 ROOM = 3e-4  # m: of shifted things beyond what is asked; they come nearer by less between places that are looked at
 NEAR = 0.02  # m: pairs nearer than this have rows
-SPREAD = 0.1  # s: how far a shift at one frame spreads to its neighbours
-MARGIN = 0.5  # s, before and after an overlap: in which grips are shifted
-FARTHEST = 0.05  # m: of a shift along any axis; what needs more is no grip, and stays as it is
-ROUNDS = 8  # of normals
-CLOSE = 0.01  # m: where frames are nearer, places between them are looked at
 SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
-ACROSS = 100.0  # weight c of what a shift has across the line between both frames
 
 
 class _Row(NamedTuple):
@@ -118,11 +113,12 @@ def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float 
     grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
     depths = np.array([_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)])
     wrong, passing = depths > OVERLAP, list[int]()
-    for gap in np.flatnonzero((depths[:-1] > -CLOSE) | (depths[1:] > -CLOSE)).tolist():
+    # where pairs are nearer than a centimetre, places between frames are looked at
+    for gap in np.flatnonzero((depths[:-1] > -0.01) | (depths[1:] > -0.01)).tolist():
         if max(_deepest(_rows_at(grip, gap + share, q, shifts, clearance)) for share in SHARES) > OVERLAP:
             passing.append(gap)
             wrong[gap : gap + 2] = True
-    for window in windows(wrong, max(3, round(MARGIN / dt))):
+    for window in windows(wrong, max(3, round(0.5 / dt))):  # 0.5 s before and after an overlap
         found = _window(grip, window, [gap for gap in passing if window.first <= gap < window.end], q, dt, clearance)
         if found is not None:
             shifts[window.first : window.end] = found
@@ -162,20 +158,20 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
 
     count = len(window)
     seams = window.first > 0, window.end < len(q)
-    bands = Objective(count, np.ones(3), SPREAD, dt, seams).bands
+    bands = Objective(count, np.ones(3), 0.1, dt, seams).bands  # tau is 0.1 s
     lines = [grip.line(q[window.first + k]) for k in range(count)]
     across = sp.block_diag([np.eye(3) * (line @ line) - np.outer(line, line) for line in lines])
-    P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + ACROSS * across)
+    P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + 100.0 * across)  # c is 100
     shifts = np.zeros((count, 3))
     places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]
     _, solve = banded_solver(None)
-    for _ in range(ROUNDS):
+    for _ in range(8):  # the normals turn less each time
         rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
         if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
             return shifts
         G = sp.vstack([sp.csr_matrix(_over_frames(row, count)) for row in rows], format="csc")
         lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
-        most = np.full(3 * count, FARTHEST)
+        most = np.full(3 * count, 0.05)  # m: what needs a larger shift is no grip, and stays as it is
         answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
         if not answer.solved:
             return None

@@ -16,8 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.motion.ground_forces import GroundForces, ground_forces
-from wholebody.motion.soles import Soles
+from wholebody.motion.soles import GroundForces, Soles, ground_forces
 from wholebody.tasks.support import convex_polygon, edges
 
 ROOT = 6  # degrees of freedom of a free root

@@ -8,15 +8,13 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance, number
+from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.motion.checking import ClipCheck, joint_jerk
+from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
-from wholebody.motion.feet import paths, standing_points
+from wholebody.motion.stance import paths, standing_points
 from wholebody.motion.windows import runs
-
-ROUNDING = 1e-9  # s: by which time steps may differ
 
 
 @dataclass(frozen=True)
@@ -144,17 +142,6 @@ def hand_off_weapon(before: Clip, after: Clip, hand: str, other: str) -> float:
     return float(np.linalg.norm(off, axis=1).max())
 
 
-def share_deeper(found: ClipCheck, depth: float = 0.01) -> float:
-    """Share of the frames in which some pair overlaps by more than a depth, metres; from 0 to 1.
-
-    Raises:
-        InputError: no check, or a depth that is not a positive number.
-    """
-    instance(found, ClipCheck, "share_deeper: found", "give the answer of wb.check(clip)")
-    depth = number(depth, "share_deeper: depth", 0.0, 1e3, "m")
-    return float((found.depth > depth).mean())
-
-
 def _centres(clip: Clip) -> Array:
     """(n, njoints - 1, 3) centres of the joints in the world, metres."""
     model, data = clip.figure.model, clip.figure.model.createData()
@@ -178,7 +165,7 @@ def _relative(figure: Figure, q: Array, first: int, second: int) -> Array:
 def _same(before: Clip, after: Clip, what: str) -> None:
     for clip, name in ((before, "before"), (after, "after")):
         instance(clip, Clip, f"{what}: {name}", "give a clip")
-    if before.names != after.names or before.q.shape != after.q.shape or abs(before.dt - after.dt) > ROUNDING:
+    if before.names != after.names or before.q.shape != after.q.shape or abs(before.dt - after.dt) > 1e-9:
         raise InputError(
             f"{what}: {after.name} has {len(after)} frames of {after.figure.name}, {after.dt:g} s apart, "
             f"{before.name} {len(before)} of {before.figure.name}, {before.dt:g} s apart; give two of the same"

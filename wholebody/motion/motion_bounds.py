@@ -71,6 +71,7 @@ class MotionBounds:
         for name, least in (("jerk", 1.0), ("speed", 1.0), ("deviation", 0.0)):
             if getattr(self, name) is not None:
                 checks.number(getattr(self, name), f"MotionBounds: {name}", least, LARGEST)
+        checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
         checks.flag(self.keep_ends, "MotionBounds: keep_ends")
 
 

@@ -1,75 +1,154 @@
-"""Postures on one side of what motions between them pass: a limb inside of a ring in one frame and outside in the next.
+"""Postures on one side of what the original motion passes through, found by following it frame by frame.
 
-Postures that were found one by one may be on either side of a thin thing, and no rows of contact free the motion from
-one side to the other. From the frame before such a motion the original motion is followed, in contact with what is in
-the way, until the motion to the next frame passes nothing.
+A limb that passes through the trunk is pushed out on one side before the middle and on the other after it; postures
+that were found one by one may be on either side of a thin thing. No rows of contact free the motion from one side to
+the other. So a posture on one side is taken, and from there the original motion is followed in contact with what is in
+the way, outwards or until the motion to the next frame as it is passes nothing.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.motion.avoider import Watch
-from wholebody.motion.dips import depths_between, dip_depth
-from wholebody.motion.faults import depth
-from wholebody.motion.following import SHALLOW, Follower
-from wholebody.motion.frame_terms import FrameTerms
-from wholebody.scene.workspace import Workspace
+from wholebody.motion.avoider import Run
+from wholebody.motion.faults import depth, depths_between, dip_depth
+from wholebody.motion.windows import Window, outwards
 
+SHALLOW = 2e-3  # m: a deeper dip passes through something; others are arcs between postures in contact
 PASSED = 1e-2
-"""Metres: a motion that is deeper passes through something. Others are mostly arcs between two postures in contact,
-which rows free; less changes more frames, more leaves more to the rows."""
-
-FEW = 0.25
-"""Share of the frames up to which those on one side take the other: more follows more frames, and where the sides are
-those of several limbs, in vain."""
+"""Metres: a motion between postures that were found one by one passes through something if it is deeper. Less changes
+more frames, more leaves more to the rows of contact."""
 
 
-def one_sided(
-    terms: FrameTerms, follower: Callable[[], Follower], workspace: Workspace, q: Array, watch: Watch
-) -> Array:
+def one_sided(run: Run, q: Array) -> Array:
     """Postures (n, nq) of a clip of which fewer motions pass something; the given ones where that is not found.
 
     Motions that pass divide the clip into runs of frames, on one side and on the other in turn. A posture is mostly on
-    the side from which it deviates less. So where one side has few frames, these take the other. Else, or where
-    something is passed still, motions that pass are gone through from the first to the last one, each side being
-    that of the frame before, and from the last to the first one where that leaves as many.
+    the side from which it deviates less. So where one side has at most a quarter of the frames, these take the other.
+    Else, or where something is passed still, motions that pass are gone through from the first to the last one, each
+    side being that of the frame before, and from the last to the first one where that leaves as many.
 
     Args:
-        terms: original postures, and what is held.
-        follower: makes or gives that of the clip; called where something is passed.
-        workspace: of this run alone.
+        run: is told of every frame.
         q: (n, nq) postures; they stay as they are.
-        watch: is told of every frame.
     """
-    depths = depths_between(workspace, q, range(len(q) - 1))
+    depths = depths_between(run.workspace, q, range(len(q) - 1))
     passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
-    runs = [range(*each) for each in pairwise([0, *(gap + 1 for gap in passing), len(q)])]
-    fewer = min((runs[::2], runs[1::2]), key=_frames)
-    if passing and _frames(fewer) <= FEW * len(q):
+    parts = [range(*each) for each in pairwise([0, *(gap + 1 for gap in passing), len(q)])]
+    fewer = min((parts[::2], parts[1::2]), key=_frames)
+    if passing and _frames(fewer) <= 0.25 * len(q):
         found = q
-        for run in fewer:
-            gap, side = (run[0] - 1, 1) if run[0] else (run[-1], -1)
-            found = _kept(terms, follower(), workspace, found, [gap], side, watch)
-        if watch.ended:
+        for part in fewer:
+            gap, side = (part[0] - 1, 1) if part[0] else (part[-1], -1)
+            found = _kept(run, found, [gap], side)
+        if run.ended:
             return q
-        if max(depths_between(workspace, found, depths).values()) <= PASSED:
+        if max(depths_between(run.workspace, found, depths).values()) <= PASSED:
             return found
     for side in (1, -1) if passing else ():
-        found = _kept(terms, follower(), workspace, q, passing, side, watch)
-        if watch.ended:
+        found = _kept(run, q, passing, side)
+        if run.ended:
             return q
         changed = (found != q).any(axis=1)
         looked = [gap for gap in depths if changed[gap] or changed[gap + 1]]
-        now = depths | depths_between(workspace, found, looked)
+        now = depths | depths_between(run.workspace, found, looked)
         if sum(deep > PASSED for deep in now.values()) < len(passing):
             return found
     return q
+
+
+def keep_back(
+    run: Run, q: Array, gap: int, most: int, first: int = 0, *, cancelled: Callable[[], bool] | None = None
+) -> bool:
+    """Keep frames beside a gap on one side of what the motion in it passes, in place, as few as can be.
+
+    Args:
+        run: of the clip.
+        q: (n, nq) postures; those that change are replaced.
+        gap: the frame before the motion that passes through something.
+        most: how many frames may change.
+        first: frame of the clip that the first posture belongs to.
+        cancelled: asked before each frame; True ends it.
+
+    Returns:
+        Whether a way back to the other frames was found; if not, q stays as it is.
+    """
+    ways = {side: _beside(run, q, gap, side, SHALLOW, first) for side in (1, -1)}
+    found = dict[int, list[Array]]((side, []) for side in ways)
+    for _ in range(most):
+        for side, way in list(ways.items()):  # in turn, so that the shorter way ends both
+            if cancelled is not None and cancelled():
+                return False
+            posture = next(way, None)
+            if posture is None:
+                del ways[side]
+                continue
+            found[side].append(posture.q)
+            if posture.joined:
+                _put(q, gap, side, found[side])
+                return True
+    return False
+
+
+def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Array:
+    """(n, nq) postures of a window, on one side of what motions between them pass as far as that is found.
+
+    Args:
+        run: of the clip.
+        window: which frames.
+        q: (n, nq) its postures.
+        gaps: frames of the window whose motion to the next one passes something.
+    """
+    q = np.array(q)
+    for gap in sorted(gaps):
+        if 0 <= gap < len(q) - 1 and dip_depth(run.workspace, q[gap], q[gap + 1]) > SHALLOW:
+            keep_back(run, q, gap, len(q) - 1, window.first)
+    return q
+
+
+def followed(run: Run, window: Window, middles: Iterable[int]) -> Iterator[Array]:
+    """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
+
+    Followed from one frame a limb may stay on the farther side of a thing for the whole window. Iterations keep the
+    side, so which start ends nearest is seen before them. Following ends where another start is nearer already;
+    it is gone on with only if that one leads to nothing.
+
+    Args:
+        run: of the clip.
+        window: which frames.
+        middles: frames of it to begin at.
+    """
+    best, others = _Followed(np.zeros(0), np.inf, -1), list[int]()
+    for middle in dict.fromkeys(middles):
+        found = _outwards(run, window, middle, best.apart)
+        if found.apart < best.apart:
+            best, found = found, best
+        if found.middle >= 0:
+            others.append(found.middle)
+    yield best.q
+    for middle in others:
+        yield _outwards(run, window, middle, np.inf).q
+
+
+class _Beside(NamedTuple):
+    """A posture (nq,) on the one side of what is passed, and whether the motion to the next frame as it is joins."""
+
+    q: Array
+    joined: bool
+
+
+class _Followed(NamedTuple):
+    """Postures (n, nq), the sum of their squared deviations, and the frame that they were followed from."""
+
+    q: Array
+    apart: float
+    middle: int
 
 
 def _frames(runs: Sequence[range]) -> int:
@@ -77,31 +156,68 @@ def _frames(runs: Sequence[range]) -> int:
     return sum(map(len, runs))
 
 
-def _kept(
-    terms: FrameTerms, follower: Follower, workspace: Workspace, q: Array, passing: Sequence[int], side: int,
-    watch: Watch,
-) -> Array:  # fmt: skip
+def _put(q: Array, gap: int, side: int, found: Sequence[Array]) -> None:
+    """Put postures that were found after (side 1) or before (-1) a gap into q (n, nq)."""
+    begin = gap + 1 if side > 0 else gap + 1 - len(found)
+    q[begin : begin + len(found)] = found[::side]
+
+
+def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
     """Postures (n, nq) of which those after motions that pass are kept on the side of the frame before.
 
     For `side` -1, those before such motions are kept on the side of the frame after.
     """
-    model, figure, q = workspace.model, terms.scene.figure, np.array(q)
-    waiting = list(passing[::-side])
+    q, waiting = np.array(q), list(passing[::-side])
     while waiting:
-        gap = waiting.pop()
-        here, frame = (gap, gap + 1) if side > 0 else (gap + 1, gap)
-        kept = q.copy()
-        while 0 <= frame < len(q):
-            if watch.tell(1.0, f"frame {frame} is kept on one side"):
+        gap, found = waiting.pop(), list[Array]()
+        for posture in _beside(run, q, gap, side, PASSED):
+            found.append(posture.q)
+            if posture.joined:
+                _put(q, gap, side, found)
+                break
+            if run.watch.tell(1.0, f"frame {gap + side * len(found)} is kept on one side"):
                 return q
-            away = pin.difference(model, terms.q[here], kept[here])
-            start = figure.clamp(np.asarray(pin.integrate(model, terms.q[frame], away)))
-            kept[frame] = follower.frame(frame, start)
-            if depth(workspace, kept[frame]) > SHALLOW:
-                break
-            here, frame = frame, frame + side
-            if not 0 <= frame < len(q) or dip_depth(workspace, kept[here], q[frame]) <= PASSED:
-                q = kept
-                break
-        waiting = [gap for gap in waiting if (gap - min(here, frame)) * side >= 0]
+        waiting = [other for other in waiting if (other - gap) * side >= len(found)]
     return q
+
+
+def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[_Beside]:
+    """Frames on the one side of what a motion between two frames passes, as far as they were on the other.
+
+    They follow the original motion from one end of the gap, in contact with what is in the way, until the motion from
+    there to the next one of q is no deeper than `passed`, metres. Each begins at the posture before it: with its
+    deviation on the next original posture it would begin on the other side of a thin thing. For `side` 1 it is frames
+    after the gap, for -1 frames before it.
+    """
+    workspace = run.workspace
+    here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
+    while 0 <= frame < len(q):
+        there = run.follower.frame(first + frame, here)
+        if max(depth(workspace, there), dip_depth(workspace, here, there)) > SHALLOW:
+            return
+        here, frame = there, frame + side
+        yield _Beside(here, not 0 <= frame < len(q) or dip_depth(workspace, here, q[frame]) <= passed)
+
+
+def _outwards(run: Run, window: Window, middle: int, most: float) -> _Followed:
+    """What following from a freed frame gives; ended where the sum of squared deviations is more than `most`.
+
+    A run of a quarter of a second at the original postures ends the following of a side.
+    """
+    terms, model = run.terms, run.workspace.model
+    q = np.array(terms.q[window.first : window.end])
+    q[middle - window.first] = run.freed_posture(middle, terms.q[middle])
+    far = float((pin.difference(model, terms.q[middle], q[middle - window.first]) ** 2).sum())
+    patience, calm, side = run.frames(0.25, 2), 0, 1
+    for frame, neighbour in outwards(window, middle):
+        if frame - neighbour != side:
+            calm, side = 0, frame - neighbour
+        if calm >= patience:
+            continue
+        here = run.follower.frame(frame, q[neighbour - window.first])
+        q[frame - window.first] = here
+        calm = calm + 1 if np.abs(here - terms.q[frame]).max() <= 1e-4 else 0
+        far += float((pin.difference(model, terms.q[frame], here) ** 2).sum())
+        if far > most:
+            break
+    return _Followed(q, far, middle)

@@ -23,9 +23,6 @@ STEP = 0.6
 DAMPING = (1e-4, 1e3)
 """Least damping, and the greatest beyond which the descent ends; squared metres per squared radian."""
 
-ROOT_STEP = 10.0
-"""Largest displacement of the root in one iteration, metres and radians."""
-
 CONE_MARGIN = 2e-3
 """Radians inside of a reach cone that the rows aim at, so that curvature does not lead outside."""
 
@@ -161,7 +158,7 @@ class Fitter:
         """Least and greatest step (nv,) within the limits, and not too long for the linearisation."""
         lower, upper = self.figure.tangent_bounds(q)
         lower, upper = np.maximum(lower, -STEP), np.minimum(upper, STEP)
-        lower[: self._free], upper[: self._free] = -ROOT_STEP, ROOT_STEP
+        lower[: self._free], upper[: self._free] = -10.0, 10.0  # m, rad
         return lower, upper
 
     def fit(

@@ -11,7 +11,7 @@ from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
-from wholebody.motion.files import amass, archive, bvh, bvh_writing, read_frames
+from wholebody.motion.files import amass, archive, bvh, read_frames
 from wholebody.motion.retargeting import retarget
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion
 from wholebody.tracking.tracks import check_figure
@@ -64,7 +64,7 @@ def read_clip(path: str | os.PathLike[str], figure: Figure) -> Clip:
     path = checked_path(path, "path")
     check_figure(figure, "read_clip")
     motion = _skeleton(path, None, None)
-    frames = read_frames(path, figure) if motion is None else bvh_writing.own(motion, figure)
+    frames = read_frames(path, figure) if motion is None else bvh.own(motion, figure)
     if motion is not None and frames is None:
         _say(motion, path)
     try:

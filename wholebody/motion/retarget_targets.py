@@ -1,4 +1,9 @@
-"""What each frame of a retargeted motion is to reach: the skeleton's directions at the figure's proportions."""
+"""Feet of a recorded skeleton that stand: when, and where the floor is.
+
+They are slow and low by the measures of `StanceFeet`, as the feet of a clip are. But the joints of a skeleton are above
+its soles, and a recording drifts: both feet have one floor, a low percentile of what they do while they are slow, and a
+foot that stands at several places made steps between them.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +13,123 @@ from typing import NamedTuple
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
-from wholebody.motion.footfalls import SMALL, Footfalls, held
 from wholebody.motion.roles import Roles
 from wholebody.motion.skeleton import RIGID, SkeletonMotion
+from wholebody.motion.stance import StanceFeet, speeds
+from wholebody.motion.windows import Window, long_runs, runs
+
+SMALL = 1e-9
+"""Metres: shorter ways have no direction."""
+
+
+class Footfalls(NamedTuple):
+    """When parts of the feet stand.
+
+    Attributes:
+        stands: role to (n,) whether it stands.
+        heights: role to its height while it stands, metres.
+    """
+
+    stands: dict[str, Mask]
+    heights: dict[str, float]
+
+
+def footfalls(motion: SkeletonMotion, roles: Roles) -> Footfalls:
+    """When the ankles and toes of a skeleton stand."""
+    stands, heights, limits = {}, {}, StanceFeet()
+    for part in ("ankle", "toe"):
+        pair = {
+            f"{side}_{part}": motion.names.index(roles.joints[f"{side}_{part}"])
+            for side in ("left", "right")
+            if f"{side}_{part}" in roles.joints
+        }
+        places = {role: motion.positions[:, joint] for role, joint in pair.items()}
+        speed = {role: speeds(at, motion.dt) for role, at in places.items()}
+        slow = [at[speed[role] <= limits.speed, 2] for role, at in places.items()]
+        low = np.concatenate(slow) if slow else np.zeros(0)
+        if not len(low):
+            continue
+        height = float(np.percentile(low, 10.0))  # some are lower by error
+        for role, at in places.items():
+            heights[role] = height
+            still = _apart(at, (speed[role] <= limits.speed) & (at[:, 2] <= height + limits.height))
+            stands[role] = long_runs(still, round(limits.least / motion.dt))
+    for side in ("left", "right"):  # a heel stands only while the toes do, so that both keep the length of the foot
+        if {f"{side}_toe", f"{side}_ankle"} <= stands.keys():
+            stands[f"{side}_ankle"] &= stands[f"{side}_toe"]
+    return Footfalls(stands, heights)
+
+
+def held(
+    points: dict[str, Array], steps: Footfalls, places: dict[str, Array], lowest: float, dt: float
+) -> dict[str, Array]:
+    """The goals of points with feet that stand at one place each, at the height at which the figure's stand.
+
+    Before and after it stands, a foot goes over from its own way to that place and back.
+
+    Args:
+        points: role to (n, 3), metres.
+        steps: when the feet stand.
+        places: role to (3,) place in the figure's neutral posture, which stands.
+        lowest: height of the figure's lowest point in it.
+        dt: seconds from frame to frame.
+    """
+    found = dict(points)
+    for part in ("toe", "ankle"):
+        for side in ("left", "right"):
+            role, toe = f"{side}_{part}", f"{side}_toe"
+            if role not in steps.stands or role not in points:
+                continue
+            corrections = []
+            for first, last in runs(steps.stands[role]):
+                frames = slice(first, last)
+                place = points[role][frames].mean(axis=0)
+                if part == "ankle" and toe in steps.stands and steps.stands[toe][frames].all():
+                    ahead = found[toe][frames].mean(axis=0)  # the toes stand already: keep the length of the foot
+                    place = ahead + (points[role][frames] - points[toe][frames]).mean(axis=0)
+                    flat = place[:2] - ahead[:2]
+                    rise = places[role][2] - places[toe][2]
+                    length = np.linalg.norm(places[role] - places[toe])
+                    place[:2] = ahead[:2] + flat / max(float(np.linalg.norm(flat)), SMALL) * np.sqrt(
+                        max(length**2 - rise**2, 0.0)
+                    )
+                place[2] = places[role][2] - lowest
+                corrections.append((first, last, place))
+            found[role] = _blended(points[role], corrections, max(1, round(0.15 / dt)))  # over 0.15 s
+    return found
+
+
+def _blended(way: Array, places: list[tuple[int, int, Array]], over: int) -> Array:
+    """A way (n, 3) that rests at places over some frames each, and goes over to and from them."""
+    frames = np.arange(len(way))
+    total, weights = np.zeros_like(way), np.zeros(len(way))
+    for first, last, place in places:
+        away = np.maximum(first - frames, frames - (last - 1))
+        share = 0.5 + 0.5 * np.cos(np.pi * np.clip(away / over, 0.0, 1.0))
+        near = np.clip(frames, first, last - 1)
+        total += share[:, None] * np.where((away > 0)[:, None], place - way[near], place - way)
+        weights += share
+    found: Array = way + total / np.maximum(weights, 1.0)[:, None]
+    return found
+
+
+def _apart(places: Array, mask: Mask) -> Mask:
+    """The mask without the fastest frame of each run over which a foot goes on, so that it stands at several places."""
+    kept: Mask = np.array(mask)
+    waiting = runs(kept)
+    moved = speeds(places, 1.0)
+    while waiting:
+        first, last = waiting.pop()
+        # a foot that moves by more than 3 cm has made a step
+        if last - first > 2 and np.linalg.norm(np.ptp(places[first:last], axis=0)) > 0.03:
+            cut = first + 1 + int(moved[first + 1 : last - 1].argmax())
+            kept[cut] = False
+            waiting += [Window(first, cut), Window(cut + 1, last)]
+    return kept
+
 
 UPRIGHT = 0.7
 """Cosine of the greatest angle between up and the trunk, thighs and shanks of a rest posture that stands."""
@@ -27,9 +143,6 @@ LIMBS = (
     ("wrist", "hand"),
 )
 """Bones whose directions are taken from the skeleton, and their lengths from the figure."""
-
-SHORT = 0.4
-"""Share of the figure's length below which a bone of the skeleton has no direction that says something."""
 
 LIMB_ABOVE = {second: first for first, second in LIMBS}
 """Part of a limb to the part nearer to the trunk."""
@@ -126,17 +239,8 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
     own = _Body(places)
     joint = {role: motion.names.index(name) for role, name in roles.joints.items()}
     source = _Body({role: motion.positions[:, k] for role, k in joint.items()})
-    axes = rest_axes(motion, roles)
-    turns: dict[str, Array] = {}
-    if axes is not None:
-        for role in ("pelvis", "head", "left_ankle", "right_ankle"):
-            if role in joint:
-                turns[role] = motion.rotations[:, joint[role]] @ axes @ turned[role]
-        for side in ("left", "right"):
-            turn = _hand_turn(motion, joint, side, axes)
-            if turn is not None and f"{side}_hand" in joint:
-                turns[f"{side}_hand"] = turn @ _hand_axes(own, side).T @ turned[f"{side}_hand"]
-    root = turns["pelvis"] if "pelvis" in turns else _pelvis(source, motion)
+    turns = _turns(motion, joint, own, turned, rest_axes(motion, roles))
+    root, scale = turns.get("pelvis", _pelvis(source, motion)), 1.0
     if figure.root == "fixed":  # only what moves relative to the pelvis can be followed
         back = np.swapaxes(root, 1, 2)
         source = _Body(
@@ -144,7 +248,6 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
         )
         turns = {role: back @ turn for role, turn in turns.items() if role != "pelvis"}
         hips = np.tile(own.places.get("hips", np.zeros(3)), (len(motion), 1))
-        scale = 1.0
     else:
         scale = _leg(own) / max(_leg(source), SMALL) if _leg(own) and _leg(source) else 1.0
         hips = scale * source.places["hips"]
@@ -155,6 +258,21 @@ def targets(motion: SkeletonMotion, figure: Figure, roles: Roles, steps: Footfal
             hips[:, 2] -= scale * float(np.percentile(motion.positions[:, :, 2].min(axis=1), 2))
     points = _points(own, source, hips, figure.root == "fixed" or not has_trunk(joint))
     return Targets(held(points, steps, places, lowest, motion.dt), turns, root, scale)
+
+
+def _turns(
+    motion: SkeletonMotion, joint: dict[str, int], own: _Body, turned: dict[str, Array], axes: Array | None
+) -> dict[str, Array]:
+    """Orientations (n, 3, 3) of pelvis, head, feet and hands by role; none where the rest posture does not stand."""
+    if axes is None:
+        return {}
+    rigid = [role for role in ("pelvis", "head", "left_ankle", "right_ankle") if role in joint]
+    turns: dict[str, Array] = {role: motion.rotations[:, joint[role]] @ axes @ turned[role] for role in rigid}
+    for side in ("left", "right"):
+        turn = _hand_turn(motion, joint, side, axes)
+        if turn is not None:
+            turns[f"{side}_hand"] = turn @ _hand_axes(own, side).T @ turned[f"{side}_hand"]
+    return turns
 
 
 def has_trunk(roles: Collection[str]) -> bool:
@@ -170,42 +288,45 @@ def _leg(body: _Body) -> float:
     return body.length("left_hip", "left_knee") + body.length("left_knee", "left_ankle")
 
 
+def _directed(own: _Body, source: _Body, first: str, second: str, start: Array) -> Array:
+    """(n, 3) from a start along the skeleton's way from one role to another, at the figure's length."""
+    ratio = own.length(first, second) / max(source.length(first, second), SMALL)
+    found: Array = start + source.way(first, second) * ratio
+    return found
+
+
 def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str, Array]:
-    points: dict[str, Array] = {}
+    """Places (n, 3) of the roles: from the hips up to the shoulders and the head, and outwards along the limbs.
 
-    def directed(first: str, second: str, start: Array) -> Array:
-        """The skeleton's way from one role to another at the figure's length."""
-        return start + source.way(first, second) * (
-            own.length(first, second) / max(source.length(first, second), SMALL)
-        )
-
-    middle = {"hip": hips}
-    top = None
-    if own.has("hips", "shoulders") and source.has("hips", "shoulders"):
-        top = directed("hips", "shoulders", hips)
-    elif own.has("shoulders"):
-        top = np.tile(own.places["shoulders"], (len(hips), 1))
-    if top is not None:
-        middle["shoulder"] = top
-    for part, start in middle.items():
-        if own.has(f"{part}s") and source.has(f"left_{part}", f"right_{part}") and own.has(f"left_{part}"):
-            for side in ("left", "right"):
-                points[f"{side}_{part}"] = directed(f"{part}s", f"{side}_{part}", start)
+    Limbs of which nothing nearer to the trunk is known begin where the figure's do, if they are `anchored`.
+    """
+    points, top = _girdles(own, source, hips)
     for side in ("left", "right"):
         for first, second in LIMBS:
             a, b = f"{side}_{first}", f"{side}_{second}"
-            if a not in points and f"{side}_{LIMB_ABOVE.get(first)}" not in own.places and own.has(a, b) and anchored:
+            if anchored and a not in points and own.has(a, b) and not own.has(f"{side}_{LIMB_ABOVE.get(first)}"):
                 points[a] = np.tile(own.places[a], (len(hips), 1))
             if a in points and own.has(a, b) and source.has(a, b):
-                points[b] = directed(a, b, points[a])
-    if (
-        top is not None
-        and own.has("shoulders", "head")
-        and source.has("shoulders", "head")
-        and source.length("shoulders", "head") > SHORT * own.length("shoulders", "head")
-    ):
-        points["head"] = directed("shoulders", "head", top)
+                points[b] = _directed(own, source, a, b, points[a])
+    necks = [body.length("shoulders", "head") if body.has("shoulders", "head") else 0.0 for body in (own, source)]
+    if top is not None and min(necks) > 0.0 and necks[1] > 0.4 * necks[0]:  # a shorter one has no direction
+        points["head"] = _directed(own, source, "shoulders", "head", top)
     return points
+
+
+def _girdles(own: _Body, source: _Body, hips: Array) -> tuple[dict[str, Array], Array | None]:
+    """Places (n, 3) of hips and shoulders, and between the shoulders; None where the figure has none."""
+    top: Array | None = None
+    if own.has("hips", "shoulders") and source.has("hips", "shoulders"):
+        top = _directed(own, source, "hips", "shoulders", hips)
+    elif own.has("shoulders"):
+        top = np.tile(own.places["shoulders"], (len(hips), 1))
+    points, starts = dict[str, Array](), {"hip": hips} if top is None else {"hip": hips, "shoulder": top}
+    for part, start in starts.items():
+        if own.has(f"{part}s", f"left_{part}") and source.has(f"left_{part}", f"right_{part}"):
+            for side in ("left", "right"):
+                points[f"{side}_{part}"] = _directed(own, source, f"{part}s", f"{side}_{part}", start)
+    return points, top
 
 
 def _pelvis(source: _Body, motion: SkeletonMotion) -> Array:

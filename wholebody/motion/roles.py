@@ -5,94 +5,21 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
+from pathlib import Path
 from typing import NamedTuple
 
 from wholebody.base.checks import path as checked_path
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.base.files import parsed_toml, read_text
+from wholebody.base.files import packaged_table, parsed_toml, read_text
 from wholebody.figures.figure import Figure
 
-SIDED = ("hip", "knee", "ankle", "toe", "shoulder", "elbow", "wrist", "hand")
-ROLES = ("pelvis", "chest", "neck", "head", *(f"{side}_{part}" for side in ("left", "right") for part in SIDED))
+ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
+
+ROLES = tuple(row["role"] for row in ROWS)
 """Parts of a body that skeletons and figures have in common. Each but the pelvis may be absent."""
 
-_CMU = {
-    "pelvis": "root", "chest": "thorax", "neck": "lowerneck", "head": "head",
-    "hip": "femur", "knee": "tibia", "ankle": "foot", "toe": "toes",
-    "shoulder": "humerus", "elbow": "radius", "wrist": "wrist", "hand": "fingers",
-}  # fmt: skip
-_MOTION_BUILDER = {
-    "pelvis": "Hips", "chest": "Spine1", "neck": "Neck1", "head": "Head",
-    "hip": "UpLeg", "knee": "Leg", "ankle": "Foot", "toe": "ToeBase",
-    "shoulder": "Arm", "elbow": "ForeArm", "wrist": "Hand", "hand": "HandIndex1",
-}  # fmt: skip
-_MIXAMO = {**_MOTION_BUILDER, "chest": "Spine2", "neck": "Neck", "hand": "HandMiddle1"}
-_LAFAN1 = {**_MIXAMO, "toe": "Toe", "hand": "Hand_end"}
-_SMPL = {
-    "pelvis": "pelvis", "chest": "spine3", "neck": "neck", "head": "head",
-    "hip": "hip", "knee": "knee", "ankle": "ankle", "toe": "foot",
-    "shoulder": "shoulder", "elbow": "elbow", "wrist": "wrist", "hand": "hand",
-}  # fmt: skip
-_PLAIN = {**_SMPL, "pelvis": "root", "chest": "chest", "neck": "", "head": "neck", "toe": "", "hand": "wrist_end"}
-
-_OWN = {
-    **_SMPL, "chest": "thorax",
-    "hip": "thigh", "knee": "shank", "ankle": "foot", "toe": "toes",
-    "shoulder": "upper_arm", "elbow": "forearm", "wrist": "hand", "hand": "hand_end",
-}  # fmt: skip
-
-
-def _both(table: Mapping[str, str], name: str) -> dict[str, str]:
-    """Names of all roles from those of one side; `name` has {side}, {Side} or {s} where the side stands."""
-    said = {}
-    for role in ROLES:
-        side, _, part = role.partition("_")
-        if part in SIDED:
-            said[role] = name.format(side=side, Side=side.capitalize(), s=side[0], part=table[part])
-        else:
-            said[role] = table[role]
-    return said
-
-
-TABLES: dict[str, dict[str, str]] = {
-    "CMU": _both(_CMU, "{s}{part}"),
-    "Mixamo": _both(_MIXAMO, "{Side}{part}"),
-    "LAFAN1": _both(_LAFAN1, "{Side}{part}"),
-    "MotionBuilder": _both(_MOTION_BUILDER, "{Side}{part}"),
-    "SMPL": _both(_SMPL, "{side}_{part}"),
-    "DeepMimic": _both(_PLAIN, "{side}_{part}"),
-    "wholebody": _both(_OWN, "{side}_{part}"),
-}
-"""Names of joints by role, of the skeletons that files of motion capture have."""
-
-NEEDED = 6
-"""Least number of roles that a table must name in a skeleton to be taken."""
-
-PREFIX = re.compile(r"^.*[:|]")
-"""Name space before a joint's name, such as mixamorig: ."""
-
-SIDE = {
-    "left": re.compile(r"left|(?<![a-z])l(?![a-z])"),
-    "right": re.compile(r"right|(?<![a-z])r(?![a-z])"),
-}
-"""How the joints of robots say their side."""
-
-HUMAN = {
-    "pelvis": "pelvis", "chest": "thorax", "neck": "neck1_flexion", "head": "head",
-    **{f"{side}_{part}": f"{side}_{part}" for side in ("left", "right") for part in SIDED[:3] + SIDED[4:7]},
-    **{f"{side}_toe": f"{side}_toe_extension" for side in ("left", "right")},
-    **{f"{side}_hand": f"{side}_index_tip" for side in ("left", "right")},
-}  # fmt: skip
-"""Frames of the person and of the avatar."""
-
-
-HUMAN_TURNS = {
-    "pelvis": "pelvis", "head": "head",
-    **{f"{side}_ankle": f"{side}_foot" for side in ("left", "right")},
-    **{f"{side}_hand": f"{side}_hand" for side in ("left", "right")},
-}  # fmt: skip
-"""Segments of the person and of the avatar that have a role's orientation."""
+SIDED = tuple(role.removeprefix("left_") for role in ROLES if role.startswith("left_"))
 
 
 class Roles(NamedTuple):
@@ -120,7 +47,7 @@ def matched(
         joints: names of the skeleton.
         figure: the figure.
         names: a TOML file or a mapping with tables `skeleton` and `figure`, each role to name; what it leaves out is
-            matched by the tables of this module.
+            matched by the table `data/roles.csv`.
 
     Raises:
         UnknownNameError: a role, a joint or a frame that does not exist.
@@ -144,7 +71,8 @@ def matched(
             f"no bones of the skeleton are known to belong to {figure.name} ({what}); name them in a TOML file with "
             "the tables [skeleton] and [figure]"
         )
-    segments = HUMAN_TURNS if set(HUMAN_TURNS.values()) <= set(figure.segments) else {}
+    segments = _column("person_turn")
+    segments = segments if set(segments.values()) <= set(figure.segments) else {}
     return Roles(
         {role: found[role] for role in common},
         {role: frames[role] for role in common},
@@ -154,25 +82,36 @@ def matched(
 
 
 def _recognised(joints: tuple[str, ...]) -> tuple[str, dict[str, str]]:
-    """The table that names most joints, and those."""
-    plain = {PREFIX.sub("", joint).lower(): joint for joint in reversed(joints)}
+    """The column of the table that names most joints, six or more, and those."""
+    # without a name space such as mixamorig:
+    plain = {re.sub(r"^.*[:|]", "", joint).lower(): joint for joint in reversed(joints)}
     best: tuple[str, dict[str, str]] = ("", {})
-    for title, table in TABLES.items():
-        found = {role: plain[name.lower()] for role, name in table.items() if name.lower() in plain}
-        if len(found) >= NEEDED and len(found) > len(best[1]):
+    for title in ROWS[0]:
+        if title in ("role", "person", "person_turn"):  # no skeletons
+            continue
+        found = {role: plain[name.lower()] for role, name in _column(title).items() if name.lower() in plain}
+        if len(found) >= 6 and len(found) > len(best[1]):
             best = title, found
     return best
+
+
+def _column(title: str) -> dict[str, str]:
+    """Role to name, of the roles that a column of the table names."""
+    return {row["role"]: row[title] for row in ROWS if row[title]}
 
 
 def _frames(figure: Figure) -> dict[str, str]:
     """Frames of a figure by role: those of the person, or of a robot whose joints are named after parts of a body."""
     known = {*figure.frames, *figure.segments, *figure.joints}
-    if all(frame in known for frame in HUMAN.values()):
-        return dict(HUMAN)
+    person = _column("person")
+    if set(person.values()) <= known:
+        return person
     found: dict[str, str] = {}
     for joint in figure.joints:
         words = joint.lower()
-        side = next((side for side, pattern in SIDE.items() if pattern.search(words)), "")
+        side = next(
+            (side for side in ("left", "right") if re.search(rf"{side}|(?<![a-z]){side[0]}(?![a-z])", words)), ""
+        )
         part = next((part for part in SIDED if part in words), "")
         # Of several joints at a hip, a shoulder or an ankle the last one is where they meet; of a wrist the first.
         if side and part and (part in ("hip", "shoulder", "ankle") or f"{side}_{part}" not in found):

@@ -1,9 +1,9 @@
-"""Soles: in which frames feet stand, and the points of them that bear force."""
+"""Soles: in which frames feet stand, their points that bear force, and the split of a wrench over these points."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -14,9 +14,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import FEET, StanceFeet, foot_points, standing
 from wholebody.tasks.support import low_points
-
-SOLE = 0.02
-"""Metres above a sole's lowest point up to which its corners bear force: soles are rounded, recordings uneven."""
 
 SPREAD_CORNERS = 12
 """Most points of one foot: the outermost ones in as many directions. Fewer cut off the ends of a rounded sole."""
@@ -92,7 +89,8 @@ class Soles:
                     for piece in self._pieces[foot]
                 ]
             )
-            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + SOLE])
+            # up to 2 cm above the lowest point: soles are rounded, recordings uneven
+            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + 0.02])
             points.append(lows)
             owner.append(np.full(len(lows), foot))
         return np.vstack(points), np.concatenate(owner)
@@ -104,3 +102,60 @@ def _outermost(points: Array) -> Array:
     far = np.argmax(points[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
     found: Array = points[np.unique(far)]
     return found
+
+
+CONE_EDGES = 8
+"""Edges of the pyramid that stands for the cone of friction: eight lie within 8 % of it, and inside."""
+
+EVENNESS = 1e-3
+"""Weight [m] of even forces beside the wrench in the least squares: many splits give the same wrench, the one with the
+smallest forces is taken. More lets the sum of the forces miss the wrench: by about the square of this."""
+
+
+class GroundForces(NamedTuple):
+    """Forces of the ground in one frame.
+
+    Attributes:
+        forces: (points, 3) force on each point of the soles, N, in the world.
+        missing: (6,) what the ground cannot give of the wrench: force N, moment N m about the wrench's point.
+        split: (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear.
+    """
+
+    forces: Array
+    missing: Array
+    split: Array
+
+
+def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
+    """Forces at points of the soles, within their cones of friction, that give a wrench as nearly as can be.
+
+    Minimises |sum of the forces' wrenches - wrench|^2 + (EVENNESS |forces|)^2 over combinations with coefficients >= 0
+    of the edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23).
+
+    Args:
+        wrench: (6,) force, N, and moment about a point, N m; in the world.
+        about: (3,) the point, metres.
+        points: (points, 3) where the soles touch the level ground; there may be none.
+        friction: coefficient of friction, more than 0.
+    """
+    if len(points) == 0:
+        return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
+    from scipy.optimize import nnls
+
+    around = 2.0 * np.pi * np.arange(CONE_EDGES) / CONE_EDGES
+    edges = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(CONE_EDGES)])
+    directions = np.tile(edges, (len(points), 1))
+    arms = np.repeat(points - about, CONE_EDGES, axis=0)
+    columns = np.hstack([directions, np.cross(arms, directions)]).T
+    # Scaled to the wrench, so that EVENNESS means the same for a mouse and an elephant.
+    scale = max(float(np.linalg.norm(wrench[:3])), 1.0)
+    stacked = np.vstack([columns, EVENNESS * np.eye(columns.shape[1])])
+    found, _ = nnls(stacked, np.concatenate([wrench / scale, np.zeros(columns.shape[1])]))
+    forces = (found[:, None] * directions).reshape(len(points), CONE_EDGES, 3).sum(axis=1) * scale
+    bears = found > 0.0
+    active = columns[:, bears]
+    # The answer on the edges that bear is that of linear least squares with EVENNESS.
+    solved = np.linalg.solve(active.T @ active + EVENNESS**2 * np.eye(active.shape[1]), active.T)
+    split = np.zeros((len(points), 3, 6))
+    np.add.at(split, np.flatnonzero(bears) // CONE_EDGES, directions[bears][:, :, None] * solved[:, None, :])
+    return GroundForces(forces, wrench - columns @ (found * scale), split.reshape(-1, 6))

@@ -25,19 +25,8 @@ from wholebody.geometry.shapes import Box, Hull, Mesh, Shape, Sphere
 
 Faces = NDArray[np.int64]
 
-CELLS = 6_000
-"""Cells of the grid inside the solid: more make the volumes finer and the filling slower."""
-
-MOST_CELLS = 150_000
-"""Cells of the whole grid, which limits those inside of thin solids."""
-
 UNCOVERED = 3.0
 """Weight of a volume that stays uncovered against one that protrudes: a limb would get into the former."""
-
-MOST_SPHERES = 500
-STARTS = 3  # seeded clusterings, of which the best is kept
-SWEEPS = 4  # over all radii, one after the other; later ones change less than a cell
-SIDES = 32  # of the meridians of a ball that is given as a shape
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +115,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
     Raises:
         InputError: another shape or count, or a mesh that is not closed and is to be filled as it stands.
     """
-    count = whole(count, "fill_with_spheres: count", 1, MOST_SPHERES)
+    count = whole(count, "fill_with_spheres: count", 1, 500)
     vertices, faces = triangles_of(shape)
     if flag(envelope, "fill_with_spheres: envelope"):
         vertices, faces = _envelope(vertices)
@@ -137,7 +126,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
     grid = _Grid(vertices, faces, count)
     if not len(grid.inside):
         raise InputError("fill_with_spheres: the mesh encloses no volume; turn its faces outwards, or thicken it")
-    fits = (_fitted(grid, count, seed) for seed in range(STARTS))
+    fits = (_fitted(grid, count, seed) for seed in range(3))  # seeded clusterings, of which the best is kept
     centers, radii, uncovered, outside = min(fits, key=lambda fit: UNCOVERED * fit[2] + fit[3])
     corners = np.vstack([grid.inside, vertices])
     beyond = max(_gap(part, centers, radii).max() for part in _parts(corners))
@@ -168,7 +157,7 @@ def triangles_of(shape: Shape) -> tuple[Array, Faces]:
     if isinstance(shape, Box):
         made = trimesh.creation.box(shape.size)
     elif isinstance(shape, Sphere):
-        made = trimesh.creation.uv_sphere(shape.radius, (SIDES, SIDES))
+        made = trimesh.creation.uv_sphere(shape.radius, (32, 32))
     else:
         raise InputError(f"a {type(shape).__name__} cannot be filled with spheres; give a Mesh, Hull, Box or Sphere")
     return np.array(made.vertices, dtype=float), np.array(made.faces, dtype=np.int64)
@@ -184,7 +173,8 @@ class _Grid:
         # A sphere that covers its share of the solid stands out no farther than this.
         margin = min(0.5 * float(np.linalg.norm(high - low)), 1.5 * float(np.prod(high - low) / count) ** (1.0 / 3.0))
         room = float(np.prod(high - low + 2.0 * margin))
-        self.cell = max(volume / CELLS, room / MOST_CELLS) ** (1.0 / 3.0)
+        # 6,000 cells inside the solid, but 150,000 in all, which limits those of thin solids
+        self.cell = max(volume / 6_000, room / 150_000) ** (1.0 / 3.0)
         axes = [
             np.arange(a - margin + self.cell * share, b + margin, self.cell)
             for a, b, share in zip(low, high, (0.5, 0.4937, 0.4979), strict=True)  # off the planes of the mesh
@@ -236,7 +226,7 @@ def _fitted(grid: _Grid, count: int, seed: int) -> tuple[Array, Array, int, int]
     for k in range(len(radii)):
         covers_in[near_in[k][inner[k] <= radii[k]]] += 1
         covers_out[near_out[k][outer[k] <= radii[k]]] += 1
-    for _ in range(SWEEPS):
+    for _ in range(4):  # over all radii, one after the other; later ones change less than a cell
         for k in range(len(radii)):
             covers_in[near_in[k][inner[k] <= radii[k]]] -= 1
             covers_out[near_out[k][outer[k] <= radii[k]]] -= 1

@@ -1,25 +1,34 @@
-"""Feet that stand: found in a clip by their speed and height."""
+"""Feet that stand: found in a clip by speed and height, where they are held, and how far they slide.
+
+Recordings that were brought onto a wider body stand with one foot in the other. Such feet cannot be held where they
+are. A foot does not slide while its shift stays the same; so each stand of a foot, from when its first point is down
+until its last one is up, gets one horizontal shift. Feet that do not overlap get none.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
 
+import coal
 import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
-from wholebody.motion.windows import long_runs
+from wholebody.geometry.swept_points import swept_points
+from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.tasks import Hold
 
 FEET = ("left_foot", "right_foot")
 POINTS = ("heel", "ball", "toe_tip")
 """Ends of the names of frames that are points of a foot."""
-
-LOWEST_SHARE = 0.02  # of the frames: how many may be lower than what counts as the ground, because they are errors
 
 
 def foot_points(figure: Figure) -> tuple[str, ...]:
@@ -103,7 +112,7 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     found = {}
     for number, name in enumerate(names):
         height = places[:, number, 2]
-        lowest = np.quantile(height, LOWEST_SHARE)
+        lowest = np.quantile(height, 0.02)  # what is lower is an error
         stand = (speed[:, number] <= settings.speed) & (height <= lowest + settings.height)
         found[name] = long_runs(stand, shortest)
     return found
@@ -129,3 +138,184 @@ def speeds(places: Array, dt: float) -> Array:
     if len(places) < 2:
         return np.zeros(places.shape[:-1])
     return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
+
+
+APART = 1e-3
+"""Metres that feet are apart after their shift: room for their rows to be met."""
+
+
+class _Foot:
+    """One foot: the frames that may stand, its pieces, and its stands."""
+
+    def __init__(self, figure: Figure, joint: int, names: set[str], stands: Sequence[Sequence[str]]) -> None:
+        self.names = names
+        self.pieces = [
+            piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
+        ]
+        self.stands: list[Window] = runs(np.array([any(name in names for name in each) for each in stands], dtype=bool))
+        self.shifts = [np.zeros(3) for _ in self.stands]
+
+
+def shifts(figure: Figure, q: Array, stands: Sequence[Sequence[str]]) -> tuple[tuple[Array, ...], ...]:
+    """For each frame, the shift (3,) of each of the frames of the figure that stand there, metres.
+
+    Args:
+        figure: with feet.
+        q: (n, nq) postures.
+        stands: for each of them, names of the frames that stand.
+    """
+    feet = _feet(figure, stands)
+    places = {}
+    for first, second in combinations(feet, 2):
+        for _ in range(10):  # a stand may be beside several of the other foot
+            moved = False
+            for i, one in enumerate(first.stands):
+                for j, other in enumerate(second.stands):
+                    begin, end = max(one.first, other.first), min(one.end, other.end)
+                    if begin >= end:
+                        continue
+                    # six frames are enough: a foot hardly moves while it stands
+                    looked = np.unique(np.linspace(begin, end - 1, 6).round().astype(int))
+                    for frame in looked:
+                        if frame not in places:
+                            places[frame] = _placed(figure, q[frame], feet)
+                    seen = [places[frame] for frame in looked]
+                    push = _push(first, second, seen, first.shifts[i] - second.shifts[j])
+                    if push.any():
+                        first.shifts[i] += 0.5 * push
+                        second.shifts[j] -= 0.5 * push
+                        moved = True
+            if not moved:
+                break
+    found = []
+    for frame, names in enumerate(stands):
+        here = []
+        for name in names:
+            foot = next(foot for foot in feet if name in foot.names)
+            number = next(k for k, stand in enumerate(foot.stands) if stand.first <= frame < stand.end)
+            here.append(foot.shifts[number])
+        found.append(tuple(here))
+    return tuple(found)
+
+
+def _feet(figure: Figure, stands: Sequence[Sequence[str]]) -> list[_Foot]:
+    """Feet of the frames that ever stand: those on one joint, or on joints that follow it, are one foot."""
+    model = figure.model
+    names = dict.fromkeys(name for each in stands for name in each)
+    joints = {name: model.frames[figure.frame_id(name)].parentJoint for name in names}
+    every = set(joints.values())
+    tops = [joint for joint in sorted(every) if not (set(model.supports[joint].tolist()) - {joint}) & every]
+    return [
+        _Foot(figure, top, {name for name, joint in joints.items() if top in model.supports[joint]}, stands)
+        for top in tops
+    ]
+
+
+def _placed(figure: Figure, q: Array, feet: Sequence[_Foot]) -> dict[str, pin.SE3]:
+    """Placements of the feet's pieces in the world at a posture, by name."""
+    data = figure.model.createData()
+    pin.forwardKinematics(figure.model, data, q)
+    return {piece.name: data.oMi[piece.parentJoint] * piece.placement for foot in feet for piece in foot.pieces}
+
+
+def _push(first: _Foot, second: _Foot, frames: Sequence[dict[str, pin.SE3]], before: Array) -> Array:
+    """(3,) horizontal shift of the first foot from the second, beyond one that it has, that brings them apart."""
+    if not (first.pieces and second.pieces):
+        return np.zeros(3)
+    apart = np.mean([_middle(first, each) - _middle(second, each) for each in frames], axis=0) + before
+    apart[2] = 0.0
+    if not np.linalg.norm(apart) > 0.0:
+        return np.zeros(3)
+    way = apart / np.linalg.norm(apart)
+    far = 0.0
+    for _ in range(20):
+        least = min(_distance(first, second, each, before + far * way) for each in frames)
+        if least >= (APART if far else 0.0):
+            break
+        far += max(APART - least, 1e-4)
+    found: Array = far * way
+    return found
+
+
+def _middle(foot: _Foot, places: dict[str, pin.SE3]) -> Array:
+    centers = []
+    for piece in foot.pieces:
+        points = swept_points(piece.geometry).points
+        centers.append(places[piece.name].act(points.mean(axis=0) if len(points) else np.zeros(3)))
+    return np.asarray(np.mean(centers, axis=0))
+
+
+def _distance(first: _Foot, second: _Foot, places: dict[str, pin.SE3], shift: Array) -> float:
+    least = np.inf
+    for one in first.pieces:
+        at = _transform(places[one.name], shift)
+        for other in second.pieces:
+            request, result = coal.DistanceRequest(), coal.DistanceResult()
+            coal.distance(one.geometry, at, other.geometry, _transform(places[other.name]), request, result)
+            least = min(least, float(result.min_distance))
+    return least
+
+
+def _transform(place: pin.SE3, shift: Array | float = 0.0) -> Any:
+    return coal.Transform3s(place.rotation, place.translation + shift)
+
+
+@dataclass(frozen=True, eq=False)
+class Sliding:
+    """How far a point of a foot slides while it stands.
+
+    Attributes:
+        frame: name of the point's frame.
+        stands: (n,) whether it stands in each frame.
+        distance: farthest from where it stood first, in the horizontal plane, in any of the times that it stands,
+            metres.
+        at: the frame in which it is farthest.
+    """
+
+    frame: str
+    stands: NDArray[np.bool_] = field(repr=False)
+    distance: float
+    at: int
+
+
+def paths(figure: Figure, q: Array, frames: tuple[str, ...]) -> Array:
+    """Positions (n, frames, 3) of frames in the world at postures (n, nq), metres."""
+    data, numbers = figure.model.createData(), [figure.frame_id(name) for name in frames]
+    found = np.zeros((len(q), len(frames), 3))
+    for k, posture in enumerate(q):
+        pin.forwardKinematics(figure.model, data, posture)
+        for i, number in enumerate(numbers):
+            found[k, i] = pin.updateFramePlacement(figure.model, data, number).translation
+    return found
+
+
+def standing_points(figure: Figure, q: Array, dt: float) -> dict[str, NDArray[np.bool_]]:
+    """In which frames of (n, nq), `dt` seconds apart, each point of the feet stands: name -> (n,)."""
+    names = foot_points(figure)
+    return dict(standing(figure, q, dt, StanceFeet(names))) if names else {}
+
+
+def slid(path: Array, stands: NDArray[np.bool_]) -> tuple[float, int]:
+    """How far a point moves in the horizontal plane while it stands, from where it stood first.
+
+    Args:
+        path: (n, 3) position in each frame, metres.
+        stands: (n,) when it stands.
+
+    Returns:
+        The longest distance, metres, and its frame; 0 and 0 where it never stands.
+    """
+    far, at = 0.0, 0
+    for first, after in runs(stands):
+        away = np.linalg.norm(path[first:after, :2] - path[first, :2], axis=1)
+        if away.max() > far:
+            far, at = float(away.max()), int(first + np.argmax(away))
+    return far, at
+
+
+def sliding(figure: Figure, q: Array, dt: float) -> tuple[Sliding, ...]:
+    """How far each point of the feet slides while it stands, at postures (n, nq), `dt` seconds apart."""
+    stand, found = standing_points(figure, q, dt), []
+    for name, path in zip(stand, paths(figure, q, tuple(stand)).transpose(1, 0, 2), strict=True):
+        found.append(Sliding(name, stand[name], *slid(path, stand[name])))
+    return tuple(found)

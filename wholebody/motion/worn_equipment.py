@@ -1,19 +1,28 @@
-"""Equipment: what a figure wears, on one of its segments; exact, or filled with spheres that join a collision group."""
+"""Equipment: what a figure wears on its segments, and ready-made pieces for people.
+
+A piece is exact, or filled with spheres that join a collision group. Ready-made pieces are parametric meshes and solids
+of the sizes of common gear; their places follow from the figure's pieces.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import choice, color, instance, known, listed, number, text
+from wholebody.base.checks import text as checked_text
 from wholebody.base.errors import InputError
+from wholebody.base.files import is_file
 from wholebody.figures.figure import Figure
 from wholebody.geometry.placement import PlacementLike, placement
-from wholebody.geometry.shapes import Shape
+from wholebody.geometry.shapes import Box, Mesh, Shape, Sphere
 from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene.scene import Scene
@@ -22,8 +31,6 @@ Side = Literal["front", "back", "left", "right"]
 
 OUTWARD = {"front": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}
 """Direction from the body to what is worn on a side: x is forward and y left."""
-
-FARTHEST = 1.0  # m: greatest height of worn equipment above the origin of its segment
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,9 +113,9 @@ class Equipment:
         instance(shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         known(to, figure.segments, "segment", f"{where}: to")
         outward = np.array(OUTWARD[choice(side, tuple(OUTWARD), f"{where}: side")])
-        shift = number(sideways, f"{where}: sideways", -FARTHEST, FARTHEST, "m")
+        shift = number(sideways, f"{where}: sideways", -1.0, 1.0, "m")
         middle = np.array([0.0, shift, 0.0]) if side in ("front", "back") else np.array([shift, 0.0, 0.0])
-        middle[2] = number(height, f"{where}: height", -FARTHEST, FARTHEST, "m")
+        middle[2] = number(height, f"{where}: height", -1.0, 1.0, "m")
         low, high = bounds(shape)
         half = 0.5 * np.abs(outward) @ (high - low)
         at = middle + outward * (_surface(figure, to, outward, where) + half) - 0.5 * (low + high)
@@ -191,3 +198,156 @@ def _along(geometry: object, at: pin.SE3, direction: Array) -> float:
     local = at.rotation.T @ direction
     reach = float((swept.points @ local).max()) + swept.radius if len(swept.points) else swept.reach
     return float(at.translation @ direction) + reach
+
+
+CARRIERS = ("lower_thorax", "thorax")
+CLOTH = (0.35, 0.38, 0.28, 1.0)
+
+BALL = 0.075  # m: radius of the sphere at the torso's side, of which half is inside the torso
+SIDE, WAIST, BELT = -0.05, -0.11, -0.15  # m: heights above the origin of the lower thorax
+SECTIONS, ROUND = 16, 12  # convex sections of the torus, and corners of each
+
+
+def side_sphere(figure: Figure) -> tuple[Equipment, ...]:
+    """A ball at the left side of the torso, half inside it."""
+    ball = Equipment.worn(
+        Sphere(BALL), figure, name="side_sphere", to="lower_thorax", side="left", height=SIDE, color=CLOTH
+    )
+    at = ball.at.translation - np.array([0.0, BALL, 0.0])  # type: ignore[union-attr]
+    return (Equipment(ball.name, ball.shape, ball.to, at, ball.rests_on, CLOTH),)
+
+
+def pouches(figure: Figure) -> tuple[Equipment, ...]:
+    """A pouch at each side of the waist."""
+    depth, width, height = 0.05, 0.17, 0.20  # m, of a double magazine pouch
+    shape = Box((width, depth, height))
+    return tuple(
+        Equipment.worn(
+            shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=BELT, sideways=0.1, color=CLOTH
+        )
+        for side in ("left", "right")
+    )
+
+
+def vest_plate(figure: Figure) -> tuple[Equipment, ...]:
+    """A plate on the chest."""
+    plate = Box((0.025, 0.24, 0.32))  # m, a medium plate of body armour
+    return (Equipment.worn(plate, figure, name="vest_plate", to="thorax", side="front", color=CLOTH),)
+
+
+def pack(figure: Figure) -> tuple[Equipment, ...]:
+    """A pack on the back."""
+    bag = Box((0.20, 0.32, 0.50))  # m, a day pack of 30 litres
+    return (Equipment.worn(bag, figure, name="pack", to="thorax", side="back", height=-0.08, color=CLOTH),)
+
+
+def torus(figure: Figure) -> tuple[Equipment, ...]:
+    """A horizontal ring at the left side of the waist; a hanging arm can get into its hole."""
+    mesh = Mesh(torus_mesh(0.13, 0.03))  # the hole is wide enough for a forearm
+    return (Equipment.worn(mesh, figure, name="torus", to="lower_thorax", side="left", height=WAIST, color=CLOTH),)
+
+
+NOTHING = "nothing"
+"""In place of equipment: nothing is worn."""
+
+READY: dict[str, Callable[[Figure], tuple[Equipment, ...]]] = {
+    "side_sphere": side_sphere,
+    "pouches": pouches,
+    "vest_plate": vest_plate,
+    "pack": pack,
+    "torus": torus,
+}
+
+
+def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
+    """Ready-made equipment, at its place on a person.
+
+    Args:
+        name: "side_sphere", "pouches", "vest_plate", "pack" or "torus".
+        figure: the person or avatar that wears it.
+
+    Raises:
+        UnknownNameError: there is no such equipment.
+        InputError: not a person.
+    """
+    known(name, READY, "equipment", "equipment")
+    instance(figure, Figure, "equipment: figure", "load one with wb.load('human')")
+    if not set(CARRIERS) <= set(figure.segments):
+        raise InputError(
+            f"equipment {name!r} fits a person, and {figure.name!r} lacks {', '.join(CARRIERS)}; "
+            "put it on with wb.motion.Equipment(name, shape, to=..., at=...)"
+        )
+    return READY[name](figure)
+
+
+Worn = str | Equipment | tuple["str | Equipment", ...]
+"""What is worn: "nothing"; names of equipment, joined by "+"; the path of a mesh, which is put on the back; equipment;
+or several of these."""
+
+
+def dressed(figure: Figure, worn: Worn) -> Scene:
+    """The scene of a figure that wears something; see `put_on`."""
+    return put_on(Scene(figure), worn)
+
+
+def put_on(scene: Scene, worn: Worn) -> Scene:
+    """The scene, which is changed, with something attached to its figure.
+
+    Raises:
+        UnknownNameError: there is no such equipment.
+        WholebodyError: a mesh that cannot be read, or a figure that the equipment does not fit.
+    """
+    if isinstance(worn, tuple):
+        for one in worn:
+            put_on(scene, one)
+        return scene
+    pieces = [worn] if isinstance(worn, Equipment) else list[Equipment]()
+    for name in () if isinstance(worn, Equipment) else _names(worn):
+        if name not in READY and Path(name).suffix:
+            pieces.append(Equipment.worn(Mesh(name), scene.figure, name=Path(name).stem))
+        elif name != NOTHING:
+            pieces.extend(equipment(name, scene.figure))
+    for piece in pieces:
+        piece.attach(scene)
+    return scene
+
+
+def label(worn: Worn) -> str:
+    """Name of what is worn, for tables and files.
+
+    Raises:
+        InputError: it is nothing of these.
+    """
+    if isinstance(worn, tuple) and worn:
+        return "+".join(label(one) for one in worn)
+    if isinstance(worn, Equipment):
+        return worn.name
+    return "+".join(Path(name).stem if Path(name).suffix else name for name in _names(worn))
+
+
+def _names(worn: object) -> list[str]:
+    text = checked_text(worn, "equipment")
+    return [text] if is_file(text) else text.split("+")
+
+
+def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
+    """A torus about z of convex closed sections, as vertices and triangles.
+
+    Args:
+        radius: of the circle of centres, metres.
+        tube: radius of its cross-section, metres.
+    """
+    turn = 2.0 * np.pi * np.arange(ROUND) / ROUND
+    ring = np.stack([radius + tube * np.cos(turn), np.zeros(ROUND), tube * np.sin(turn)], axis=1)
+    sides = [(k, (k + 1) % ROUND) for k in range(ROUND)]
+    section = [[a, b + ROUND, b] for a, b in sides] + [[a, a + ROUND, b + ROUND] for a, b in sides]
+    section += [[0, k, k + 1] for k in range(1, ROUND - 1)]
+    section += [[ROUND, ROUND + k + 1, ROUND + k] for k in range(1, ROUND - 1)]
+    vertices, faces = [], []
+    for k in range(SECTIONS):
+        # rad: between two sections, so that they stay separate parts, each convex
+        for angle in (2.0 * np.pi * k / SECTIONS + 1e-4, 2.0 * np.pi * (k + 1) / SECTIONS):
+            c, s = np.cos(angle), np.sin(angle)
+            vertices.append(ring @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
+        faces.append(np.array(section, dtype=np.int64) + 2 * ROUND * k)
+    return np.vstack(vertices), np.vstack(faces)

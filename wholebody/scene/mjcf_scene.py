@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.checks import path as as_path
-from wholebody.base.checks import warn
+from wholebody.base.checks import text, warn
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import check_file
 from wholebody.figures.link_pieces import Concavity
@@ -45,6 +45,8 @@ def read_scene(path: str | PathLike[str], root: str | None = None, concavity: Co
         raise FileFormatError(
             f"{place}: a scene is an MJCF file, whose outermost element is <mujoco>; wb.load reads a URDF"
         )
+    if root is not None:
+        text(root, "read_scene: root")
     compiled = Compiled(place)
     scene = Scene(mjcf_figure(compiled, root, concavity))
     names, model = compiled.names, compiled.model

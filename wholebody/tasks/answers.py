@@ -45,32 +45,48 @@ def _is_ours(kind: type) -> bool:
     return kind.__module__.partition(".")[0] == _OURS
 
 
-def check_answers(kind: type, table: Mapping[str, tuple[str, Check]]) -> None:
+def check_answers(kind: type, table: Mapping[str, Check]) -> None:
     """Have the answers of a class of terms checked.
 
     Args:
         kind: the class; methods and properties that this package wrote, or that are checked already, stay as they are.
-        table: method or property to what it answers in words, and its check.
+        table: method or property to the check of its answer.
     """
-    for name, (what, check) in table.items():
+    for name, check in table.items():
         owner = next((base for base in kind.__mro__ if name in vars(base)), None)
         if owner is None or _is_ours(owner):
             continue
         found = vars(owner)[name]
         if isinstance(found, property):
             if found.fget is not None and not hasattr(found.fget, _MARK):
-                setattr(kind, name, property(_checked(found.fget, what, check), doc=found.__doc__))
+                setattr(kind, name, property(_checked(found.fget, name, check), doc=found.__doc__))
         elif hasattr(found, "__get__") and not hasattr(found, _MARK):
-            setattr(kind, name, _checked(found, what, check))
+            setattr(kind, name, _checked(found, name, check))
 
 
 def _checked(found: Any, what: str, check: Check) -> Any:
     def answer(self: object, *arguments: Any, **named: Any) -> Any:
-        given = found.__get__(self, type(self))(*arguments, **named)
-        return check(self, what, given, arguments or tuple(named.values()))
+        return Checked(self, what, found.__get__(self, type(self)), check)(*arguments, **named)
 
     setattr(answer, _MARK, True)
     return wraps(found)(answer) if hasattr(found, "__name__") else answer
+
+
+class Checked:
+    """A method of a term whose answers are checked."""
+
+    def __init__(self, term: object, what: str, found: Callable[..., Any], check: Check) -> None:
+        """Store the term, the method and its check."""
+        self._term, self._what, self._found, self._check = term, what, found, check
+
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
+        """The checked answer."""
+        given, asked = self._found(*arguments, **named), arguments or tuple(named.values())
+        try:
+            return self._check(self._term, self._what, given, asked)
+        except UndefinedTermError as error:
+            error.q = next((np.array(one.q) for one in asked if isinstance(one, State)), None)
+            raise
 
 
 def values(term: object, what: str, given: Any, _: object = ()) -> Array:

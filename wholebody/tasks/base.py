@@ -12,8 +12,8 @@ from __future__ import annotations
 
 import copy
 from abc import ABC, abstractmethod
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, TypeVar
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
@@ -83,6 +83,19 @@ class SupportingPlanes(NamedTuple):
 class Term(Checked):
     """Base of goals, constraints, bounds and measures; `Checked` says how the fields of one are checked."""
 
+    _answered: ClassVar[Mapping[str, answers.Check]] = {}
+
+    def __init_subclass__(cls, **given: Any) -> None:
+        """Have the answers of a class of one's own checked at every call."""
+        super().__init_subclass__(**given)
+        answers.check_answers(cls, cls._answered)
+
+    def __setattr__(self, name: str, value: object) -> None:
+        """Set an attribute; the answers of a method that is set on an object are checked too."""
+        if name in self._answered and callable(value):
+            value = answers.Checked(self, name, value, self._answered[name])
+        object.__setattr__(self, name, value)
+
     @property
     def touching(self) -> tuple[tuple[str, str], ...]:
         """Pairs of segments and things that the term brings together: their clearance is zero; once resolved."""
@@ -112,18 +125,12 @@ class Term(Checked):
 class Goal(Term, ABC):
     """An equality that is met if possible: ``error(state) = 0``."""
 
-    def __init_subclass__(cls, **given: Any) -> None:
-        """Have the answers of a class of one's own checked at every call."""
-        super().__init_subclass__(**given)
-        answers.check_answers(
-            cls,
-            {
-                "error": ("error", answers.values),
-                "jacobian": ("jacobian", answers.rows),
-                "weight": ("weight", answers.weight),
-                "angular": ("angular", answers.mask),
-            },
-        )
+    _answered: ClassVar[Mapping[str, answers.Check]] = {
+        "error": answers.values,
+        "jacobian": answers.rows,
+        "weight": answers.weight,
+        "angular": answers.mask,
+    }
 
     @property
     def weight(self) -> float:
@@ -155,19 +162,13 @@ class Goal(Term, ABC):
 class Constraint(Term, ABC):
     """An equality or inequality that always holds: ``lower <= value(state) <= upper``."""
 
-    def __init_subclass__(cls, **given: Any) -> None:
-        """Have the answers of a class of one's own checked at every call."""
-        super().__init_subclass__(**given)
-        answers.check_answers(
-            cls,
-            {
-                "value": ("value", answers.values),
-                "jacobian": ("jacobian", answers.rows),
-                "lower": ("lower", answers.limit),
-                "upper": ("upper", answers.limit),
-                "angular": ("angular", answers.mask),
-            },
-        )
+    _answered: ClassVar[Mapping[str, answers.Check]] = {
+        "value": answers.values,
+        "jacobian": answers.rows,
+        "lower": answers.limit,
+        "upper": answers.limit,
+        "angular": answers.mask,
+    }
 
     @property
     def lower(self) -> Array:
@@ -200,10 +201,7 @@ class Constraint(Term, ABC):
 class Bound(Term, ABC):
     """Least and greatest displacement of every degree of freedom."""
 
-    def __init_subclass__(cls, **given: Any) -> None:
-        """Have the answers of a class of one's own checked at every call."""
-        super().__init_subclass__(**given)
-        answers.check_answers(cls, {"bounds": ("bounds", answers.sides)})
+    _answered: ClassVar[Mapping[str, answers.Check]] = {"bounds": answers.sides}
 
     @abstractmethod
     def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
@@ -221,19 +219,13 @@ class Bound(Term, ABC):
 class Measure(Term, ABC):
     """A cost to minimise. Value, gradient and curvature are without the weight; the problem multiplies them by it."""
 
-    def __init_subclass__(cls, **given: Any) -> None:
-        """Have the answers of a class of one's own checked at every call."""
-        super().__init_subclass__(**given)
-        answers.check_answers(
-            cls,
-            {
-                "value": ("value", answers.one),
-                "gradient": ("gradient", answers.freedoms),
-                "curvature": ("curvature", answers.diagonal),
-                "squares": ("squares", answers.squares),
-                "weight": ("weight", answers.weight),
-            },
-        )
+    _answered: ClassVar[Mapping[str, answers.Check]] = {
+        "value": answers.one,
+        "gradient": answers.freedoms,
+        "curvature": answers.diagonal,
+        "squares": answers.squares,
+        "weight": answers.weight,
+    }
 
     @property
     def weight(self) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import instance, shown
+from wholebody.base.checks import FASTEST_TURN, instance, shown, warn_of_degrees
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
 from wholebody.figures.description import Limits
@@ -87,6 +87,8 @@ class StepLimit(Bound):
         super().__post_init__()
         instance(self.joints, Mapping, "StepLimit: joints", "give velocities by name, such as {'left_arm': 1.0}")
         speeds = {name: SPEED(speed, f"StepLimit: joints[{shown(name)}]") for name, speed in self.joints.items()}
+        for name, speed in {"velocity": self.velocity, "root_turn": self.root_turn, **speeds}.items():
+            warn_of_degrees(speed, f"StepLimit: {name}", FASTEST_TURN, "rad/s")
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:

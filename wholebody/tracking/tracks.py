@@ -34,8 +34,8 @@ def check_frames(q: Array, what: str, place: Callable[[int], str]) -> None:
     Raises:
         InputError: a value is not finite or far too large; the frame is named.
     """
-    bad = np.argwhere(~(np.abs(q) <= LARGEST))
-    if len(bad):
+    if not (q.min(initial=0.0) >= -LARGEST and q.max(initial=0.0) <= LARGEST):  # false of NaN, and without copies of q
+        bad = np.argwhere(~(np.abs(q) <= LARGEST))
         frame, column = (int(k) for k in bad[0])
         raise InputError(
             f"{what}: frame {frame}, {place(column)} is {q[frame, column]:g}; {len(bad)} values are not finite or "

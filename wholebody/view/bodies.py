@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -12,6 +12,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.pieces import box_corners
 from wholebody.view import drawing, style
+from wholebody.view.crowds import crowds
 from wholebody.view.link_visuals import LinkVisuals
 from wholebody.view.scene_graph import Keyframe, SceneGraph
 from wholebody.view.skin import Skin, Skinned
@@ -114,8 +115,15 @@ class Bodies:
             owner for owner in scene.piece_owner for figure in self._drawn if figure.owns(owner, numbers)
         )
         self._patches: list[tuple[str, Skinned]] = []
-        shown = enumerate(self.all)
-        self._things = [index for index, body in shown if body.thing is not None and not self._hidden(index)]
+        shown = [index for index, body in enumerate(self.all) if body.thing is not None and not self._hidden(index)]
+        self._things, standing = shown, [index for index in shown if self._stands(index)]
+        colors = [body.color for body in self.all]
+        self._crowds = crowds(LOOK.object_node, standing, list(scene.geometry.geometryObjects), colors)
+        self._among = {
+            index: (crowd.path, k) for crowd in self._crowds for k, index in enumerate(crowd.members.tolist())
+        }
+        for index in self._among:  # no node of its own
+            self.carriers.pop(self.all[index].carrier, None)
 
     def _drawn_figures(self) -> Iterator[DrawnFigure]:
         """The figures that have a surface or visuals; their joints' nodes join the carriers."""
@@ -157,7 +165,7 @@ class Bodies:
         ]
         for index, piece in enumerate(self.scene.geometry.geometryObjects):
             body = self.all[index]
-            if self._hidden(index):
+            if self._hidden(index) or index in self._among:
                 continue
             graph.put(body.path, drawing.piece(piece.geometry, body.path, body.color))
             graph.place(body.path, piece.placement.homogeneous)
@@ -179,9 +187,18 @@ class Bodies:
         body = self.all[index]
         return self.scene.piece_owner[index] in self._owned or (body.thing is None and body.color[3] == 0.0)
 
+    def _stands(self, index: int) -> bool:
+        """Whether a thing's piece is opaque and the world carries it."""
+        body = self.all[index]
+        return body.joint == 0 and not body.plate and body.color[3] == 1.0
+
     def paint(self, keyframe: Keyframe, index: int, state: Color) -> None:
         """Give a piece the colour of a state, or the patches of the surface on its segment."""
         body = self.all[index]
+        if index in self._among:
+            path, number = self._among[index]
+            keyframe.crowds[path] = keyframe.crowds[path].painted(number, body.state_color(state))
+            return
         if not self._hidden(index):
             keyframe.colors[body.path] = body.state_color(state)
             return
@@ -195,9 +212,12 @@ class Bodies:
             keyframe.transforms[path] = data.oMi[joint].homogeneous
         pieces = self.scene.geometry.geometryObjects
         for index in self._things:
-            keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
+            if index not in self._among:
+                keyframe.transforms[self.all[index].path] = pieces[index].placement.homogeneous
+        for crowd in self._crowds:
+            keyframe.crowds[crowd.path] = crowd.at(pieces)
         for index, body in enumerate(self.all):
-            if not self._hidden(index):
+            if not self._hidden(index) and index not in self._among:
                 keyframe.colors[body.path] = body.color
         for _, patch in self._patches:
             keyframe.colors[patch.path] = patch.color
@@ -232,15 +252,14 @@ class Bodies:
             if body.thing is None or (not body.plate and body.color[3] == 1.0)
         ]
         chosen = [index for index in solid if (self.all[index].thing is not None) == things]
-        return np.concatenate([np.zeros((0, 3)), *(self._box(index, data) for index in chosen)])
+        return self._boxes(chosen, data).reshape(-1, 3)
 
     def tops(self, data: Any) -> dict[str, tuple[str, Array]]:
         """Labels of things: by node, the name and the top middle (3,) of its boxes; no half-spaces."""
         found: dict[str, list[Array]] = {}
-        for index in self._things:
-            body = self.all[index]
-            if not body.plate and body.thing is not None:
-                found.setdefault(body.thing, []).append(self._box(index, data))
+        named = [index for index in self._things if not self.all[index].plate]
+        for index, box in zip(named, self._boxes(named, data), strict=True):
+            found.setdefault(str(self.all[index].thing), []).append(box)
         tops = {}
         for name, boxes in found.items():
             corners = np.concatenate(boxes)
@@ -258,11 +277,14 @@ class Bodies:
             if owner in colors:
                 keyframe.colors[patch.path] = colors[owner]
 
-    def _box(self, index: int, data: Any) -> Array:
-        """Corners (8, 3) in the world of the box around a piece."""
-        piece = self.scene.geometry.geometryObjects[index]
-        place = data.oMi[self.all[index].joint] * piece.placement
-        return np.asarray(self.all[index].corners @ place.rotation.T + place.translation)
+    def _boxes(self, indices: Sequence[int], data: Any) -> Array:
+        """Corners (k, 8, 3) in the world of the boxes around pieces."""
+        pieces = self.scene.geometry.geometryObjects
+        places = [data.oMi[self.all[index].joint] * pieces[index].placement for index in indices]
+        turns = np.array([place.rotation for place in places]).reshape(-1, 3, 3)
+        origins = np.array([place.translation for place in places]).reshape(-1, 1, 3)
+        corners = np.array([self.all[index].corners for index in indices]).reshape(-1, 8, 3)
+        return np.asarray(corners @ np.swapaxes(turns, 1, 2) + origins)
 
 
 def _own_color(piece: Any) -> Color:

@@ -39,7 +39,7 @@ def look(
         command["eye"] = np.asarray(eye, dtype=float).tolist()
     else:
         command["direction"] = np.asarray(direction, dtype=float).tolist()
-        command["points"] = np.asarray(points, dtype=float).round(6).ravel().tolist()
+        command["points"] = commands.floats(points)
         command["margin"] = float(margin)
     return Command(CAMERA, "", "", commands.pack(command))
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import coal
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +17,7 @@ from wholebody.view.style import LOOK, Color
 Three = dict[str, Any]
 _FRONT, _BOTH = 0, 2
 _AROUND, _ALONG = 32, 8
+_TRIANGLES = 1_500_000  # of balls that are drawn together
 
 
 def piece(geometry: Any, name: str, color: Color) -> Three:
@@ -32,6 +34,38 @@ def piece(geometry: Any, name: str, color: Color) -> Three:
     shape, scale, center, flat = _shape(geometry, name)
     shadow = color[3] == 1.0 and type(geometry).__name__ != "Halfspace"
     return _mesh(name, shape, _material(color, flat=flat), matrix=_matrix(scale, center), shadow=shadow)
+
+
+def unit(geometry: Any) -> Any:
+    """What pieces of a kind are but for scale: a ball of radius 1, a cube of side 1; otherwise the piece itself."""
+    kind = type(geometry).__name__
+    if kind in ("Sphere", "Ellipsoid"):
+        return coal.Sphere(1.0)
+    return coal.Box(1.0, 1.0, 1.0) if kind == "Box" else geometry
+
+
+def instances(form: Any, name: str, places: Array, colors: Array) -> Three:
+    """Opaque pieces of one form as one object; balls have the fewer triangles the more there are.
+
+    Args:
+        form: a coal shape, as for `piece`.
+        name: an identifier that nothing else in the page has.
+        places: (k, 4, 4) placement of each, with its scale.
+        colors: (k, 3) red, green, blue of each.
+    """
+    shape, _, _, flat = _shape(form, name)
+    if shape["type"] == "SphereGeometry":
+        around = int(np.clip((_TRIANGLES / len(places) / 1.5) ** 0.5, 8, _AROUND))
+        shape = {**shape, "widthSegments": around, "heightSegments": 3 * around // 4}
+    made = _mesh(name, shape, _material((1.0, 1.0, 1.0, 1.0), flat=flat))
+    made["object"].update(
+        type="InstancedMesh",
+        count=len(places),
+        instanceMatrix={"array": floats(np.swapaxes(places, 1, 2))},
+        instanceColor={"array": floats(colors), "itemSize": 3},
+        frustumCulled=False,  # the box of the mesh is that of the form
+    )
+    return made
 
 
 def mesh(vertices: Array, faces: NDArray[Any], name: str, color: Color) -> Three:

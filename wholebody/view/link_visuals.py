@@ -23,7 +23,7 @@ from wholebody.view.skin import Skinned
 from wholebody.view.style import Color
 from wholebody.view.surface.nets import clustered
 
-FORMAT = "1"
+FORMAT = "2"
 """Part of the key of kept meshes: another one whenever what is kept changes."""
 
 MANY = 4000
@@ -121,7 +121,8 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
     place = Path(path)
 
     def make() -> MeshParts:
-        parts = [(vertices * scale, faces, color) for vertices, faces, color in read_parts(place)]
+        turn = slice(None, None, -1 if np.prod(scale) < 0.0 else 1)  # a mirrored face keeps its outer side
+        parts = [(vertices * scale, faces[:, turn], color) for vertices, faces, color in read_parts(place)]
         fine = sum(len(faces) for _, faces, _ in parts) <= MANY
         return tuple(part if fine else _thinned(*part) for part in parts)
 

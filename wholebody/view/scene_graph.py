@@ -11,6 +11,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.view import commands, drawing
 from wholebody.view.commands import Track
+from wholebody.view.crowds import Instances
 from wholebody.view.sender import Sender
 from wholebody.view.server import Command, Store
 from wholebody.view.style import LOOK, Color
@@ -40,6 +41,7 @@ class Keyframe:
     Attributes:
         transforms: placement (4, 4) by node, relative to the node above.
         colors: by node.
+        crowds: pieces that are drawn together, by node; a motion shows those of its first keyframe.
         markers: marker and placement (4, 4) by node. Markers of earlier keyframes that are not named are hidden.
         contacts_shown: whether all pairs that overlap are shown.
         touching, overlapping: numbers of pairs that are shown as touching, and that overlap.
@@ -48,6 +50,7 @@ class Keyframe:
 
     transforms: dict[str, Array] = field(default_factory=dict)
     colors: dict[str, Color] = field(default_factory=dict)
+    crowds: dict[str, Instances] = field(default_factory=dict)
     markers: dict[str, tuple[Marker, Array]] = field(default_factory=dict)
     contacts_shown: bool = True
     touching: int = 0
@@ -64,6 +67,7 @@ class SceneGraph:
         self._sender: Sender | None = None
         self._waiting: list[Command] = []
         self._markers: dict[str, Marker] = {}
+        self._crowds: dict[str, Instances] = {}
 
     def connect(self, sender: Sender) -> None:
         """Connect to the live page, which then shows everything."""
@@ -109,6 +113,10 @@ class SceneGraph:
             self.place(path, matrix)
         for path, color in keyframe.colors.items():
             self.set(path, "color", color)
+        for path, crowd in keyframe.crowds.items():
+            if self._crowds.get(path) is not crowd:
+                self._crowds[path] = crowd
+                self.put(path, crowd.drawn(path))
         for path in self._markers:
             shown = path in keyframe.markers
             self.set(path, "visible", shown)

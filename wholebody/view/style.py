@@ -72,9 +72,9 @@ LOOK = Style()
 
 
 def object_color(number: int) -> Color:
-    """Colour of the thing with this number: the palette, then the palette darker."""
+    """Colour of the thing with this number: the palette, then the palette in three darker shades, then anew."""
     red, green, blue, alpha = LOOK.objects[number % len(LOOK.objects)]
-    shade = 0.78 ** (number // len(LOOK.objects))
+    shade = 0.78 ** (number // len(LOOK.objects) % 4)
     hue, lightness, saturation = colorsys.rgb_to_hls(red, green, blue)
     return (*colorsys.hls_to_rgb(hue, max(lightness * shade, 0.15), saturation), alpha)
 

@@ -15,8 +15,8 @@ from wholebody.bench.measure.motion import cases, measuring, report
 from wholebody.bench.measure.motion.measuring import CHECKED, NEAREST, MotionRow
 from wholebody.bench.tables import read_rows
 from wholebody.cli import main
-from wholebody.motion import avoidance
-from wholebody.motion.ready_equipment import dressed
+from wholebody.motion import avoidance, judging
+from wholebody.motion.worn_equipment import dressed
 
 NAME = "sword cut"
 
@@ -84,7 +84,7 @@ def test_a_clip_that_misses_what_is_held_is_not_free(tmp_path: Path, monkeypatch
     wb.Clip(figure, np.array([figure.posture("standing")] * 8), 1 / 30, "still").write(path)
     row, missed, freed = MotionRow("still", "nothing", "trajectory"), 0.0, avoidance.avoid
 
-    def avoid(*given: object, **more: object) -> avoidance.Avoided:
+    def avoid(*given: object, **more: object) -> judging.Avoided:
         found = freed(*given, **more)  # type: ignore[arg-type]
         return dataclasses.replace(found, report=dataclasses.replace(found.report, missed=missed))
 

@@ -133,7 +133,7 @@ def test_squat_is_balanced():
     assert at["left_heel"].translation[0] < x < at["left_toe_tip"].translation[0]
 
 
-@settings(max_examples=15)
+@settings(max_examples=6)
 @given(
     sex=st.sampled_from(["male", "female"]),
     stature=st.floats(1.45, 2.05),

@@ -10,7 +10,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.cones import Polygon, guards
+from wholebody.methods.ccd.cones import Polygon
+from wholebody.methods.ccd.guards import guards
 from wholebody.methods.ccd.limbs import Limbs
 
 
@@ -40,7 +41,7 @@ def test_a_limb_that_left_its_cone_is_brought_back(
         limbs.read(start, data)
         limbs.forward()
         for cone in cones:
-            cone.read(data)
+            cone.read(start, data)
         pin.forwardKinematics(human.model, data, q)
         limbs.read(q, data)
         limbs.forward()

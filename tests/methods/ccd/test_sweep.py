@@ -70,7 +70,7 @@ def test_the_nearest_allowed_angle_is_found_across_half_a_turn() -> None:
     assert within(7.0, -np.inf, 1.0) == pytest.approx(7.0 - 2.0 * np.pi)
 
 
-@settings(max_examples=40)
+@settings(max_examples=20)
 @given(radius=st.floats(0.15, 0.65), angle=st.floats(-2.0, 2.0))
 def test_two_links_reach_where_the_triangle_says(radius: float, angle: float, planar_arm: Callable[..., Any]) -> None:
     figure = planar_arm((0.4, 0.3))

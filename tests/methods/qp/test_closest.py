@@ -41,7 +41,7 @@ def test_how_a_pull_bends_is_the_second_derivative_of_the_place():
         assert total == pytest.approx(np.array(second), abs=1e-6)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_start_whose_holds_are_far_off_comes_back_to_them(standing, seed):
     """What holds a metre away pull with is no curvature: with it descents ended after two programs."""
     problem = wb.Problem(standing, goals=[wb.Point("right_index_tip", (0.2, -0.3, 2.6))], constraints=FEET)

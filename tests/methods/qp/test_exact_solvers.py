@@ -57,7 +57,7 @@ def programs(draw):
 
 
 @pytest.mark.parametrize("name", solver_names())
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(program=programs())
 def test_every_solver_is_exact(name, program):
     solver = make_solver(name, hot_start=False)
@@ -70,7 +70,7 @@ def test_every_solver_is_exact(name, program):
     assert (fresh.by, fresh.iterations) == (once.by, once.iterations)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(program=programs())
 def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
     workspace = OSQPSolver().workspace(program)
@@ -85,7 +85,7 @@ def test_osqps_arrays_are_those_of_the_scaled_split_form(program):
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(program=programs())
 def test_the_scaled_form_is_the_same_program(program):
     """Its variables are those of the split form, scaled; the objective is the same, whatever the weights."""
@@ -112,7 +112,7 @@ def test_a_form_that_was_used_is_as_good_as_a_new_one(random_program):
         assert np.array_equal(one, other)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(program=programs())
 def test_quadprog_gets_a_factor_of_the_inverse_hessian(program):
     factor = inverse_factor(program)

@@ -67,8 +67,7 @@ def test_without_a_hot_start_every_program_is_the_named_solvers(over_a_table, as
     assert all(answer.iterations > 0 for answer in asked), "the solver's own iterations"
 
 
-@pytest.mark.parametrize("solver", ["osqp", "active_set"])
-@pytest.mark.parametrize("hot_start", [True, False])
+@pytest.mark.parametrize(("solver", "hot_start"), [("osqp", True), ("active_set", False)])
 def test_counts_add_up_to_the_programs(over_a_table, solver, hot_start):
     for measures in (True, False):
         solution = wb.QP(solver=solver, hot_start=hot_start, measures=measures).solve(over_a_table)

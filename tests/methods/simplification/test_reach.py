@@ -45,7 +45,7 @@ def postures(model: pin.Model, count: int, rng: np.random.Generator) -> np.ndarr
     return found
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_a_ball_holds_its_piece_in_every_posture_seen_from_every_joint(seed: int) -> None:
     pin.seed(seed)
     rng = np.random.default_rng(seed)

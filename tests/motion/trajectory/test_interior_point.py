@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import tracemalloc
+from typing import Any
 
 import numpy as np
 import pytest
 import qpsolvers
 import scipy.sparse as sp
 
-from wholebody.motion.trajectory.band import compiled_kernel
-from wholebody.motion.trajectory.banded_qp import ACCURACY, GAP, BandedQP
-from wholebody.motion.trajectory.interior_point import minimise
-from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory import interior_point
+from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
+from wholebody.motion.trajectory.banded_qp import ACCURACY, GAP
+from wholebody.motion.trajectory.deviations import Objective
 
 FRAMES, DOFS = 10, 3
 PRICE = 1e3
+
+
+def minimise(*given: Any) -> Answer:
+    """The answer of a program, its fields one after the other, to an accuracy and a gap."""
+    return interior_point.minimise(BandedQP(*given[:-2]), *given[-2:])
 
 
 def program(seed: int, fixed: bool = True, contradicting: bool = False) -> BandedQP:
@@ -75,7 +82,7 @@ def dense(asked: BandedQP) -> np.ndarray:
     return np.asarray(found)
 
 
-@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("fixed", [True, False])
 @pytest.mark.parametrize("contradicting", [True, False])
 @pytest.mark.parametrize("known", [True, False])
@@ -191,17 +198,16 @@ def test_squares_of_rows_in_a_band() -> None:
     rows = np.zeros((5, 8))
     for k in range(5):
         rows[k, first[k] : first[k] + lengths[k]] = values[begins[k] : begins[k + 1]]
-    kernel = compiled_kernel()
 
     def full(band: np.ndarray) -> np.ndarray:
         lower = np.array([[band[j, i - j] if 0 <= i - j < band.shape[1] else 0.0 for j in range(8)] for i in range(8)])
         return lower + np.tril(lower, -1).T
 
     band = np.zeros((8, 7))
-    kernel.add_rows(band, first, begins, values, weights)
+    add_rows(band, first, begins, values, weights)
     np.testing.assert_allclose(full(band), rows.T @ np.diag(weights) @ rows, atol=1e-12)
 
     band, shares = np.zeros((8, 7)), random.normal(size=2)
-    kernel.add_sums(band, first, begins, values, factors, np.array([0, 1, 2, 3, 4]), np.array([0, 2, 5]), shares)
+    add_sums(band, first, begins, values, factors, np.array([0, 1, 2, 3, 4]), np.array([0, 2, 5]), shares)
     sums = np.array([factors[:2] @ rows[:2], factors[2:] @ rows[2:]])
     np.testing.assert_allclose(full(band), sums.T @ np.diag(shares) @ sums, atol=1e-12)

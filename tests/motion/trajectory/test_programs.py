@@ -8,10 +8,11 @@ import qpsolvers
 import scipy.sparse as sp
 
 import wholebody as wb
-from wholebody.motion.trajectory.banded_qp import SOLVERS, BandedQP, banded_solver
+from wholebody.motion.trajectory.banded_program import BandedQP
+from wholebody.motion.trajectory.banded_qp import SOLVERS, banded_solver
+from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.trajectory.nodes import Node, Rows
-from wholebody.motion.trajectory.objective import Objective
-from wholebody.motion.trajectory.program import Limits, lay_out
+from wholebody.motion.trajectory.program import Limits, Step, lay_out
 
 TIME, DT = 0.1, 0.05
 
@@ -67,11 +68,10 @@ def brought_back(
     bounds = np.full((frames - 1, 1), slowest), np.full((frames - 1, 1), fastest)
     none = np.zeros((0, 1))
     rows = [Rows(Node(k), np.zeros(0), (none,), np.zeros(0, dtype=np.intp), np.zeros(0), none) for k in range(frames)]
-    layout = lay_out(
-        Objective(frames, np.ones(1), 0.0, DT, (False, False)), rows, x, np.zeros(1, dtype=np.intp),
-        Limits(-wide if least is None else least, wide, *bounds), radius,
-        1.0, [np.zeros(0)] * frames, 1.0, [np.zeros(0, dtype=bool)] * frames,
-    )  # fmt: skip
+    none_kept = [np.zeros(0, dtype=bool)] * frames
+    step = Step(x, rows, np.zeros(1, dtype=np.intp), radius, 1.0, [np.zeros(0)] * frames, none_kept)
+    limits = Limits(-wide if least is None else least, wide, *bounds)
+    layout = lay_out(Objective(frames, np.ones(1), 0.0, DT, (False, False)), limits, step)
     return layout.deviations(banded_solver("osqp")[1](layout.program).z, x)
 
 

@@ -11,7 +11,7 @@ import pytest
 import wholebody as wb
 from wholebody.figures.figure import Figure
 from wholebody.motion.frame_terms import frame_terms
-from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
 from wholebody.tasks import Hold, Plane

@@ -17,7 +17,6 @@ from wholebody.view.surface import surface as surfaces
 from wholebody.view.surface.person_shape import PersonShape
 
 PEOPLE: dict[str, dict[str, Any]] = {
-    "median man": {},
     "small woman": {"sex": "female", "stature": 1.525, "mass": 51.3},
     "heavy man": {"sex": "male", "stature": 1.87, "mass": 125.0},
 }
@@ -254,7 +253,7 @@ def test_the_shirt_ends_in_one_level_line_and_covers_the_belt(who: str) -> None:
     assert turns(under, shirt.vertices[shirt.faces]).min() > 0.5
 
 
-@pytest.mark.parametrize("case", ["F5", "F50", "M50", "M95"])
+@pytest.mark.parametrize("case", ["F5", "M95"])
 def test_the_drawn_neck_has_the_girth_that_was_measured(case: str) -> None:
     """Of people of that stature and mass (ANSUR II), although the piece within is thinner."""
     person = design_cases()[case]

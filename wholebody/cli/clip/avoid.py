@@ -13,9 +13,9 @@ from wholebody.cli.command import command, option
 if TYPE_CHECKING:
     from rich.console import Console
 
-    from wholebody.motion.avoidance import Avoided
     from wholebody.motion.avoider import Avoider
     from wholebody.motion.batch_table import AvoidedCase
+    from wholebody.motion.judging import Avoided
 
 METHOD, WORN, FOLDER = "trajectory", "nothing", "freed"
 
@@ -75,7 +75,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.files import check_ending
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import dressed
+    from wholebody.motion.worn_equipment import dressed
 
     (file,) = arguments.files
     jobs_of(arguments)  # one case needs no jobs; what is wrong with them is said all the same

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.base.files import checked_target, write
     from wholebody.motion.checking import DEPTH
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import NOTHING, put_on
+    from wholebody.motion.worn_equipment import NOTHING, put_on
 
     depth = DEPTH if arguments.depth is None else 1e-3 * arguments.depth
     if len(arguments.files) * max(1, len(arguments.equipment)) > 1:
@@ -109,7 +109,7 @@ def _many(arguments: argparse.Namespace, depth: float) -> int:
     from wholebody.base.runner import Job
     from wholebody.cli.tables import table
     from wholebody.motion.checking import LARGEST, SMALLEST
-    from wholebody.motion.ready_equipment import NOTHING, put_on
+    from wholebody.motion.worn_equipment import NOTHING, put_on
 
     if arguments.html is not None:
         raise InputError("--html is for one motion with one equipment; give one file")
@@ -149,7 +149,7 @@ def _check_one(arguments: argparse.Namespace, file: Path, worn: str, depth: floa
     from wholebody.base.errors import WholebodyError
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import put_on
+    from wholebody.motion.worn_equipment import put_on
 
     try:
         scene = put_on(_scene(arguments), worn)

@@ -50,7 +50,7 @@ def run(arguments: argparse.Namespace) -> int:
     from wholebody.base.files import checked_target
     from wholebody.geometry.shapes import HalfSpace
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import dressed
+    from wholebody.motion.worn_equipment import dressed
     from wholebody.view import Viewer
     from wholebody.view.filmstrip import write_filmstrip
 

@@ -86,8 +86,8 @@ def mjcf_figure(
         Robot(
             str(compiled.model.names[: compiled.model.names.index(b"\0")], "utf-8") or compiled.path.stem,
             robot.model, links, made.geometry, (*notes, *made.notes), None, robot.sites,
-            _postures(compiled, robot), robot.cones, untested,
-            compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
+            _postures(compiled, robot), robot.cones, untested=untested,
+            place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
         ),
         samples,
         seed,

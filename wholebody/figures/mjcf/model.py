@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import shown
+from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.figures.description import ROOT_JOINT, JointCone
 from wholebody.figures.mjcf.compiled import BALL, FREE, HINGE, SLIDE, Compiled, placement
 from wholebody.figures.reach_cones import ReachCone
@@ -150,6 +150,8 @@ class _Builder:
         self._joints[joint] = made
         slot, dof = self._model.joints[made].idx_q, self._model.joints[made].idx_v
         low, high = self._range(joint)
+        for end, value in (("lower", low), ("upper", high)) if kind == HINGE else ():
+            warn_of_degrees(value, f"joint {shown(name)}: the {end} limit")
         for limits, value in (("lowerPositionLimit", low), ("upperPositionLimit", high)):
             changed = np.array(getattr(self._model, limits))
             changed[slot] = value + 0.0  # no negative zero

@@ -6,13 +6,17 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
+import pinocchio as pin
+
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
 from wholebody.figures.link_pieces import Concavity, check_concavity
 from wholebody.figures.robot_figure import Robot, check_size, geometry_of_links, robot_figure, visual_of_links
 from wholebody.figures.urdf.extension import extended_figure
 from wholebody.figures.urdf.file import read_urdf
 from wholebody.figures.urdf.model import urdf_model
+from wholebody.figures.urdf.srdf import read_srdf
 
 SAMPLES = 400
 """Number of random postures for finding pairs that always overlap."""
@@ -25,6 +29,7 @@ def urdf_figure(
     concavity: Concavity = None,
     samples: int = SAMPLES,
     seed: int = 0,
+    srdf: str | PathLike[str] | None = None,
 ) -> Figure:
     """Return the figure of a URDF file.
 
@@ -37,6 +42,7 @@ def urdf_figure(
             as a share of a mesh's size; or a mapping from link to such a number, with hulls for the other links.
         samples: number of random postures for finding pairs that always overlap.
         seed: of those postures.
+        srdf: path of its SRDF: groups, states as postures, and pairs of links that are not tested.
 
     Raises:
         FileFormatError: a file that cannot be read, with the place and the correction.
@@ -58,6 +64,20 @@ def urdf_figure(
     )
     if extension is not None:
         return extended_figure(urdf.path, extension, urdf.name, model, geometry, (*urdf.notes, *remarks, *notes))
-    told = (*urdf.notes, *remarks, *notes)
-    visual = visual_of_links(model, urdf.visuals)
-    return robot_figure(Robot(urdf.name, model, urdf.links, geometry, told, visual), samples, seed)
+    robot = Robot(
+        urdf.name, model, urdf.links, geometry, (*urdf.notes, *remarks, *notes), visual_of_links(model, urdf.visuals)
+    )
+    return robot_figure(robot if srdf is None else _described(robot, Path(srdf)), samples, seed)
+
+
+def _described(robot: Robot, path: Path) -> Robot:
+    """The robot with what its SRDF says."""
+    known = read_srdf(path, robot.model, robot.links)
+    owners = [robot.model.frames[piece.parentFrame].name for piece in robot.geometry.geometryObjects]
+    return with_values(
+        robot,
+        notes=(*robot.notes, *known.notes),
+        groups=known.groups,
+        postures=known.postures(robot.model, pin.neutral(robot.model)),
+        untested=lambda first, second: known.disabled.get(frozenset((owners[first], owners[second]))),
+    )

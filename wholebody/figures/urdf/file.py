@@ -6,6 +6,7 @@ import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
+from urllib.parse import unquote
 from xml.etree.ElementTree import Element
 
 from wholebody.base.checks import color, shown
@@ -216,7 +217,7 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
 
     A path is looked up beside the file and in `package_dirs`; ``package://<package>/<path>`` in `package_dirs`, the
     file's parents, the folders of ROS_PACKAGE_PATH, and ``share`` below those of AMENT_PREFIX_PATH. A folder may hold
-    packages or be one.
+    packages or be one. A name that is not found is tried with slashes for backslashes and with ``%20`` decoded.
 
     Args:
         name: the mesh's name in the file.
@@ -229,6 +230,17 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
     """
     if not name.strip():
         raise FileFormatError(f"{place} has a mesh without filename; add it")
+    for tried in dict.fromkeys((name, unquote(name), unquote(name).replace("\\", "/"))):
+        found = _found(tried, place, path, package_dirs)
+        if found is not None:
+            return found
+    raise FileFormatError(
+        f"{place}: the mesh {shown(name)} is not found; put it in place, or name the folder of its package in "
+        "package_dirs or ROS_PACKAGE_PATH"
+    )
+
+
+def _found(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> Path | None:
     folder = Path(os.path.abspath(path)).parent
     if name.startswith(SCHEMES):
         parts = [part for part in name.split("://", 1)[1].split("/") if part not in ("", ".")]
@@ -239,13 +251,7 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
     else:
         plain = Path(name.removeprefix("file://"))
         candidates = [plain if plain.is_absolute() else folder / plain, *(base / plain for base in package_dirs)]
-    for candidate in candidates:
-        if _is_file(candidate):
-            return candidate
-    raise FileFormatError(
-        f"{place}: the mesh {shown(name)} is not found; put it in place, or name the folder of its package in "
-        "package_dirs or ROS_PACKAGE_PATH"
-    )
+    return next(filter(_is_file, candidates), None)
 
 
 def _ros_folders() -> list[Path]:

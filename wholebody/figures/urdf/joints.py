@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import pi, radians
 from pathlib import Path
 from typing import NamedTuple
 from xml.etree.ElementTree import Element
@@ -11,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
-from wholebody.base.checks import shown, warn
+from wholebody.base.checks import UNLIMITED, shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError
 from wholebody.base.records import with_values
 from wholebody.figures.urdf.xml_reading import bounded, numbers, placement, unique_names
@@ -19,12 +18,6 @@ from wholebody.geometry.pieces import LARGEST
 
 JOINT_TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 FOLLOWING = ("revolute", "continuous", "prismatic")
-
-TWO_TURNS = 4.0 * pi
-"""Limits beyond this were probably meant in degrees."""
-
-UNLIMITED = 1e4
-"""Limits beyond this, radians or metres, count as no limits: some files write 1e16 for no limit."""
 
 
 class Mimic(NamedTuple):
@@ -155,9 +148,8 @@ def _limits(element: Element, kind: str, place: str, notes: list[str]) -> tuple[
         lower, upper = (numbers(limit, end, place, 1, "0")[0] for end in ("lower", "upper"))
         if lower > upper:
             raise FileFormatError(f"{place} has the lower limit {lower:g} above the upper {upper:g}; exchange them")
-        if kind == "revolute" and TWO_TURNS < max(abs(lower), abs(upper)) <= UNLIMITED:
-            told = f"{place} has the limits {lower:g} and {upper:g} rad, more than two turns"
-            warn(f"{told}; {lower:g} and {upper:g} degrees are {radians(lower):.4g} and {radians(upper):.4g}")
+        for end, value in (("lower", lower), ("upper", upper)) if kind == "revolute" else ():
+            warn_of_degrees(value, f"{place}: the {end} limit")
         if limit.get("lower") is None and limit.get("upper") is None:
             notes.append(f"joint {shown(name)}: its <limit> has neither lower nor upper, so it moves without limits")
             lower, upper = -np.inf, np.inf

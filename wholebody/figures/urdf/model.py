@@ -45,10 +45,53 @@ def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
     joints, notes = _with_constant_followers(urdf.joints)
     model = _build(urdf, joints, root, mimic=False)
     if any(joint.mimic for joint in joints):
+        joints, remarks = _within_followers(joints)
+        notes += remarks
         joints = _led_by_the_first(joints, {name: place for place, name in enumerate(model.names)})
         model = _build(urdf, joints, root, mimic=True)
+    for joint in joints:
+        if joint.kind == "planar":
+            _lay_in_plane(model, joint)
     _set_limits(model, joints)
     return model, notes
+
+
+def _lay_in_plane(model: pin.Model, joint: UrdfJoint) -> None:
+    """Let a planar joint move in the plane normal to its axis: Pinocchio's moves in x and y of its frame."""
+    z = joint.axis
+    x = np.cross(np.eye(3)[int(np.argmin(np.abs(z)))], z)
+    x /= np.linalg.norm(x)
+    turned = pin.SE3(np.column_stack((x, np.cross(z, x), z)), np.zeros(3))
+    if z[2] == 1.0:
+        return
+    back, index = turned.inverse(), model.getJointId(joint.name)
+    model.jointPlacements[index] = model.jointPlacements[index] * turned
+    model.inertias[index] = back.act(model.inertias[index])
+    for child in range(index + 1, model.njoints):
+        if model.parents[child] == index:
+            model.jointPlacements[child] = back * model.jointPlacements[child]
+    for frame in model.frames:
+        if frame.parentJoint == index:
+            frame.placement = back * frame.placement
+
+
+def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, ...], tuple[str, ...]]:
+    """Cut the limits of leaders so that every follower stays within its own."""
+    laws, by_name = _laws(joints), {joint.name: joint for joint in joints}
+    ends = {name: (joint.lower, joint.upper) for name, joint in by_name.items()}
+    notes = []
+    for name, law in laws.items():
+        own = by_name[name]
+        low, high = sorted((end - law.offset) / law.slope for end in (own.lower, own.upper))
+        kept = max(low, ends[law.leader][0]), min(high, ends[law.leader][1])
+        if kept[0] > kept[1]:
+            told = f"its limits exclude those of {shown(law.leader)}, so they are left out"
+            notes.append(f"joint {shown(name)}: {told}")
+            continue
+        ends[law.leader] = kept
+    return tuple(with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints), tuple(
+        notes
+    )
 
 
 def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:

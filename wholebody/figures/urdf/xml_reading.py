@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.checks import shown, warn
+from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
@@ -20,7 +20,7 @@ MOST_BYTES = 64 * 2**20
 """Largest file that is accepted as a description of a robot."""
 
 
-MOST_TURNED = 2.0 * math.pi
+A_TURN = 2.0 * math.pi
 """Radians: roll, pitch and yaw beyond this were probably meant in degrees."""
 
 MOST = 1e9
@@ -126,10 +126,8 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
     if origin is None:
         return pin.SE3.Identity()
     roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
-    if max(abs(angle) for angle in (roll, pitch, yaw)) > MOST_TURNED:
-        degrees = " ".join(f"{math.radians(angle):.4g}" for angle in (roll, pitch, yaw))
-        told = f"{place}: <origin> has rpy={_short(origin.get('rpy'))}, more than a turn in radians"
-        warn(f"{told}; these numbers of degrees are {degrees}")
+    for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
+        warn_of_degrees(angle, f"{place}: the {name} of <origin>", A_TURN)
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
 
 

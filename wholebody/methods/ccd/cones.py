@@ -2,7 +2,7 @@
 
 The polygons are those of `wholebody.figures.reach_cones` (Wilhelms and Van Gelder 2001). The paper projects a limb that
 has left its cone to the nearest direction inside; the joints of the ball joint then turn, each to its best, until the
-limb points there. If the limb is still outside, bisection moves it back towards the last values inside.
+limb points there.
 """
 
 from __future__ import annotations
@@ -15,14 +15,13 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.reach_cones import ReachCone
-from wholebody.methods.ccd.limbs import Limbs, Placement, floats, rotated, seen_from
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs
 from wholebody.methods.ccd.sweep import Aims, sweep
 
 Direction = tuple[float, float, float]
 
 SWEEPS = 12  # over the joints of a ball joint: more than two are needed only near a singularity
 INWARD = 1e-6  # margin inside the cone, as a share of the distance to its middle; larger than rounding
-HALVINGS = 20  # of the motion back to the last values inside, to a millionth of it
 
 
 class Polygon:
@@ -82,99 +81,39 @@ class ConeGuard:
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
         """Find the nodes between the cone's reference frame and the limb."""
-        cone, model = figure.cones[name], figure.model
-        limb, base = model.frames[figure.frame_id(cone.limb)], model.frames[figure.frame_id(cone.reference)]
-        self._polygon = Polygon(cone.cone)
-        self._limbs = limbs
-        self._limb, self._base = limbs.carrier(int(limb.parentJoint)), limbs.carrier(int(base.parentJoint))
-        self._limb_joint, self._base_joint = int(limb.parentJoint), int(base.parentJoint)
-        self._base_placement = base.placement
-        self._axis = _three(limb.placement.rotation @ cone.axis)
-        under = limbs.paths[self._base] if self._base >= 0 else ()
-        path = limbs.paths[self._limb] if self._limb >= 0 else ()
-        self.nodes = tuple(node for node in path if node not in under)
-        self._local: Direction = self._axis
-        self._stand: Placement = floats(self._base_placement)
-        self._stands = self._base >= 0 and limbs.joints[self._base] == self._base_joint  # the cone, in a node's frame
-        self._last: Array | None = None
-        self._rows = np.array(self.nodes, dtype=np.intp)
+        cone = figure.cones[name]
+        self._polygon, self._axis, self._limbs = Polygon(cone.cone), np.asarray(cone.axis, dtype=float), limbs
+        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (cone.limb, cone.reference))
+        self.nodes = limbs.between(self._base.node, self._limb.node)
 
     def holds(self, data: Any) -> bool:
         """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
-        base = data.oMi[self._base_joint].rotation @ self._base_placement.rotation
-        return self._polygon.contains(_three((data.oMi[self._limb_joint].rotation @ self._axis) @ base))
+        return self._polygon.contains(_three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
 
-    def read(self, data: Any) -> None:
-        """Read the placements that the nodes do not change; call `limbs.read` and `limbs.forward` first."""
-        if not self.nodes:
-            return
-        own = self._limbs.joints[self._limb]
-        if own != self._limb_joint:  # else the limb stands in its node's frame, always
-            self._local = rotated(floats(data.oMi[own].actInv(data.oMi[self._limb_joint])), *self._axis)
-        if not self._stands:
-            base = data.oMi[self._base_joint] * self._base_placement
-            if self._base >= 0:
-                base = data.oMi[self._limbs.joints[self._base]].actInv(base)
-            self._stand = floats(base)
-        self._last = None
-        self._remember()
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+        self._limb.read(data)
+        self._base.read(data)
 
-    def keep(self) -> bool:
-        """Turn the limb back into its cone if it has left it; true if it is inside then.
+    def inside(self) -> bool:
+        """Whether the limb is in its cone, after `limbs.forward`."""
+        return self._polygon.contains(self._base.seen(*self._limb.direction(*self._axis)))
 
-        Call it after `limbs.forward()`; if it moves something, it calls `limbs.forward()` itself.
-        """
-        if not self.nodes or self._remember():
-            return True
-        self._turn_back()
-        if not self._remember() and self._last is not None:
-            self._retreat(self._last)
-        return self._remember()
-
-    def _direction(self) -> Direction:
-        """The limb's direction in the cone's reference frame."""
+    def turn_back(self) -> None:
+        """Turn the joints of the limb to the nearest direction of its cone, and call `limbs.forward`."""
         limbs = self._limbs
-        world = rotated(limbs.frame(self._limb), *self._local)
-        return seen_from(self._stand, *seen_from(limbs.frame(self._base), *world))
-
-    def _remember(self) -> bool:
-        if not self._polygon.contains(self._direction()):
-            return False
-        self._last = self._limbs.values[self._rows]
-        return True
-
-    def _turn_back(self) -> None:
-        """Turn the joints of the limb until it points to the nearest direction of its cone."""
-        limbs = self._limbs
-        wanted = rotated(self._stand, *self._polygon.nearest(self._direction()))
-        target = rotated(limbs.frame(self._base), *wanted)
+        nearest = self._polygon.nearest(self._base.seen(*self._limb.direction(*self._axis)))
+        target = self._base.direction(*nearest)
         for _ in range(SWEEPS):
             aims = Aims()
-            aims.add(self._limb, rotated(limbs.frame(self._limb), *self._local), target, direction=True)
+            aims.add(self._limb.node, self._limb.direction(*self._axis), target, direction=True)
             sweep(limbs, aims, aims.plan(limbs, self.nodes))
             limbs.forward()
-            if self._polygon.contains(self._direction()):
+            if self.inside():
                 return
 
-    def _retreat(self, last: Array) -> None:
-        """Move from the last values inside as far towards the present ones as the cone allows."""
-        wanted = self._limbs.values[self._rows]
-        inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
-            middle = 0.5 * (inside + outside)
-            self._blend(last, wanted, middle)
-            if self._polygon.contains(self._direction()):
-                inside = middle
-            else:
-                outside = middle
-        self._blend(last, wanted, inside)
 
-    def _blend(self, first: Array, second: Array, share: float) -> None:
-        self._limbs.values[self._rows] = first + share * (second - first)
-        self._limbs.forward()
-
-
-def guards(figure: Figure, limbs: Limbs, names: Sequence[str] | None = None) -> list[ConeGuard]:
+def cone_guards(figure: Figure, limbs: Limbs, names: Sequence[str] | None = None) -> list[ConeGuard]:
     """The cones that these limbs can leave: all of the figure's, or only some."""
     made = [ConeGuard(figure, limbs, name) for name in (figure.cones if names is None else names)]
     return [guard for guard in made if guard.nodes]

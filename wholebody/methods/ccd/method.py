@@ -56,14 +56,11 @@ class CCD(Checked):
 
     Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
     frame; any other goal moves all joints between its frame and the root; the root itself stays. Limits always hold,
-    reach cones if the problem has `ReachCones`, clearances by the loop of Schmidl and Lin, which may turn
-    other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze` and `StepLimit` are taken.
+    reach cones and ranges of motion if the problem has `ReachCones` and `RangeOfMotion`, clearances by the loop of
+    Schmidl and Lin, which may turn other chains too. `Hold` is taken if no moving joint can move its frame; `Freeze`
+    and `StepLimit` are taken. Balance, which a person keeps by default, is left to the assessment.
 
-    What a person keeps by default is kept as far as it goes. Two-joint muscles and the neck are, while the descent
-    reaches: what their joints have beyond is given back after each sweep. The twist of upper arms is not, nor balance,
-    nor anything of them by the loop that removes overlap: the assessment tells.
-
-    Other terms (Balance, RangeOfMotion, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method
+    Other terms (Balance, Plane, Axis, CenterOfMass, Relative, measures) are refused by name. The method
     has no objective beside the goals. A problem without measures is taken although its default is `Effort()`: the
     descent begins at the start and stops at the first posture that meets the goals, which is near the start and not the
     nearest; `assessment.measure` gives its effort.
@@ -175,6 +172,7 @@ class _Search:
             problem.clearances,
             fixed=request.fixed,
             cones=request.cones,
+            ranges=request.ranges,
             tolerance=self._tolerance,
             control=control,
         )

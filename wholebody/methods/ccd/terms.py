@@ -53,7 +53,7 @@ class Request:
         joints: Pinocchio's indices of the joints that move for the goals.
         fixed: joints that must not move, not even to resolve overlap.
         cones: names of the reach cones to keep.
-        ranges: names of the ranges of motion to keep while reaching, as far as it goes.
+        ranges: names of the ranges of motion to keep.
     """
 
     goals: tuple[GoalPlace, ...]
@@ -84,16 +84,19 @@ def read(problem: Problem) -> Request:
         goals.append(_goal_place(figure, goal))
         joints.update(path)
     cones: dict[str, None] = {}
+    ranges: dict[str, None] = {}
     moving = _dofs(figure, joints)
     state = State(problem.scene.model).update(problem.start)
     support = joint_support(problem.scene.model)
-    left_out = {id(term) for term in problem.defaults if not isinstance(term, ReachCones)}
+    left_out = {id(term) for term in problem.defaults if not isinstance(term, (ReachCones, RangeOfMotion))}
     for number, term in enumerate(problem.constraints):
         if id(term) in left_out:
             continue
         where = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, ReachCones):
             cones.update(dict.fromkeys(figure.cones if term.names is None else term.names))
+        elif isinstance(term, RangeOfMotion):
+            ranges.update(dict.fromkeys(term.row_names))
         elif isinstance(term, Hold):
             carried = support[_joint(figure, term.frame)]
             if term.relative_to is not None:
@@ -114,7 +117,6 @@ def read(problem: Problem) -> Request:
     refused += [f"joint {name!r}, which follows another one (mimic)" for name in list(followers_of(figure.model))[:1]]
     if refused:
         raise UnsupportedTermError("ccd", refused)
-    ranges = [name for term in problem.defaults if isinstance(term, RangeOfMotion) for name in term.row_names]
     return Request(tuple(goals), tuple(sorted(joints)), frozenset(fixed), tuple(cones), tuple(ranges))
 
 

@@ -13,7 +13,7 @@ from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, judged, nearest_to
+from wholebody.methods.base import Method, begun, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
@@ -89,6 +89,7 @@ class NewtonTracker(NotCopyable):
         Raises:
             InputError: as for `frame`.
         """
+        q = begun(self.problem, q)
         self.workspace.refresh()
         motion, step = self.workspace.next_frame(q), self.frame(q, tolerance)
         if motion is None:

@@ -14,7 +14,7 @@ from wholebody.base.errors import TermError
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
-from wholebody.methods.base import Method, goal_error, nearest_to
+from wholebody.methods.base import Method, begun, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
@@ -95,6 +95,7 @@ class QPTracker(NotCopyable):
         measures = flag(measures, "measures")
         with self._alone:
             self.problem.check_fresh()
+            q = begun(self.problem, q)
             self.workspace.refresh()
             self._renew()
             motion = self.workspace.next_frame(q)

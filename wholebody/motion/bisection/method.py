@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,32 +12,12 @@ from wholebody.figures.figure import Figure
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
-from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
-from wholebody.motion.bisection.interpolation import Kind, key_frames
-from wholebody.motion.bisection.prediction import ANKLES, ELBOWS, Predictor
-from wholebody.motion.bisection.recursion import SHORT, Recursion, Stays, changed_frames, hold_between
-from wholebody.motion.clip import Clip
-from wholebody.motion.following import Follower
-from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms, said
-from wholebody.motion.repair import Repairer
-from wholebody.scene.scene import Scene
+from wholebody.motion.avoider import MethodResult, Run
+from wholebody.motion.bisection.prediction import SWINGING, Predictor
+from wholebody.motion.bisection.recursion import Kind, Recursion, RecursionSettings, hold_between, key_frames
 from wholebody.tasks import Freeze
 
-OVERLAP = 5e-5
-"""Depth up to which a frame is free, and by which a gap may be deeper, metres: together the 0.1 mm of `wb.check`."""
-
-CHARACTER = 0.2
-"""Radians and metres: what interpolation between evaluation points may miss of the original. Less follows the original
-more closely and predicts more postures."""
-
-MOST = 50
-"""Programs of one prediction: nine in ten take at most 20. More = a little less effort, and much more time where planes
-and what is held contradict each other."""
-
 MOST_FRAMES = 1_000_000
-MOST_BUFFER = 1000.0  # percent
-MOST_ROOM = 0.1  # m
-NAMED = 6  # runs of frames that a message lists
 
 
 @dataclass(frozen=True)
@@ -52,7 +31,7 @@ class Bisection:
     Attributes:
         evaluation: frames that characterise the motion. They are corrected first and never interpolated; so are the
             first and the last frame. None for the frames from which linear interpolation misses no original posture by
-            more than `CHARACTER`; () for none but both ends.
+            more than `character`; () for none but both ends.
         buffer: percentage of the frames of a group by which it is widened to each side before it is interpolated.
         least: least number of frames in a group, where there is room.
         interpolation: "linear" or "quadratic", between the frames beside the group and its middle.
@@ -62,8 +41,11 @@ class Bisection:
             ("root", "lower_body") moves the upper body alone.
         room: least distance in predicted postures of what overlapped, metres.
         method: predicts postures: a name or a method such as `wb.QP(solver="daqp")`. "qp" is
-            `wb.QP(restarts=0, iterations=50)`, ended after 25 programs where another start or way is left: a free
-            root too is let go where no start frees a frame in so many.
+            `wb.QP(restarts=0, iterations=50)`, ended after `short` programs where another start or way is left: a
+            free root too is let go where no start frees a frame in so many.
+        character: radians and metres that interpolation between evaluation points may miss of the original; less
+            follows the original more closely and predicts more postures.
+        short: programs after which a prediction of "qp" is ended where others may be tried.
     """
 
     evaluation: tuple[int, ...] | None = None
@@ -74,6 +56,8 @@ class Bisection:
     frozen: tuple[str, ...] | None = None
     room: float = 0.005
     method: str | Method = "qp"
+    character: float = 0.2
+    short: int = 25
 
     def __post_init__(self) -> None:
         """Check the settings.
@@ -86,7 +70,7 @@ class Bisection:
             frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
             checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
             object.__setattr__(self, "evaluation", checked)
-        settle(self, "buffer", number(self.buffer, "Bisection: buffer", 0.0, MOST_BUFFER, "percent"))
+        settle(self, "buffer", number(self.buffer, "Bisection: buffer", 0.0, 1000.0, "percent"))
         settle(self, "least", whole(self.least, "Bisection: least", 1, MOST_FRAMES))
         choice(self.interpolation, ("linear", "quadratic"), "Bisection: interpolation")
         for name in ("planes", "frozen"):
@@ -94,7 +78,9 @@ class Bisection:
             if given is not None:
                 names = listed(given, f"Bisection: {name}", "['left_elbow']")
                 object.__setattr__(self, name, tuple(text(entry, f"Bisection: {name}") for entry in names))
-        settle(self, "room", number(self.room, "Bisection: room", 0.0, MOST_ROOM, "m"))
+        settle(self, "room", number(self.room, "Bisection: room", 0.0, 0.1, "m"))
+        settle(self, "character", number(self.character, "Bisection: character", 0.0, 100.0))
+        settle(self, "short", whole(self.short, "Bisection: short", 1, MOST_FRAMES))
         method_for_motions(self.method)
 
     @property
@@ -111,51 +97,37 @@ class Bisection:
     def dynamics(self) -> None:
         """It looks at no torques."""
 
-    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
+    def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`.
 
         Raises:
-            InputError: an evaluation point beyond the clip's frames, or a constraint that is none.
-            UnknownNameError: a plane, a frozen joint or a constraint names what the figure does not have.
+            InputError: an evaluation point beyond the clip's frames.
+            UnknownNameError: a plane or a frozen joint names what the figure does not have.
         """
-        check_input(clip, scene, progress)
-        figure, watch = scene.figure, Watch(progress)
+        figure = run.scene.figure
         for frame in self.evaluation or ():
-            whole(frame, f"Bisection: evaluation, {clip.name}", 0, len(clip) - 1)
-        original = np.array([figure.clamp(q) for q in clip.q])
-        terms = frame_terms(scene, original, clip.dt, constraints)
-        usual = tuple(name for name in (*ELBOWS, *ANKLES) if name in figure.frames)
-        joints = usual if self.planes is None else self.planes
-        for joint in joints:
-            figure.frame_id(joint)
-        method = QP(restarts=0, iterations=MOST) if self.method == "qp" else method_for_motions(self.method)
+            whole(frame, f"Bisection: evaluation, {run.clip.name}", 0, len(run.clip) - 1)
+        usual = tuple(name for name in SWINGING if name in figure.frames)
+        settings = RecursionSettings(
+            usual if self.planes is None else self.planes, self.buffer / 100.0, self.least, self.interpolation,
+            self.short if self.method == "qp" else None,
+        )  # fmt: skip
+        for name in settings.planes:
+            figure.frame_id(name)
+        # Nine in ten predictions take at most 20 programs. More give a little less effort and take much more time where
+        # planes and what is held contradict each other.
+        method = QP(restarts=0, iterations=50) if self.method == "qp" else method_for_motions(self.method)
+        run = run.of(replace(run.terms, q=np.array([figure.clamp(q) for q in run.terms.q])))
         ways = self._frozen(figure)
-        predictions = programs = 0  # of a way that was given up
-        with scene.borrow() as workspace:
-            for frozen in ways:
-                stays = Stays(scene, original, terms, frozen)
-                predictor = Predictor(scene, original, terms, frozen, method, self.room, OVERLAP, workspace)
-                recursion = Recursion(
-                    scene, predictor, stays, joints, self.buffer / 100.0, self.least, self.interpolation, watch,
-                    SHORT if self.method == "qp" else None,
-                )  # fmt: skip
-                recursion.run(self._points(figure, original, frozen), whole=frozen == ways[-1])
-                if frozen == ways[-1] or watch.ended or not recursion.stuck:
-                    break
-                predictions, programs = recursion.predictions, recursion.programs
-            frozen_too = _with_frozen(terms, frozen)
-            follower = Follower(frozen_too, self.clearance)
-            missed = hold_between(recursion, predictor, follower, changed_frames(original, recursion.q), watch)
-            repairer = Repairer(frozen_too, workspace)
-            q = repairer.repair(recursion.q, watch)
-            for frame in changed_frames(recursion.q, q):
-                q[frame] = stays.applied(frame, q[frame])
-            stuck = [frame for frame in sorted(recursion.stuck) if not predictor.good(frame, q[frame])]
-            bad = [frame for frame in np.flatnonzero(recursion.bad).tolist() if not predictor.free(q[frame])]
-            missed = [frame for frame in missed if not predictor.holds(frame, q[frame])]
-        message = said(terms, _message(recursion, stuck, bad, missed, watch))
-        predictions, programs = predictions + recursion.predictions, programs + recursion.programs
-        return MethodResult(q, predictions, programs + follower.programs + repairer.programs, message)
+        for frozen in ways:
+            given = (*run.terms.given, *([Freeze(*frozen)] if frozen else []))
+            predictor = Predictor(run.of(replace(run.terms, given=given)), method, self.room)
+            recursion = Recursion(predictor, settings)
+            recursion.free(self._points(figure, run.terms.q, frozen), whole=frozen == ways[-1])
+            if frozen == ways[-1] or run.ended or not recursion.stuck:
+                break
+        hold_between(recursion, predictor)
+        return MethodResult(recursion.q, repair=True, frozen=frozen)
 
     def _frozen(self, figure: Figure) -> tuple[tuple[str, ...], ...]:
         """What is frozen, and what else where a frame cannot be freed so."""
@@ -169,34 +141,4 @@ class Bisection:
             return self.evaluation
         moving = np.ones(figure.model.nv, dtype=bool)
         moving[figure.dofs(frozen)] = False
-        return key_frames(figure.model, original, moving, CHARACTER)
-
-
-def _with_frozen(terms: FrameTerms, frozen: tuple[str, ...]) -> FrameTerms:
-    return replace(terms, given=(*terms.given, Freeze(*frozen))) if frozen else terms
-
-
-def _message(recursion: Recursion, stuck: list[int], bad: list[int], missed: list[int], watch: Watch) -> str:
-    """What did not succeed, in one sentence; empty where all did."""
-    parts = []
-    if stuck:
-        others = f" and {len(stuck) - 1} others" if len(stuck) > 1 else ""
-        parts.append(f"frame {stuck[0]}{others} could not be freed ({recursion.stuck[stuck[0]]})")
-    if bad:
-        parts.append(f"{_frames(bad)} still overlap{'s' if len(bad) == 1 else ''}")
-    if missed:
-        parts.append(f"what is held does not hold in {_frames(missed)}")
-    if watch.ended:
-        parts.append("it was ended before it was done")
-    return "; ".join(parts)
-
-
-def _frames(frames: list[int]) -> str:
-    """Frames in words: "frames 3 to 7, 12"."""
-    ends = (
-        [frame for frame in frames if frame - 1 not in frames],
-        [frame for frame in frames if frame + 1 not in frames],
-    )
-    parts = [f"{a}" if a == b else f"{a} to {b}" for a, b in zip(*ends, strict=True)]
-    more = f" and {len(parts) - NAMED} more runs" if len(parts) > NAMED else ""
-    return f"frame{'s' if len(frames) > 1 else ''} {', '.join(parts[:NAMED])}{more}"
+        return key_frames(figure.model, original, moving, self.character)

@@ -9,12 +9,12 @@ from pathlib import Path
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.motion.files import archive, bvh_writing, columns, gltf, joint_profile
+from wholebody.motion.files import archive, bvh, columns, gltf, joint_profile
 from wholebody.motion.files.base import Frames, Motion
 
 WRITERS: dict[str, Callable[[Motion, Path], Path]] = {
     ".npz": archive.write,
-    ".bvh": bvh_writing.write,
+    ".bvh": bvh.write,
     ".csv": columns.write,
     ".txt": joint_profile.write,
     ".glb": gltf.write,

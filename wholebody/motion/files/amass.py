@@ -14,31 +14,15 @@ from scipy.spatial.transform import Rotation
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import FileFormatError, InputError, one_line
-from wholebody.base.files import title_of
+from wholebody.base.files import packaged_table, title_of
 from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
-JOINTS: dict[str, tuple[str, tuple[float, float, float]]] = {
-    "pelvis": ("", (0.0, 0.0, 0.0)),
-    "left_hip": ("pelvis", (0.06, -0.09, -0.01)), "right_hip": ("pelvis", (-0.06, -0.09, -0.01)),
-    "spine1": ("pelvis", (0.0, 0.12, -0.03)),
-    "left_knee": ("left_hip", (0.04, -0.38, 0.0)), "right_knee": ("right_hip", (-0.04, -0.38, 0.0)),
-    "spine2": ("spine1", (0.0, 0.14, 0.03)),
-    "left_ankle": ("left_knee", (-0.01, -0.40, -0.04)), "right_ankle": ("right_knee", (0.01, -0.40, -0.04)),
-    "spine3": ("spine2", (0.0, 0.06, 0.0)),
-    "left_foot": ("left_ankle", (0.04, -0.06, 0.12)), "right_foot": ("right_ankle", (-0.04, -0.06, 0.12)),
-    "neck": ("spine3", (0.0, 0.21, -0.03)),
-    "left_collar": ("spine3", (0.08, 0.12, -0.02)), "right_collar": ("spine3", (-0.08, 0.12, -0.02)),
-    "head": ("neck", (0.0, 0.09, 0.05)),
-    "left_shoulder": ("left_collar", (0.09, 0.03, -0.01)), "right_shoulder": ("right_collar", (-0.09, 0.03, -0.01)),
-    "left_elbow": ("left_shoulder", (0.26, -0.01, -0.02)), "right_elbow": ("right_shoulder", (-0.26, -0.01, -0.02)),
-    "left_wrist": ("left_elbow", (0.25, 0.01, 0.0)), "right_wrist": ("right_elbow", (-0.25, 0.01, 0.0)),
-    "left_hand": ("left_wrist", (0.08, -0.01, -0.01)), "right_hand": ("right_wrist", (-0.08, -0.01, -0.01)),
-}  # fmt: skip
-"""SMPL's first 24 joints in its order: name to parent and offset in the template's axes: x left, y up, z forward."""
+SKELETON = Path(__file__).parents[1] / "data" / "smpl.csv"
+"""Joints of SMPL, their parents and offsets."""
 
-RATES = ("mocap_framerate", "mocap_frame_rate")
+RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""
 
@@ -48,7 +32,7 @@ TEMPLATE = np.array([[0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 
 def is_amass(arrays: dict[str, np.ndarray]) -> bool:
     """Whether an archive's arrays are those of AMASS."""
-    return "poses" in arrays and "trans" in arrays
+    return "trans" in arrays and ("poses" in arrays or {"root_orient", "pose_body"} <= arrays.keys())
 
 
 def read_motion(path: Path) -> SkeletonMotion:
@@ -58,12 +42,43 @@ def read_motion(path: Path) -> SkeletonMotion:
         FileFormatError: an array is missing, has another shape, or has values that are not finite.
     """
     name = one_line(path.name)
-    arrays = read_arrays(path)
+    poses, places, frequency = _arrays(name, read_arrays(path))
+    frames = len(poses)
+    bones = packaged_table(SKELETON)
+    names = tuple(bone["joint"] for bone in bones)
+    offsets = np.array([[float(bone[axis]) for axis in "xyz"] for bone in bones])
+    local = np.tile(np.eye(3), (frames, len(names), 1, 1))
+    turns = Rotation.from_rotvec(poses[:, : 3 * BODY].reshape(-1, 3)).as_matrix().reshape(frames, BODY, 3, 3)
+    # Poses turn the template, whose y is up, into a world whose z is up: the root's rotation holds the change of axes.
+    local[:, 0] = turns[:, 0] @ TEMPLATE.T
+    local[:, 1:BODY] = TEMPLATE @ turns[:, 1:] @ TEMPLATE.T
+    parents = np.array([names.index(bone["parent"]) if bone["parent"] else -1 for bone in bones], dtype=np.intp)
+    try:
+        return SkeletonMotion.moved(
+            names, parents, offsets @ TEMPLATE.T, local, places, 1.0 / frequency, title_of(path),
+            ("lengths of bones are those of an average body",),
+        )  # fmt: skip
+    except InputError as error:
+        raise FileFormatError(f"{name}: {error}") from None
+
+
+def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, float]:
+    """Poses (n, 3 x joints) and places (n, 3) of an archive, and its frame rate, checked; see `read_motion`."""
     rate = next((arrays[key] for key in RATES if key in arrays), None)
     if not is_amass(arrays) or rate is None:
         missing = [key for key in ("poses", "trans") if key not in arrays] or [RATES[0]]
         raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
-    poses, places = _numbers(arrays["poses"], f"{name}: poses"), _numbers(arrays["trans"], f"{name}: trans")
+    if "poses" in arrays:
+        poses = _numbers(arrays["poses"], f"{name}: poses")
+    else:
+        parts = [_numbers(arrays[part], f"{name}: {part}") for part in ("root_orient", "pose_body")]
+        if any(part.ndim != 2 or len(part) != len(parts[0]) for part in parts):
+            raise FileFormatError(
+                f"{name}: root_orient and pose_body have shapes {parts[0].shape} and {parts[1].shape}; "
+                "give (frames, 3) and (frames, 63)"
+            )
+        poses = np.hstack(parts)
+    places = _numbers(arrays["trans"], f"{name}: trans")
     frequency = _numbers(rate, f"{name}: frame rate")
     if frequency.size != 1 or not 1.0 / TIME_STEP[1] <= float(frequency.ravel()[0]) <= 1.0 / TIME_STEP[0]:
         raise FileFormatError(
@@ -77,21 +92,7 @@ def read_motion(path: Path) -> SkeletonMotion:
         )
     if places.shape != (frames, 3):
         raise FileFormatError(f"{name}: trans has shape {places.shape}; give ({frames}, 3)")
-    names = tuple(JOINTS)
-    offsets = np.array([offset for _, offset in JOINTS.values()])
-    local = np.tile(np.eye(3), (frames, len(names), 1, 1))
-    turns = Rotation.from_rotvec(poses[:, : 3 * BODY].reshape(-1, 3)).as_matrix().reshape(frames, BODY, 3, 3)
-    # Poses turn the template, whose y is up, into a world whose z is up: the root's rotation holds the change of axes.
-    local[:, 0] = turns[:, 0] @ TEMPLATE.T
-    local[:, 1:BODY] = TEMPLATE @ turns[:, 1:] @ TEMPLATE.T
-    parents = np.array([names.index(parent) if parent else -1 for parent, _ in JOINTS.values()], dtype=np.intp)
-    try:
-        return SkeletonMotion.moved(
-            names, parents, offsets @ TEMPLATE.T, local, places, 1.0 / float(frequency.ravel()[0]), title_of(path),
-            ("lengths of bones are those of an average body",),
-        )  # fmt: skip
-    except InputError as error:
-        raise FileFormatError(f"{name}: {error}") from None
+    return poses, places, float(frequency.ravel()[0])
 
 
 def _numbers(value: np.ndarray, what: str) -> Array:

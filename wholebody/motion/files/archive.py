@@ -111,7 +111,8 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
             for entry in archive.infolist():
                 name = entry.filename.removesuffix(".npy")
                 with archive.open(entry) as file:
-                    _check_size(file, f"{path.name}: {one_line(name, 30)}")
+                    if _holds_objects(file, f"{path.name}: {one_line(name, 30)}"):
+                        continue
                 with archive.open(entry) as file:
                     content = np.lib.format.read_array(file, allow_pickle=False)  # type: ignore[no-untyped-call]
                 arrays[name] = content
@@ -123,8 +124,8 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
     return arrays
 
 
-def _check_size(file: IO[bytes], what: str) -> None:
-    """Check what the header of an array says of its size.
+def _holds_objects(file: IO[bytes], what: str) -> bool:
+    """Whether an array holds Python objects, which are never unpacked; its header says that, and its size.
 
     Raises:
         FileFormatError: more frames than a clip has, or more numbers than can be read as such.
@@ -132,7 +133,10 @@ def _check_size(file: IO[bytes], what: str) -> None:
     """
     version = np.lib.format.read_magic(file)  # type: ignore[no-untyped-call]
     read = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
-    shape: tuple[int, ...] = read(file)[0]  # type: ignore[no-untyped-call]
+    header = read(file)  # type: ignore[no-untyped-call]
+    shape: tuple[int, ...] = header[0]
+    if header[2].hasobject:
+        return True
     if shape and shape[0] > MOST_FRAMES:
         raise FileFormatError(f"{what} has {shape[0]} frames; give 1 to {MOST_FRAMES}, or cut the clip into parts")
     size = 8 * math.prod(shape)  # as float64
@@ -140,6 +144,7 @@ def _check_size(file: IO[bytes], what: str) -> None:
         raise FileFormatError(
             f"{what} has shape {shape}, {size / 1e6:.0f} MB; give at most {LARGEST / 1e6:g} MB, or cut it into parts"
         )
+    return False
 
 
 def _listed(arrays: dict[str, NDArray[np.generic]]) -> str:

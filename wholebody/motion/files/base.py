@@ -1,11 +1,16 @@
-"""What every format writes and reads."""
+"""What formats share: what they write and read, and tables of numbers whose faults are told with their line."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
+import numpy as np
+
 from wholebody.base.arrays import Array
+from wholebody.base.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
+from wholebody.tracking.tracks import LARGEST
 
 
 class Motion(Protocol):
@@ -40,3 +45,51 @@ class Frames(NamedTuple):
     q: Array
     dt: float
     name: str
+
+
+LARGEST_FILE = 500_000_000
+"""Bytes of a text file of motion: an hour of 75 joints at 120 frames a second."""
+
+
+def number(word: str, where: str) -> float:
+    """A finite number.
+
+    Raises:
+        FileFormatError: the word is none.
+    """
+    try:
+        value = float(word)
+    except ValueError:
+        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number") from None
+    if not abs(value) <= LARGEST:
+        raise FileFormatError(f"{where}: {one_line(word, 20)} is not finite or beyond {LARGEST:g}")
+    return value
+
+
+def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) -> Array:
+    """The numbers of rows, (n, columns).
+
+    Args:
+        name: of the file.
+        rows: number of the line, and its words.
+        columns: how many words a row has.
+
+    Raises:
+        FileFormatError: a row has more or less words, or a word is no finite number.
+    """
+    found = np.empty((len(rows), columns))
+    for k, (line, words) in enumerate(rows):
+        if len(words) != columns:
+            raise FileFormatError(
+                f"{name}, line {line}: {len(words)} values and not {columns}; the line is cut off or wrong"
+            )
+        try:
+            found[k] = [float(word) for word in words]
+        except ValueError:
+            found[k] = [number(word, f"{name}, line {line}") for word in words]
+        if not (np.abs(found[k]) <= LARGEST).all():
+            wrong = int(np.flatnonzero(~(np.abs(found[k]) <= LARGEST))[0])
+            raise FileFormatError(
+                f"{name}, line {line}: value {wrong + 1} is {one_line(words[wrong], 20)}; give finite numbers"
+            )
+    return found

@@ -8,26 +8,21 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import read_text, title_of
+from wholebody.base.files import Scratch, read_foreign_text, title_of
+from wholebody.base.files import write as write_file
+from wholebody.figures.figure import Figure
+from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
 from wholebody.motion.files.bvh_text import BvhText, parsed
-from wholebody.motion.files.text import LARGEST_FILE
+from wholebody.motion.files.nodes import OFF, angles_about, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit
-
-STEADY = 0.01
-"""Share of the skeleton's size by which the place of a joint in its parent may change before it is told."""
 
 RESTING = 1e-3
 """Radians by which the joints of a rest posture turn at most. Converters put one before the motion."""
-
-FEW = 0.25
-"""Share of the angles that change later, of which less are not zero in a rest posture: a tenth in CMU files,
-nine tenths in recorded frames."""
-
-JUMP = 3.0
-"""How much larger the change from the rest posture to the motion is than the median one within the motion, at least."""
 
 
 def pybvh() -> ModuleType:
@@ -56,8 +51,9 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         MissingPackageError: pybvh is not installed.
     """
     library = pybvh()
-    found = parsed(read_text(path, "motion", LARGEST_FILE), path.name)
+    found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
     offsets, root, notes = _offsets(found)
+    notes = [*found.notes, *notes]
     made = _pybvh_motion(library, found, offsets, root)
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
@@ -78,19 +74,70 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     moving = np.array([bool(joint.channels) for joint in found.joints])
     local = np.tile(np.eye(3), (len(found.table) - first, len(parents), 1, 1))
     local[:, moving] = turn @ made.to_rotmat()[1][first:] @ turn.T
+    names = tuple(joint.name for joint in found.joints)
+    top = _moved_joint(found, parents, offsets)
+    places = scale * root[first:] @ turn.T
+    if top:
+        places, local = _from_the_world(
+            top, places, scale * _positions(found, top)[first:] @ turn.T, parents, local, offsets, scale * turn
+        )
+        notes = [note for note in notes if f"the bone to {names[top]} changes" not in note]
+        notes.append(f"{names[top]} moves below {names[0]}, which is left out")
+        kept = _below(top, parents)
+        names, offsets, local = tuple(names[k] for k in kept), offsets[kept], local[:, kept]
+        offsets[0] = 0.0
+        parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
     try:
         return SkeletonMotion.moved(
-            tuple(joint.name for joint in found.joints),
-            parents,
-            scale * offsets @ turn.T,
-            local,
-            scale * root[first:] @ turn.T,
-            made.frame_time,
-            title_of(path),
-            tuple(notes),
+            names, parents, scale * offsets @ turn.T, local, places, made.frame_time, title_of(path), tuple(notes)
         )
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _positions(found: BvhText, joint: int) -> Array:
+    """Positions of a joint in its parent (n, 3): its channels, and its offset where it has none."""
+    columns = _columns(found)[joint]
+    still = np.zeros(len(found.table))
+    offset = found.joints[joint].offset
+    return np.stack([columns.get(("XYZ"[axis], "position"), still + offset[axis]) for axis in range(3)], axis=1)
+
+
+def _moved_joint(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> int:
+    """The joint whose positions move the skeleton below a root that carries nothing else; 0 for the root itself."""
+    size, at = longest_way(parents, offsets), 0
+    while True:
+        below = [k for k in range(len(parents)) if parents[k] == at and found.joints[k].channels]
+        if len(below) != 1:
+            return 0
+        at = below[0]
+        if np.ptp(_positions(found, at), axis=0).max() > 0.01 * size:
+            return at
+
+
+def _below(top: int, parents: NDArray[np.intp]) -> list[int]:
+    kept = [top]
+    for k in range(top + 1, len(parents)):
+        if parents[k] in kept:
+            kept.append(k)
+    return kept
+
+
+def _from_the_world(
+    top: int, root: Array, position: Array, parents: NDArray[np.intp], local: Array, offsets: Array, scale: Array
+) -> tuple[Array, Array]:
+    """Places of a joint in the world (n, 3), and the local rotations with those above it in its own."""
+    above = [top]
+    while parents[above[-1]] >= 0:
+        above.append(int(parents[above[-1]]))
+    places, turned = root, local[:, above[-1]]
+    for joint in reversed(above[:-1]):
+        step = position if joint == top else np.broadcast_to(scale @ offsets[joint], root.shape)
+        places = places + np.einsum("nij,nj->ni", turned, step)
+        turned = turned @ local[:, joint]
+    changed = local.copy()
+    changed[:, top] = turned
+    return places, changed
 
 
 def _begins_with_rest(angles: Array) -> bool:
@@ -108,10 +155,11 @@ def _begins_with_rest(angles: Array) -> bool:
     if not turns[0].any():
         return bool(turns[1].any())
     moving = np.ptp(angles[1:], axis=0) >= RESTING
-    if len(angles) < 3 or not moving.any() or turns[0][moving].mean() >= FEW:
+    # a tenth of the angles that change later are not zero in the rest postures of CMU, nine tenths in recorded frames
+    if len(angles) < 3 or not moving.any() or turns[0][moving].mean() >= 0.25:
         return False
     ways = np.abs(np.angle(np.exp(1j * np.diff(angles, axis=0)))).max(axis=(1, 2))
-    return bool(ways[0] > JUMP * np.median(ways[1:]))
+    return bool(ways[0] > 3.0 * np.median(ways[1:]))
 
 
 def _columns(found: BvhText) -> list[dict[tuple[str, str], Array]]:
@@ -129,14 +177,16 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
     columns = _columns(found)
     size = longest_way(np.array([joint.parent for joint in found.joints]), offsets)
     notes = []
+    # positions that are zero in every frame are those of a program that adds them to the offsets
+    still = [not any(values.any() for (_, kind), values in each.items() if kind == "position") for each in columns]
     for k, joint in enumerate(found.joints[1:], 1):
         for axis in range(3):
             values = columns[k].get(("XYZ"[axis], "position"))
-            if values is not None:
+            if values is not None and not still[k]:
                 offsets[k, axis] = values.mean()
-                if np.ptp(values) > STEADY * size:
+                if np.ptp(values) > 0.01 * size:
                     notes.append(f"the length of the bone to {joint.name} changes; its mean is taken")
-    root = np.stack([columns[0]["XYZ"[axis], "position"] for axis in range(3)], axis=1)
+    root = _positions(found, 0)
     offsets[0] = 0.0  # the root's channels are its place in the world
     return offsets, root, notes
 
@@ -169,3 +219,85 @@ def _pybvh_motion(library: ModuleType, found: BvhText, offsets: Array, root: Arr
         frame_time=found.dt,
         world_up="+y",
     )
+
+
+ORDER = "ZXY"
+"""Order of rotations, as most writers of BVH have it."""
+
+
+def write(motion: Motion, path: Path) -> Path:
+    """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place.
+
+    Raises:
+        InputError: a joint of the figure slides, or the file cannot be written.
+        MissingPackageError: pybvh is not installed.
+    """
+    library = pybvh()
+    kinds = library.bvhnode
+    nodes = nodes_of(motion.figure)
+    local, root = rotations(motion.figure, nodes, motion.q)
+    back, scale = UP["y"].T, 1.0 / UNITS["centimetres"]  # six digits of which are 1e-8 m
+    made: list[Any] = []
+    for node in nodes:
+        offset = (scale * back @ node.offset).tolist()
+        if node.parent < 0:
+            made.append(kinds.BvhRoot(node.name, offset, ["X", "Y", "Z"], list(ORDER), [], None))
+        else:
+            made.append(kinds.BvhJoint(node.name, offset, list(ORDER), [], made[node.parent]))
+            made[node.parent].children = [*made[node.parent].children, made[-1]]
+        if node.tip is not None:
+            end = kinds.BvhEndSite(f"{node.name}_end", (scale * back @ node.tip).tolist(), made[-1])
+            made[-1].children = [end]
+    tree = _depth_first(made[0])
+    written = library.Bvh(
+        nodes=tree,
+        root_pos=scale * root @ back.T,
+        joint_angles=_angles(back @ local @ back.T)[:, [made.index(node) for node in tree if node in made]],
+        frame_time=motion.dt,
+        world_up="+y",
+    )
+    with Scratch() as folder:
+        library.write_bvh_file(written, folder / "clip.bvh")
+        content = (folder / "clip.bvh").read_text()
+    return write_file(path, content)
+
+
+def own(motion: SkeletonMotion, figure: Figure) -> Frames | None:
+    """Postures of a skeleton that is the figure's own, as `write` writes it; None for any other skeleton."""
+    try:
+        nodes = nodes_of(figure)
+    except InputError:
+        return None
+    names = {name: k for k, name in enumerate(motion.names)}
+    if any(node.name not in names for node in nodes):
+        return None
+    at = [names[node.name] for node in nodes]
+    for node, joint in zip(nodes, at, strict=True):
+        if np.abs(motion.offsets[joint] - node.offset).max() > OFF:
+            return None
+        if node.parent >= 0 and motion.parents[joint] != at[node.parent]:
+            return None
+    world = motion.rotations[:, at]
+    local = np.array(world)
+    local[:, 1:] = np.swapaxes(world[:, [node.parent for node in nodes[1:]]], 2, 3) @ world[:, 1:]
+    q = postures(figure, nodes, local, motion.positions[:, at[0]])
+    return None if q is None else Frames(q, motion.dt, motion.name)
+
+
+def _depth_first(node: Any) -> list[Any]:
+    """A node and all below it, in the order of the file."""
+    return [node, *(below for child in getattr(node, "children", []) for below in _depth_first(child))]
+
+
+def _angles(local: Array) -> Array:
+    """Euler angles (n, nodes, 3), radians, without flips: of the two solutions the one nearer to the frame before."""
+    frames, count = local.shape[:2]
+    axes = np.eye(3)[["XYZ".index(axis) for axis in ORDER]]
+    first = np.stack([angles_about(Rotation.from_matrix(local[:, node]), axes) for node in range(count)], axis=1)
+    other = first * (1.0, -1.0, 1.0) + np.pi
+    found = np.array(first)
+    for k in range(1, frames):
+        near = [found[k - 1] + wrapped(choice[k] - found[k - 1]) for choice in (first, other)]
+        jumps = [np.abs(choice - found[k - 1]).sum(axis=1) for choice in near]
+        found[k] = np.where((jumps[1] < jumps[0])[:, None], near[1], near[0])
+    return found

@@ -11,13 +11,11 @@ from dataclasses import dataclass, field
 from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
-from wholebody.motion.files.text import number as read_number
-from wholebody.motion.files.text import table
+from wholebody.motion.files.base import number as read_number
+from wholebody.motion.files.base import table
 from wholebody.tracking.tracks import MOST_FRAMES
 
-CHANNEL = re.compile(r"([XYZ])(position|rotation)", re.IGNORECASE)
 MOST_JOINTS = 1000
-DEEPEST = 200  # braces within braces
 
 
 @dataclass
@@ -47,11 +45,13 @@ class BvhText:
         joints: parents before children.
         table: (frames, channels) numbers of the motion.
         dt: seconds.
+        notes: sentences on what was changed.
     """
 
     joints: list[BvhJoint]
     table: Array
     dt: float
+    notes: tuple[str, ...] = ()
 
 
 def parsed(text: str, name: str) -> BvhText:
@@ -66,8 +66,8 @@ def parsed(text: str, name: str) -> BvhText:
     """
     lines = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     place = _Hierarchy(name, lines).read()
-    frames, rest = _counted(name, lines, place.at, r"frames:\s*(\S+)", "Frames:")
-    step, rest = _counted(name, lines, rest, r"frame\s+time:\s*(\S+)", "Frame Time:")
+    frames, rest = _counted(name, lines, place.at, r"frames\s*:\s*(\S+)", "Frames:")
+    step, rest = _counted(name, lines, rest, r"frame\s*time\s*:\s*(\S+)", "Frame Time:")
     number = lines[rest - 2][0]
     count = _whole(frames, f"{name}, line {number}")
     if not 1 <= count <= MOST_FRAMES:
@@ -77,13 +77,23 @@ def parsed(text: str, name: str) -> BvhText:
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; {TIME_STEP_ASKED}")
     wide = sum(len(joint.channels) for joint in place.joints)
-    rows = [(number, line.split()) for number, line in lines[rest:]]
+    rows = _unwrapped([(number, line.split()) for number, line in lines[rest:]], count, wide)
     values = table(name, rows[:count], wide)
     if len(rows) != count:
         number = rows[-1][0] if rows else number
         what = "cut off" if len(rows) < count else "longer than it says"
         raise FileFormatError(f"{name}, line {number}: {len(rows)} frames and not {count}; the file is {what}")
-    return BvhText(place.joints, values, dt)
+    return BvhText(place.joints, values, dt, tuple(place.notes))
+
+
+def _unwrapped(rows: list[tuple[int, list[str]]], count: int, wide: int) -> list[tuple[int, list[str]]]:
+    """The rows of the frames where their lines are wrapped: as many words as the frames have, in other lines."""
+    if len(rows) == count or not wide or sum(len(words) for _, words in rows) != count * wide:
+        return rows
+    words = [(number, word) for number, line in rows for word in line]
+    return [
+        (words[k][0], [word for _, word in words[k : k + wide]]) for k in range(0, count * wide, wide)
+    ]  # fmt: skip
 
 
 class _Hierarchy:
@@ -92,6 +102,7 @@ class _Hierarchy:
     def __init__(self, name: str, lines: list[tuple[int, str]]) -> None:
         self.name, self.lines = name, lines
         self.joints: list[BvhJoint] = []
+        self.notes: list[str] = []
         self.at = 0
         self._open: list[int] = []
 
@@ -114,17 +125,18 @@ class _Hierarchy:
         for joint in self.joints:
             if len(joint.offset) != 3:
                 raise FileFormatError(f"{self.name}, line {joint.line}: {one_line(joint.name)} has no OFFSET")
-        if sum(kind == "position" for _, kind in self.joints[0].channels) != 3:
-            raise FileFormatError(f"{self.name}, line {self.joints[0].line}: the root has not three position channels")
+        if sum(kind == "position" for _, kind in self.joints[0].channels) not in (0, 3):
+            where = f"{self.name}, line {self.joints[0].line}"
+            raise FileFormatError(f"{where}: the root has one or two position channels; give three, or none")
         return self
 
     def _line(self, where: str, number: int, line: str) -> None:
-        word, _, rest = line.partition(" ") if " " in line else line.partition("\t")
+        word, rest = (*line.split(None, 1), "")[:2]
         word, rest = word.upper(), rest.strip()
         if word in ("ROOT", "JOINT", "END"):
             self._begin(where, number, word, rest)
         elif line == "{":
-            if not self.joints or len(self._open) > DEEPEST:
+            if not self.joints or len(self._open) > 200:
                 raise FileFormatError(f"{where}: a brace that opens no joint")
         elif line == "}":
             if not self._open:
@@ -151,7 +163,10 @@ class _Hierarchy:
         while word == "END" and any(joint.name == name for joint in self.joints):
             name += "_"
         if any(joint.name == name for joint in self.joints):
-            raise FileFormatError(f"{where}: a second joint is called {one_line(name)!r}; rename one")
+            known = {joint.name for joint in self.joints}
+            other = next(f"{name}_{k}" for k in range(2, MOST_JOINTS + 2) if f"{name}_{k}" not in known)
+            self.notes.append(f"a second joint is called {one_line(name)!r}; it is {one_line(other)!r} here")
+            name = other
         self._open.append(len(self.joints))
         self.joints.append(BvhJoint(name, parent, number))
 
@@ -161,7 +176,7 @@ class _Hierarchy:
                 raise FileFormatError(f"{where}: an OFFSET has three numbers, once for each joint")
             joint.offset = tuple(read_number(value, where) for value in words)
             return
-        found = [CHANNEL.fullmatch(value) for value in words[1:]]
+        found = [re.fullmatch(r"([XYZ])(position|rotation)", value, re.IGNORECASE) for value in words[1:]]
         if not words or joint.channels or words[0] != str(len(found)) or None in found:
             raise FileFormatError(
                 f"{where}: CHANNELS are a count and as many names, such as 3 Zrotation Xrotation Yrotation"

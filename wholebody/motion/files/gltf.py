@@ -20,24 +20,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 
-FLOAT = 5126
-"""glTF's number for 32-bit floats."""
-
-STILL = 1e-9
-"""Metres or quaternion units by which a joint may move over a clip and still get no keyframes."""
-
-COLOR = (214, 189, 165, 255)
-"""Red, green, blue, alpha of the figure."""
-
-SECTIONS = (24, 24)
-"""Of what is round."""
-
-ROUGH = 0.8
-"""Of the material: 0 is a mirror."""
-
-MOST_KEYS = 20_000_000
-"""Keyframes of all joints together: about 600 MB."""
-
 WORLD = "world_y_up"
 
 
@@ -53,7 +35,7 @@ def write(motion: Motion, path: Path) -> Path:
     except ImportError:
         raise MissingPackageError("writing glTF needs trimesh: pip install trimesh") from None
     figure = motion.figure
-    if len(motion.q) * figure.model.njoints > MOST_KEYS:
+    if len(motion.q) * figure.model.njoints > 20_000_000:  # keyframes, about 600 MB
         raise InputError(f"{motion.name}: {len(motion.q)} frames are too many for one glTF file; write parts of it")
     keys = _keys(figure, motion.q)
     scene, names = joint_tree(
@@ -61,7 +43,7 @@ def write(motion: Motion, path: Path) -> Path:
     )
     for piece in figure.geometry.geometryObjects:
         if not isinstance(piece.geometry, coal.Halfspace):  # it has no end
-            add_piece(scene, names, piece, triangles(piece.geometry), COLOR)
+            add_piece(scene, names, piece, triangles(piece.geometry), (214, 189, 165, 255))  # the colour of skin
     animate = _Animation(motion, names, keys)
     return write_file(path, export_glb(scene, buffer_postprocessor=animate.buffers, tree_postprocessor=animate.tree))
 
@@ -103,7 +85,7 @@ class _Animation:
             flat = data.reshape(len(data), -1)
             buffers[label] = data.tobytes()
             tree["accessors"][label] = {
-                "bufferView": len(buffers) - 1, "componentType": FLOAT, "count": len(data), "type": kind,
+                "bufferView": len(buffers) - 1, "componentType": 5126, "count": len(data), "type": kind,  # float32
                 "min": flat.min(axis=0).tolist(), "max": flat.max(axis=0).tolist(),
             }  # fmt: skip
             return len(tree["accessors"]) - 1
@@ -112,7 +94,7 @@ class _Animation:
         for joint in range(1, len(self.names)):
             for path, keys, kind in (("rotation", self.turns, "VEC4"), ("translation", self.places, "VEC3")):
                 values = keys[:, joint]
-                if np.ptp(values, axis=0).max() > STILL:
+                if np.ptp(values, axis=0).max() > 1e-9:  # metres or parts of a quaternion
                     index = accessor(f"{path} {joint}", values, kind)
                     self._channels.append((self.names[joint], path, index))
 
@@ -169,7 +151,7 @@ def add_piece(tree: Any, joints: Sequence[str], piece: Any, mesh: Any, color: Se
 
     blend = "BLEND" if color[3] < 255 else None
     mesh.visual = TextureVisuals(
-        material=PBRMaterial(baseColorFactor=color, roughnessFactor=ROUGH, metallicFactor=0.0, alphaMode=blend)
+        material=PBRMaterial(baseColorFactor=color, roughnessFactor=0.8, metallicFactor=0.0, alphaMode=blend)
     )
     tree.add_geometry(
         mesh, node_name=f"piece {piece.name}", geom_name=f"mesh {piece.name}",
@@ -186,7 +168,7 @@ def triangles(shape: Any) -> Any:
     if isinstance(shape, coal.Sphere):
         return creation.icosphere(radius=shape.radius)
     if isinstance(shape, coal.Capsule):
-        mesh = creation.capsule(2.0 * shape.halfLength, shape.radius, count=SECTIONS)
+        mesh = creation.capsule(2.0 * shape.halfLength, shape.radius, count=(24, 24))
         mesh.apply_translation(-mesh.bounds.mean(axis=0))  # not centred in every version
         return mesh
     if isinstance(shape, coal.Ellipsoid):

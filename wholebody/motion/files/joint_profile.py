@@ -18,16 +18,12 @@ from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.motion.files.base import Frames, Motion
-from wholebody.motion.files.euler import angles_about
-from wholebody.motion.files.text import LARGEST_FILE, number, table
+from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, number, table
+from wholebody.motion.files.nodes import angles_about
 from wholebody.tracking.tracks import MOST_FRAMES, ROOT_SIZE
 
 GLOBAL = 6
 """Values of the pelvis: place and rotation."""
-
-DIGITS = 9
-"""Digits after the point: 1e-9 rad and m."""
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -50,7 +46,7 @@ def write(motion: Motion, path: Path) -> Path:
         "# " + "\t".join(names),
         repr(motion.dt),
         str(len(rows)),
-        *("\t".join(f"{value:.{DIGITS}f}" for value in row) for row in rows.tolist()),
+        *("\t".join(f"{value:.9f}" for value in row) for row in rows.tolist()),
     ]
     return write_file(path, "\n".join(lines) + "\n")
 

@@ -6,6 +6,7 @@ the posture is zero, as in BVH.
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,13 +16,39 @@ from scipy.spatial.transform import Rotation
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.motion.files.euler import angles_about
+
+
+def angles_about(turned: Rotation, axes: Array) -> Array:
+    """Angles (n, 3) of rotations about axes (3, 3), rows, each turned by the ones before; radians.
+
+    In gimbal lock only the sum or the difference of the first and the third angle is known. The third one is then that
+    of the nearest frame without, so that no angle jumps for a frame; zero where all frames are locked.
+
+    Args:
+        turned: n rotations, frame by frame.
+        axes: unit vectors; the second is orthogonal to both others.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Gimbal lock", UserWarning)
+        found: Array = turned.as_davenport(axes, "intrinsic")
+    first_is_third = abs(float(axes[0] @ axes[2])) > 0.5
+    # so near to gimbal lock six digits of a degree, as BVH has, say nothing of the first and the third angle
+    locked = np.abs(np.sin(found[:, 1]) if first_is_third else np.cos(found[:, 1])) < 1e-6
+    free = np.flatnonzero(~locked)
+    if not locked.any() or not len(free):
+        return found
+    at = np.flatnonzero(locked)
+    after = np.minimum(np.searchsorted(free, at), len(free) - 1)
+    before = np.maximum(after - 1, 0)
+    near = np.where(at - free[before] < np.abs(free[after] - at), free[before], free[after])
+    found[at, 2] = found[near, 2]
+    back = Rotation.from_rotvec(-found[at, 2:] * axes[2]) * Rotation.from_rotvec(-found[at, 1:2] * axes[1])
+    found[at, 0] = (turned[at] * back).as_rotvec() @ axes[0]
+    return found
+
 
 SAME_PLACE = 1e-9
 """Metres between joints that are at one place."""
-
-ORTHOGONAL = 1e-6
-"""Cosine between axes of joints that make one node."""
 
 OFF = 1e-4
 """Metres and radians by which a skeleton may differ from a figure and still be the figure's own."""
@@ -82,7 +109,7 @@ def nodes_of(figure: Figure) -> list[Node]:
             and len(before.joints) < 3
             and np.linalg.norm(place - places[at]) < SAME_PLACE
             and sum(other == parent for other in model.parents) == 1
-            and abs(before.axes[-1] @ axis) < ORTHOGONAL
+            and abs(before.axes[-1] @ axis) < 1e-6
         )
         if merges:
             found[at] = Node(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import sys
+from types import ModuleType
+
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices
@@ -62,3 +65,12 @@ def add_sums(
                 for to in range(column, most):
                     band[column, to - column] += scaled * total[to]
         total[least:most] = 0.0
+
+
+def compiled_kernel() -> ModuleType:
+    """This module, with its loops compiled or loaded from the cache."""
+    none, places, band = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 1))
+    begins = np.zeros(1, dtype=np.intp)
+    add_rows(band, places, begins, none, none)
+    add_sums(band, places, begins, none, none, places, begins, none)
+    return sys.modules[__name__]

@@ -1,7 +1,4 @@
-"""Sparse quadratic programs with one block a frame and bands between, and the solvers that take them.
-
-    minimise    1/2 z' P z + c' z
-    subject to  lower <= G z <= upper,   least <= z <= most
+"""The solvers of programs with one block a frame and bands between.
 
 The package's own interior-point method factorises them as one band, in a time that is linear in the frames. PIQP's
 multistage backend finds the blocks by itself and factorises from block to block, linear too. OSQP takes the same
@@ -13,65 +10,23 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 
 ACCURACY = 1e-5  # of the optimality conditions: a tenth of what a step is judged by; smaller costs an iteration
 GAP = 1e-6  # of the duality gap; smaller costs iterations, larger leaves deviations 3e-4 rad from the optimum
-OSQP_ACCURACY = 1e-6
-OSQP_ITERATIONS = 8000
-POLISH = 5  # steps of refinement of OSQP's polishing
-
-
-class BandedQP(NamedTuple):
-    """A program; matrices are scipy.sparse.csc_array or csc_matrix.
-
-    Attributes:
-        P: (n, n) symmetric, both triangles.
-        c: (n,).
-        G: (m, n).
-        lower: (m,).
-        upper: (m,).
-        least: (n,).
-        most: (n,).
-        start: (n,) where an iteration may begin; None where nothing is known.
-    """
-
-    P: Any
-    c: Array
-    G: Any
-    lower: Array
-    upper: Array
-    least: Array
-    most: Array
-    start: Array | None = None
-
-
-class Answer(NamedTuple):
-    """Of a program.
-
-    Attributes:
-        z: (n,) the minimiser; not finite numbers never occur.
-        solved: whether the solver met its own conditions.
-        iterations: of the solver.
-    """
-
-    z: Array
-    solved: bool
-    iterations: int
 
 
 def solve_by_bands(program: BandedQP) -> Answer:
     """Solve by an interior-point method whose factor is one band; see `interior_point`."""
     from wholebody.motion.trajectory import interior_point
 
-    found = interior_point.minimise(*program, ACCURACY, GAP)
-    return _answer(found.z, found.solved, found.iterations, program)
+    return _answer(*interior_point.minimise(program, ACCURACY, GAP), program)
 
 
 def solve_by_piqp(program: BandedQP) -> Answer:
@@ -104,8 +59,8 @@ def solve_by_osqp(program: BandedQP) -> Answer:
     solver = osqp.OSQP()
     solver.setup(
         sp.csc_matrix(sp.triu(program.P)), program.c, rows, np.concatenate([program.lower, program.least]),
-        np.concatenate([program.upper, program.most]), verbose=False, eps_abs=OSQP_ACCURACY, eps_rel=OSQP_ACCURACY,
-        max_iter=OSQP_ITERATIONS, polishing=True, polish_refine_iter=POLISH,
+        np.concatenate([program.upper, program.most]), verbose=False, eps_abs=1e-6, eps_rel=1e-6,
+        max_iter=8000, polishing=True, polish_refine_iter=5,
     )  # fmt: skip
     found = solver.solve(raise_error=False)
     return _answer(found.x, found.info.status == "solved", int(found.info.iter), program)

@@ -26,58 +26,29 @@ import scipy.sparse as sp
 from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.motion.trajectory.band import compiled_kernel
+from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 
-ITERATIONS = 60
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
-INNER = 0.05  # share of the way between bounds that the beginning keeps from both
 LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
-KEPT = 0.995  # share of the way to the next bound that a step goes
-FIXED = 1e-9  # an unknown whose bounds are no farther apart stays where it is
-STEEPEST = 1e25  # of a multiplier by its slack; where it is more, rounding is all that is left
-STUCK = 1e-8  # a step that is a smaller share of Newton's leads nowhere
 
 
-class InteriorPointResult(NamedTuple):
-    """What the iterations ended with.
-
-    Attributes:
-        z: (n,) unknowns.
-        solved: whether the conditions of optimality are met.
-        iterations: how many there were.
-    """
-
-    z: Array
-    solved: bool
-    iterations: int
-
-
-def minimise(
-    P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
-    accuracy: float, gap: float,
-) -> InteriorPointResult:  # fmt: skip
+def minimise(program: BandedQP, accuracy: float, gap: float) -> Answer:
     """Solve a program; see the module.
 
     Args:
-        P: (n, n) sparse, positive definite, both triangles.
-        c: (n,).
-        G: (m, n) sparse.
-        lower: (m,) may be infinite.
-        upper: (m,) may be infinite.
-        least: (n,) may be infinite.
-        most: (n,) may be infinite.
-        start: (n,) where to begin; None for the middle between bounds.
+        program: P is positive definite; it begins at `start`, or in the middle between bounds.
         accuracy: by which rows may be missed, and ten times of it, in parts of the largest derivative, the condition
             of stationarity.
         gap: of the objective, in parts of it where it is over 1.
     """
-    fixed = most - least <= FIXED
+    fixed = program.most - program.least <= 1e-9  # an unknown whose bounds are no farther apart stays where it is
     if fixed.any():
-        return _without(fixed, P, c, G, lower, upper, least, most, start, accuracy, gap)
-    matrices, bounds = _Matrices(sp.csc_array(P), sp.csc_array(G)), _Bounds(lower, upper, least, most)
-    z, s, y = _begun(matrices, bounds, c, least, most, start)
+        return _without(fixed, program, accuracy, gap)
+    matrices, bounds, c = _Matrices(sp.csc_array(program.P), sp.csc_array(program.G)), _Bounds(program), program.c
+    z, s, y = _begun(matrices, bounds, program)
     count, Pz, Az = max(len(s), 1), matrices.P @ z, bounds.times(matrices.G @ z, z)
-    for iteration in range(ITERATIONS):
+    for iteration in range(60):
         derivative, missed = Pz + c - bounds.transposed(matrices.transposed, y), Az - bounds.a - s
         mu = float(s @ y) / count
         largest = max(1.0, float(np.abs(Pz).max(initial=0.0)))
@@ -86,29 +57,28 @@ def minimise(
             and np.abs(derivative).max(initial=0.0) <= 10.0 * accuracy * largest
             and mu * count <= gap * max(1.0, abs(float(z @ (0.5 * Pz + c))))
         ):
-            return InteriorPointResult(z, True, iteration)
-        factor = matrices.factor(*bounds.diagonals(y / s)) if (y < STEEPEST * s).all() else None
+            return Answer(z, True, iteration)
+        # where a multiplier is more than 1e25 times its slack, rounding is all that is left
+        factor = matrices.factor(*bounds.diagonals(y / s)) if (y < 1e25 * s).all() else None
         if factor is None:
-            return InteriorPointResult(z, False, iteration)
+            break
         newton = _Newton(matrices, bounds, factor, derivative, missed, s, y)
         _, _, ds, dy = newton.direction(s * y)
         along, across = _share(s, ds), _share(y, dy)
         ahead = float((s + along * ds) @ (y + across * dy)) / count
         centred = ahead * (ahead / mu) ** 2 if mu > 0.0 else 0.0
         dz, change, ds, dy = newton.direction(s * y + ds * dy - centred)
-        along, across = min(1.0, KEPT * _share(s, ds)), min(1.0, KEPT * _share(y, dy))
-        if max(along, across) < STUCK:
-            return InteriorPointResult(z, False, iteration)
+        along, across = 0.995 * _share(s, ds), 0.995 * _share(y, dy)  # of the way to the next bound
+        if max(along, across) < 1e-8:  # a step that is a smaller share of Newton's leads nowhere
+            break
         z, Az = z + along * dz, Az + along * change
         s, y, Pz = s + along * ds, y + across * dy, matrices.P @ z
-    return InteriorPointResult(z, False, ITERATIONS)
+    return Answer(z, False, iteration + 1)
 
 
-def _without(
-    fixed: Mask, P: Any, c: Array, G: Any, lower: Array, upper: Array, least: Array, most: Array, start: Array | None,
-    accuracy: float, gap: float,
-) -> InteriorPointResult:  # fmt: skip
+def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Answer:
     """Solve for the unknowns that are not fixed (n,) alone; rows that have no others hold or not."""
+    P, c, G, lower, upper, least, most, start = program
     P, G, free = sp.csc_array(P), sp.csc_array(G), np.flatnonzero(~fixed)
     z = np.zeros(len(fixed))
     z[fixed] = 0.5 * (least[fixed] + most[fixed])
@@ -118,14 +88,15 @@ def _without(
     missed = np.maximum(lower - value, value - upper)[~asked].max(initial=0.0)
     holds = bool(missed <= accuracy and (least[fixed] - most[fixed]).max() <= accuracy)
     if not len(free):
-        return InteriorPointResult(z, holds, 0)
+        return Answer(z, holds, 0)
     there = value[rows]
-    found = minimise(
+    others = BandedQP(
         P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
-        least[free], most[free], None if start is None else start[free], accuracy, gap,
+        least[free], most[free], None if start is None else start[free],
     )  # fmt: skip
+    found = minimise(others, accuracy, gap)
     z[free] = found.z
-    return InteriorPointResult(z, holds and found.solved, found.iterations)
+    return Answer(z, holds and found.solved, found.iterations)
 
 
 class _Bounds:
@@ -135,7 +106,8 @@ class _Bounds:
         a: (k,).
     """
 
-    def __init__(self, lower: Array, upper: Array, least: Array, most: Array) -> None:
+    def __init__(self, program: BandedQP) -> None:
+        lower, upper, least, most = program.lower, program.upper, program.least, program.most
         self.low, self.high = np.flatnonzero(np.isfinite(lower)), np.flatnonzero(np.isfinite(upper))
         self.under = np.flatnonzero(np.isfinite(least))
         self.over = np.flatnonzero(np.isfinite(most))
@@ -219,20 +191,13 @@ class _Matrices:
         K = self._K
         K[:] = self._base
         K[:, 0] += unknowns[self.band]
-        kernel = compiled_kernel()
-        kernel.add_rows(K, self._first, self._begins, self._values, weights)
+        add_rows(K, self._first, self._begins, self._values, weights)
         if len(self._begun) > 1:
             total = (own + shared)[self._several]
-            kernel.add_sums(
-                K,
-                self._first,
-                self._begins,
-                self._values,
-                rows * self._factors,
-                self._members,
-                self._begun,
+            add_sums(
+                K, self._first, self._begins, self._values, rows * self._factors, self._members, self._begun,
                 -1.0 / total,
-            )
+            )  # fmt: skip
         cholesky, failed = lapack.dpbtrf(K.T, lower=1, overwrite_ab=1)
         return None if failed else _Factor(self, cholesky, rows, own + shared)
 
@@ -333,16 +298,15 @@ def _slacks(P: Any, G: Any) -> Mask:
     return alone
 
 
-def _begun(
-    matrices: _Matrices, bounds: _Bounds, c: Array, least: Array, most: Array, start: Array | None
-) -> tuple[Array, Array, Array]:
+def _begun(matrices: _Matrices, bounds: _Bounds, program: BandedQP) -> tuple[Array, Array, Array]:
     """Unknowns (n,), slacks (k,) and multipliers (k,) to begin with."""
+    c, least, most, start = program.c, program.least, program.most, program.start
     both, slack = np.isfinite(least) & np.isfinite(most), matrices.slack
     middle = np.clip(0.0, least, most)
     middle[both] = 0.5 * (least[both] + most[both])
     z = middle if start is None else start.copy()
     z = np.where(both, z, np.clip(z, least + LEAST, most - LEAST))
-    room = INNER * (most[both] - least[both])
+    room = 0.05 * (most[both] - least[both])  # from both bounds
     z[both] = np.clip(z[both], least[both] + room, most[both] - room)
     largest = np.full(matrices.G.shape[0], np.inf)
     price = np.maximum(c[slack], 1.0)

@@ -26,11 +26,8 @@ from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
-from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows
-
-FRICTION = 0.8
-"""Coefficient of friction of the ground, as that of `wb.motion.torques`."""
 
 LENGTH = 0.1
 """Metres that stand for a whole strength: one hundredth of it is weighed like a millimetre of the support."""
@@ -113,7 +110,7 @@ class ClipLoads:
             terms: what is held.
             stretch: by which factor the clip may be slowed.
         """
-        dynamics = InverseDynamics(clip.figure, tuple(feet), FRICTION)
+        dynamics = InverseDynamics(clip.figure, tuple(feet), 0.8)  # the friction of `wb.motion.torques`
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
         # Where a foot is held beside its place, the original stands in its own.

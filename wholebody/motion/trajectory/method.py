@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,30 +10,21 @@ import pinocchio as pin
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import listed
-from wholebody.base.records import with_values
-from wholebody.figures.state import State
-from wholebody.motion.avoider import MethodResult, Progress, Watch, check_input
+from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import faults
-from wholebody.motion.frame_terms import FrameTerms, Given, between, frame_terms, said
-from wholebody.motion.soles import standing_feet, usual_feet
+from wholebody.motion.faults import Faults
+from wholebody.motion.frame_terms import FrameTerms, between
+from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.banded_qp import Answer, BandedQP, banded_solver
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
+from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun, WindowResult, WindowSettings
-from wholebody.motion.windows import Window, windows
-from wholebody.scene.scene import Scene
-from wholebody.scene.workspace import Workspace
+from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
+from wholebody.motion.windows import Window
 
-RELOADED = 3  # programs of a timing: in each the ground's forces are split as the one before makes them
-CORRECTIONS = 6  # of the loads of rows; more = fewer loads beyond their bounds, longer where they cannot keep to them
 CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
 # rows, as filters change less of it
-WORTH = 0.9  # of what loads are beyond their bounds: a correction that leaves more gets no farther
-MEASURED = 1.5e-3  # m: as far a load may be beyond its bound, see `loads.LENGTH`; `avoid` allows 2e-3
-LOOKED = 0.1  # share of the progress that looking for collisions counts for
 
 
 @dataclass(frozen=True)
@@ -88,127 +79,95 @@ class Trajectory:
         """Name for tables."""
         return "trajectory" if self.solver is None else f"trajectory/{self.solver}"
 
-    def avoid(self, clip: Clip, scene: Scene, constraints: Iterable[Given], progress: Progress | None) -> MethodResult:
+    def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
-        check_input(clip, scene, progress)
-        constraints = tuple(listed(constraints, "avoid: constraints", "[wb.Freeze('root')]"))
-        terms, watch = frame_terms(scene, clip.q, clip.dt, constraints, self.clearance), Watch(progress)
         _, solve = banded_solver(self.solver)
-        settings = WindowSettings(self.clearance, self.time, self.iterations)
-        with scene.borrow() as workspace:
-            loads = None
-            if self.dynamics is not None:
-                stands = standing_feet(clip, usual_feet(scene.figure, constraints))
-                loads = ClipLoads.original(
-                    Clip(scene.figure, clip.q, clip.dt), stands, self.dynamics, terms, self.stretch
-                )
-            run = ClipRun(settings, terms, workspace, solve, clip.q, self.stretch, loads)
-            q, missed = self._freed(run, terms, workspace, clip.q, watch)
-            new = None if watch.ended else self._timing(q, terms, workspace.state, solve, loads)
-            if new is None:
-
-                def again_with(loads: ClipLoads, time: float) -> ClipRun:
-                    smoother = with_values(settings, time=time)
-                    return ClipRun(smoother, terms, workspace, solve, clip.q, self.stretch, loads)
-
-                q, used = self._measured(again_with, terms, workspace, clip.q, q, loads, watch)
-                return MethodResult(q, run.posture_solves, run.programs + used, _said(watch, terms, missed))
-            # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
-            slower = terms.at(new.times)
-            passed = between(scene.model, q, new.times / clip.dt)
-            loads = None if loads is None else loads.of(passed, new.times)
-            again = ClipRun(settings, slower, workspace, solve, passed, 1.0, loads)
-            beyond = None if loads is None else loads.beyond()
-            q, left = self._freed(again, slower, workspace, passed, watch, beyond)
-
-            def slower_with(loads: ClipLoads, time: float) -> ClipRun:
-                smoother = with_values(settings, time=time)
-                return ClipRun(smoother, slower, workspace, solve, passed, 1.0, loads)
-
-            q, used = self._measured(slower_with, slower, workspace, passed, q, loads, watch)
-        return MethodResult(
-            q, run.posture_solves + again.posture_solves, run.programs + again.programs + used,
-            _said(watch, terms, [*missed, *left, slower.left_out]), times=new.times, stretch=new.largest,
-        )  # fmt: skip
+        loads, q = None, run.terms.q
+        if self.dynamics is not None:
+            clip = Clip(run.scene.figure, q, run.terms.dt)
+            loads = ClipLoads.original(clip, standing_feet(clip, run.feet), self.dynamics, run.terms, self.stretch)
+        freed, missed = self._freed(run, solve, run.terms.q, loads, self.stretch)
+        new = None if run.ended else self._timing(freed, run.terms, solve, loads)
+        if new is None:
+            return MethodResult(self._measured(run, solve, q, freed, loads, self.stretch), message="; ".join(missed))
+        # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
+        slower = run.of(run.terms.at(new.times))
+        passed = between(run.scene.model, freed, new.times / run.terms.dt)
+        loads = None if loads is None else loads.of(passed, new.times)
+        q, left = self._freed(slower, solve, passed, loads, 1.0, None if loads is None else loads.beyond())
+        q = self._measured(slower, solve, passed, q, loads, 1.0)
+        return MethodResult(q, message="; ".join((*missed, *left)), times=new.times, stretch=new.largest)
 
     def _measured(
-        self, run_with: Callable[[ClipLoads, float], ClipRun], terms: FrameTerms, workspace: Workspace,
-        reference: Array, q: Array, loads: ClipLoads | None, watch: Watch,
-    ) -> tuple[Array, int]:  # fmt: skip
+        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, q: Array, loads: ClipLoads | None,
+        rate: float,
+    ) -> Array:  # fmt: skip
         """Postures whose loads keep to their bounds as `torques` measures them, as far as a few corrections get.
 
         Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
         what is beyond its bounds are computed again.
 
         Args:
-            run_with: makes a run with loads and a smoothness, seconds.
-            terms: of the reference.
-            workspace: of this run alone.
+            run: of the reference.
+            solve: solves one program.
             reference: (n, nq) postures that deviations are from.
             q: (n, nq) free postures.
             loads: of the reference; None where they are not looked at.
-            watch: is told of every window.
+            rate: factor of the speed limits.
 
         Returns:
-            (n, nq) the best postures that were found, and how many quadratic programs were solved.
+            (n, nq) the best postures that were found.
         """
         if loads is None:
-            return q, 0
-        depths, _, gaps = faults(workspace, terms, reference, self.clearance)
-        corrected = loads.corrected(q)
-        worst, programs, times = corrected.of(q).worst(), 0, list(CORRECTING)
-        margin = max(3, round(self.margin / terms.dt))
-        for _ in range(CORRECTIONS):
-            beyond = worst > MEASURED
-            if not beyond.any() or not times or watch.ended:
+            return q
+        faults, corrected, times = run.faults(reference), loads.corrected(q), list(CORRECTING)
+        worst = corrected.of(q).worst()
+        for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
+            beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
+            if not beyond.any() or not times or run.ended:
                 break
-            run = run_with(corrected, times[0])
+            windows = ClipRun(run, solve, reference, times[0], self.iterations, rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
-            for window in windows(changed, margin):
+            for window in run.windows(changed, self.margin):
                 if beyond[window.first : window.end].any():
-                    told = self._teller(watch, 1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
-                    freed = run.window(window, depths, gaps, told, q[window.first : window.end])
+                    told = run.watch.teller(1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
+                    freed = windows.window(window, faults, told, q[window.first : window.end])
                     other[window.first : window.end] = freed.q
-            programs += run.programs
-            _, wrong, dipping = faults(workspace, terms, other, self.clearance)
             again = loads.corrected(other)
             now = again.of(other).worst()
-            if wrong.any() or dipping or now.max() > WORTH * worst.max():
+            if run.faults(other).number or now.max() > 0.9 * worst.max():
                 times.pop(0)
             else:
                 q, corrected, worst = other, again, now
-        return q, programs
+        return q
 
     def _freed(
-        self, run: ClipRun, terms: FrameTerms, workspace: Workspace, reference: Array, watch: Watch,
+        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, loads: ClipLoads | None, rate: float,
         beyond: Mask | None = None,
     ) -> tuple[Array, list[str]]:  # fmt: skip
         """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
 
         Frames (n,) that are beyond something else are changed too.
         """
+        windows = ClipRun(run, solve, reference, self.time, self.iterations, rate, loads)
         q: Array = np.array(reference)
-        watch.tell(0.0, "looking for collisions")
-        depths, wrong, gaps = faults(workspace, terms, reference, self.clearance)
-        wrong[[frame + end for frame in gaps for end in (0, 1)]] = True
-        if beyond is not None:
-            wrong |= beyond
-        found = windows(wrong, max(3, round(self.margin / terms.dt)))
+        run.watch.tell(0.0, "looking for collisions")
+        faults = run.faults(reference)
+        found = run.windows(faults.frames if beyond is None else faults.frames | beyond, self.margin)
         total, done = max(1, sum(map(len, found))), 0
         missed: dict[Window, str] = {}
         while found:
             window = found.pop(0)
-            begun, note = done, f"frames {window.first} to {window.end - 1}"
-            cancelled = self._teller(watch, begun / total, len(window) / total, note)
-            freed = run.window(window, depths, gaps, cancelled)
+            told = run.watch.teller(done / total, len(window) / total, f"frames {window.first} to {window.end - 1}")
+            freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
-            if freed.missed and not watch.ended:
-                window, freed = self._kept_back(run, window, freed, q, depths, gaps, cancelled)
+            if freed.missed and not run.ended:
+                window, freed = self._kept_back(run, windows, window, freed, q, faults, told)
                 q[window.first : window.end] = freed.q
                 found = [other for other in found if not window.first <= other.first < window.end]
                 missed = {other: said for other, said in missed.items() if not window.first <= other.first < window.end}
-            if watch.ended:
+            if run.ended:
                 break
             if freed.missed:
                 missed[window] = f"frames {window.first} to {window.end - 1}: {freed.missed}"
@@ -216,8 +175,8 @@ class Trajectory:
         return q, list(missed.values())
 
     def _kept_back(
-        self, run: ClipRun, window: Window, freed: WindowResult, q: Array, depths: Array, gaps: list[int],
-        cancelled: Callable[[float], bool],
+        self, run: Run, windows: ClipRun, window: Window, freed: WindowResult, q: Array, faults: Faults,
+        told: Callable[[float], bool],
     ) -> tuple[Window, WindowResult]:  # fmt: skip
         """A window that was not freed once more, on one side of what it passes for good.
 
@@ -226,24 +185,24 @@ class Trajectory:
 
         Args:
             run: of the clip.
+            windows: frees them.
             window: that was not freed.
             freed: what was found for it.
             q: (n, nq) postures of the clip, with these.
-            depths: as for `ClipRun.window`.
-            gaps: as for `ClipRun.window`.
-            cancelled: told the share done.
+            faults: of the reference.
+            told: told the share done.
         """
-        margin = max(3, round(self.margin / run.dt))
-        for kept, changed in run.kept_back(window, q):
+        for kept, changed in windows.kept_back(window, q):
             changed[window.first : window.end] = True
-            wider = next(one for one in windows(changed, margin) if one.first <= window.first < one.end)
-            again = run.window(wider, depths, gaps, cancelled, kept[wider.first : wider.end])
+            marked = run.windows(changed, self.margin)
+            wider = next(one for one in marked if one.first <= window.first < one.end)
+            again = windows.window(wider, faults, told, kept[wider.first : wider.end])
             if not again.missed:
                 return wider, again
         return window, freed
 
     def _timing(
-        self, q: Array, terms: FrameTerms, state: State, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None
+        self, q: Array, terms: FrameTerms, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None
     ) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""
         stretch = allowance(len(q), self.stretch)
@@ -251,18 +210,11 @@ class Trajectory:
             return None
         model, gaps = terms.scene.model, range(len(q) - 1)
         steps = np.array([pin.difference(model, q[gap], q[gap + 1]) for gap in gaps])
-        bounds = [terms.step_bounds(gap, state) for gap in gaps]
-        most = speed_bounds(steps, np.array([one[0] for one in bounds]), np.array([one[1] for one in bounds]))
+        slowest, fastest = (np.array(bounds) for bounds in zip(*map(terms.step_bounds, gaps), strict=True))
+        most = speed_bounds(steps, slowest, fastest)
         b = slowed(most, terms.dt, stretch, solve)
         if loads is not None:
             path = loads.of(q)
-            for _ in range(RELOADED):
+            for _ in range(3):  # the ground's forces are split as the timing before makes them
                 b = slowed(most, terms.dt, stretch, solve, path.timed(b))
         return timing(b, terms.dt)
-
-    def _teller(self, watch: Watch, begun: float, share: float, note: str) -> Callable[[float], bool]:
-        return lambda part: watch.tell(LOOKED + (1.0 - LOOKED) * (begun + share * part), note)
-
-
-def _said(watch: Watch, terms: FrameTerms, missed: list[str]) -> str:
-    return "the caller ended it" if watch.ended else said(terms, *missed)

@@ -14,7 +14,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.figures.state import State
-from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.loads import WindowLoads
 from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint, Goal

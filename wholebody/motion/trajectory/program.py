@@ -11,20 +11,19 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+import pinocchio as pin
 import scipy.sparse as sp
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.motion.trajectory.banded_qp import BandedQP
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.trajectory.banded_program import BandedQP
+from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.nodes import Rows
-from wholebody.motion.trajectory.objective import Objective
 
 SOFT = 1e3  # 1/m, of loads that are beyond their bounds: large, so that they are met where contacts let them be
-LITTLE = 0.1  # share of a load's greatest derivative: what moves the load by less does not join the program for it
-SLACK_CURVATURE = 1e-2  # 1/m^2, of a share of the penalty: keeps equal splits of a shortfall unique
+STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
-NEAR_SPEED = 0.5  # share of a bound on speed from which a change has a row; what passes unseen has one in the next step
 CLOSE, NEAR_SHARE = 3e-3, 0.3  # m, and m for each rad of the radius: rows nearer than the larger begin a program
-TIGHT = 1e-6  # m, rad: a row nearer than this to being missed at a program's answer is active
 
 
 class Limits(NamedTuple):
@@ -39,6 +38,39 @@ class Limits(NamedTuple):
     upper: Array
     slowest: Array
     fastest: Array
+
+    @classmethod
+    def of(
+        cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None
+    ) -> Limits:
+        """Those of the frames of a clip; at a seam nothing moves.
+
+        Args:
+            terms: of the clip.
+            chart: of the frames from `first` on.
+            first: number of its first frame.
+            seams: whether the clip goes on before and after them.
+            rate: factor of the speed limits; None for no bounds on speed.
+        """
+        count, nv = len(chart), chart.model.nv
+        lower, upper = chart.bounds(terms.scene.figure.limits)
+        slowest, fastest = np.full((count - 1, nv), -np.inf), np.full((count - 1, nv), np.inf)
+        for place in range(count):
+            bounds = terms.bounds(first + place)
+            away = pin.difference(chart.model, terms.q[first + place], chart.original[place])
+            lower[place] = np.maximum(lower[place], bounds.lower - away)
+            upper[place] = np.minimum(upper[place], bounds.upper - away)
+            still = bounds.lower == bounds.upper
+            lower[place, still] = upper[place, still] = 0.0
+            if rate is not None and place < count - 1:
+                # where the original is faster than a limit, it may stay as fast
+                slow, fast = terms.step_bounds(first + place)
+                slowest[place] = np.minimum(rate * slow, chart.steps[place]) - chart.steps[place]
+                fastest[place] = np.maximum(rate * fast, chart.steps[place]) - chart.steps[place]
+        for seam, place in zip(seams, (0, -1), strict=True):
+            if seam:
+                lower[place] = upper[place] = 0.0
+        return cls(lower, upper, slowest, fastest)
 
     def passed(self, x: Array) -> Array:
         """(n, nv) by how much deviations (n, nv) pass their limits, or their changes the bounds on speed."""
@@ -68,50 +100,55 @@ class Layout(NamedTuple):
         return found
 
 
-def lay_out(
-    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, limits: Limits, radius: float, penalty: float,
-    multipliers: Sequence[Array], stiffness: float, kept: Sequence[Mask],
-) -> Layout:  # fmt: skip
-    """The program of a step from the deviations x (n, nv).
+class Step(NamedTuple):
+    """A step from deviations: what its program is made of.
 
-    Args:
-        objective: of the window.
-        rows: of all nodes at x, in the order of their frames.
+    Attributes:
         x: (n, nv) deviations.
+        rows: of all nodes at x, in the order of their frames.
         dofs: (a,) degrees of freedom that may change, ascending.
-        limits: of the deviations.
         radius: largest change of any deviation, radians and metres.
         penalty: of a metre or radian of shortfall.
         multipliers: of the equalities of each node.
-        stiffness: quadratic penalty of equalities.
         kept: for each node which of its rows the program gets.
     """
-    frames, count = len(x), len(dofs)
-    slacks = [_slacks(one, keep) for one, keep in zip(rows, kept, strict=True)]
-    per_frame = np.zeros(frames, dtype=np.intp)
-    for one, (_, number) in zip(rows, slacks, strict=True):
+
+    x: Array
+    rows: Sequence[Rows]
+    dofs: Indices
+    radius: float
+    penalty: float
+    multipliers: Sequence[Array]
+    kept: Sequence[Mask]
+
+
+def lay_out(objective: Objective, limits: Limits, step: Step) -> Layout:
+    """The program of a step."""
+    count, slacks = len(step.dofs), [_slacks(one, keep) for one, keep in zip(step.rows, step.kept, strict=True)]
+    per_frame = np.zeros(len(step.x), dtype=np.intp)
+    for one, (_, number) in zip(step.rows, slacks, strict=True):
         per_frame[one.node.frame] += number
     start = np.concatenate([[0], np.cumsum(count + per_frame)]).astype(np.intp)
     size = int(start[-1])
     place = start[:-1, None] + np.arange(count)[None]
-    prices = np.zeros(size)
-    used = start[:-1] + count
-    for one, (_, number) in zip(rows, slacks, strict=True):
+    prices, used, columns = np.zeros(size), start[:-1] + count, list[Indices]()
+    for one, (slack, number) in zip(step.rows, slacks, strict=True):
         frame = one.node.frame
-        prices[used[frame] : used[frame] + number] = SOFT if one.node.soft else penalty
+        prices[used[frame] : used[frame] + number] = SOFT if one.node.soft else step.penalty
+        columns.append(used[frame] + slack)
         used[frame] += number
-    P, c = _cost(objective, rows, x, dofs, place, prices, multipliers, stiffness)
-    G, lower = _contact_part(rows, kept, slacks, x, dofs, place, start, count, size)
-    D, slowest, fastest = _speed_part(x, dofs, place, limits, size, radius)
+    P, c = _cost(objective, step, place, prices)
+    G, lower = _contact_part(step, columns, place, size)
+    D, slowest, fastest = _speed_part(step, place, limits, size)
     least, most = np.zeros(size), np.full(size, np.inf)
-    least[place], most[place] = box(x, limits, radius, dofs)
+    least[place], most[place] = box(step.x, limits, step.radius, step.dofs)
     begun = np.zeros(size)
-    begun[place] = x[:, dofs]
+    begun[place] = step.x[:, step.dofs]
     program = BandedQP(
         P, c, sp.csc_matrix(sp.vstack([G, D])), np.concatenate([lower, slowest]),
         np.concatenate([np.full(len(lower), np.inf), fastest]), least, most, begun,
     )  # fmt: skip
-    return Layout(program, place, dofs)
+    return Layout(program, place, step.dofs)
 
 
 def box(x: Array, limits: Limits, radius: float, dofs: Indices) -> tuple[Array, Array]:
@@ -129,7 +166,8 @@ def touched(rows: Sequence[Rows], which: Sequence[Mask]) -> Mask:
         if mask.any():
             for part in one.parts:
                 moved = np.abs(part[mask])
-                least = LITTLE * moved.max(axis=1, initial=0.0) if one.node.soft else np.zeros(len(moved))
+                # what moves a load by less than a tenth of its greatest derivative does not join the program for it
+                least = 0.1 * moved.max(axis=1, initial=0.0) if one.node.soft else np.zeros(len(moved))
                 found |= (moved > least[:, None]).any(axis=0)
     return found
 
@@ -144,8 +182,8 @@ def foreseen(one: Rows, step: Array) -> Array:
 
 
 def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
-    """For each node which rows are tight or missed after a step (n, nv)."""
-    return [foreseen(one, step) <= one.node.room + TIGHT for one in rows]
+    """For each node which rows are tight or missed after a step (n, nv), to a micrometre."""
+    return [foreseen(one, step) <= one.node.room + 1e-6 for one in rows]
 
 
 def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
@@ -173,42 +211,36 @@ def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
     return slack, len(own) + int((~missed).any())
 
 
-def _cost(
-    objective: Objective, rows: Sequence[Rows], x: Array, dofs: Indices, place: Indices, prices: Array,
-    multipliers: Sequence[Array], stiffness: float,
-) -> tuple[sp.csc_matrix, Array]:  # fmt: skip
-    size, count = len(prices), len(dofs)
+def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tuple[sp.csc_matrix, Array]:
+    """P and c: the objective, the prices of slacks, and the augmented Lagrangian of equalities."""
+    x, dofs, count = step.x, step.dofs, len(step.dofs)
     c = prices.copy()
     first, second = np.nonzero(objective.bands)
     values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
     at, to = [place[first].ravel()], [place[second].ravel()]
     slack = np.flatnonzero(prices)
-    values.append(SLACK_CURVATURE * prices[slack])
+    values.append(1e-2 * prices[slack])  # 1/m^2: keeps equal splits of a shortfall unique
     at.append(slack)
     to.append(slack)
-    for one, multiplier in zip(rows, multipliers, strict=True):
+    for one, multiplier in zip(step.rows, step.multipliers, strict=True):
         if len(one.equal):
             part, here = one.equal_rows[:, dofs], place[one.node.frame]
-            wanted = one.equal_rows[:, dofs] @ x[one.node.frame, dofs] - one.equal - multiplier
-            values.append((stiffness * part.T @ part).ravel())
+            wanted = part @ x[one.node.frame, dofs] - one.equal - multiplier
+            values.append((STIFFNESS * part.T @ part).ravel())
             at.append(np.repeat(here, count))
             to.append(np.tile(here, count))
-            c[here] -= stiffness * part.T @ wanted
+            c[here] -= STIFFNESS * part.T @ wanted
     triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
-    return sp.csc_matrix(triplets, shape=(size, size)), c
+    return sp.csc_matrix(triplets, shape=(len(c), len(c))), c
 
 
-def _contact_part(
-    rows: Sequence[Rows], kept: Sequence[Mask], slacks: Sequence[tuple[Indices, int]], x: Array, dofs: Indices,
-    place: Indices, start: Indices, count: int, size: int,
-) -> tuple[sp.csc_matrix, Array]:  # fmt: skip
-    """Rows ``gap + J (y - x) + slack >= 0``."""
+def _contact_part(step: Step, columns: Sequence[Indices], place: Indices, size: int) -> tuple[sp.csc_matrix, Array]:
+    """Rows ``gap + J (y - x) + slack >= 0``; `columns` has the slack of each row that is kept."""
+    x, dofs, count = step.x, step.dofs, len(step.dofs)
     values, at, to, lower = [np.zeros(0)], [np.zeros(0, dtype=np.intp)], [np.zeros(0, dtype=np.intp)], [np.zeros(0)]
-    number, used = 0, np.zeros(len(x), dtype=np.intp)
-    for one, keep, (slack, slack_count) in zip(rows, kept, slacks, strict=True):
-        frame, many = one.node.frame, int(keep.sum())
-        if not many:
-            continue
+    number = 0
+    for one, keep, slack in zip(step.rows, step.kept, columns, strict=True):
+        frame, many = one.node.frame, len(slack)
         index = np.arange(number, number + many)
         bound = np.minimum(one.node.room - one.gap[keep], ONE_STEP)
         for offset, part in enumerate(one.parts):
@@ -219,29 +251,24 @@ def _contact_part(
             bound = bound + own @ x[frame + offset, dofs]
         values.append(np.ones(many))
         at.append(index)
-        to.append(start[frame] + count + used[frame] + slack)
-        used[frame] += slack_count
+        to.append(slack)
         lower.append(bound)
         number += many
     triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
     return sp.csc_matrix(triplets, shape=(number, size)), np.concatenate(lower)
 
 
-def _speed_part(
-    x: Array, dofs: Indices, place: Indices, limits: Limits, size: int, radius: float
-) -> tuple[sp.csc_matrix, Array, Array]:
+def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[sp.csc_matrix, Array, Array]:
     """Rows that bound the change of a deviation from a frame to the next, where it is near the bound."""
-    change = np.diff(x[:, dofs], axis=0)
-    slowest, fastest = limits.slowest[:, dofs], limits.fastest[:, dofs]
-    # a bound may be zero, where the original is as fast as the limit: a little before it counts as near too
-    near = NEAR_SHARE * radius
-    high_near, low_near = (
-        np.minimum(NEAR_SPEED * fastest, fastest - near),
-        np.maximum(NEAR_SPEED * slowest, slowest + near),
-    )
-    frame, dof = np.nonzero((change > high_near) | (change < low_near))
+    x = step.x[:, step.dofs]
+    change = np.diff(x, axis=0)
+    slowest, fastest = limits.slowest[:, step.dofs], limits.fastest[:, step.dofs]
+    # from half of a bound on; one may be zero, where the original is as fast as the limit: a little before it is near
+    near = NEAR_SHARE * step.radius
+    fast, slow = np.minimum(0.5 * fastest, fastest - near), np.maximum(0.5 * slowest, slowest + near)
+    frame, dof = np.nonzero((change > fast) | (change < slow))
     now, low, high = change[frame, dof], slowest[frame, dof], fastest[frame, dof]
-    share = _brought_back(x[:, dofs], change - np.clip(change, slowest, fastest), radius)[dof]
+    share = _brought_back(x, change - np.clip(change, slowest, fastest), step.radius)[dof]
     low = np.where(now < low, now + share * (low - now), low)
     high = np.where(now > high, now + share * (high - now), high)
     index = np.arange(len(frame))

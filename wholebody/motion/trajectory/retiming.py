@@ -20,20 +20,11 @@ import numpy as np
 import scipy.sparse as sp
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
-from wholebody.motion.trajectory.objective import Objective
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
+from wholebody.motion.trajectory.deviations import Objective
 
 SPREAD = 0.2
 """Seconds, tau: how far slowing at one frame spreads to its neighbours; larger = smoother, slower for longer."""
-
-SAME = 1e-3
-"""Of b: a clip that is slowed by no more keeps its timing."""
-
-MISSED = 1e3
-"""Weight of a shortfall of loads: large, so that they are met where the largest slowing lets them be."""
-
-CURVATURE = 1e-3
-"""Of a shortfall, in parts of its weight: keeps equal splits of it unique."""
 
 
 class TimedRows(NamedTuple):
@@ -77,8 +68,10 @@ def slowed(
         rows = sp.diags(loads.speed) @ sp.eye(count, format="csr")[loads.frame] + sp.diags(loads.change) @ rate
         ahead = np.asarray(rows @ np.ones(count)).ravel() + loads.gap  # of b = 1
         slacks = len(loads.gap)
-        P = sp.block_diag([bands, CURVATURE * MISSED * sp.eye(slacks)])
-        c = np.concatenate([c, np.full(slacks, MISSED)])
+        # shortfalls are weighed by 1e3, so that loads are met where the largest slowing lets them be; their curvature
+        # keeps equal splits unique
+        P = sp.block_diag([bands, sp.eye(slacks)])
+        c = np.concatenate([c, np.full(slacks, 1e3)])
         G, lower = sp.hstack([-rows, sp.eye(slacks)]), -ahead
         low, high = np.concatenate([low, np.zeros(slacks)]), np.concatenate([high, np.full(slacks, np.inf)])
     program = BandedQP(
@@ -139,7 +132,7 @@ def timing(b: Array, dt: float) -> Timing | None:
         b: (n,) squares of the rate at each frame; linear in between.
         dt: seconds from frame to frame, of both.
     """
-    if len(b) < 2 or (b >= 1.0 - SAME).all():
+    if len(b) < 2 or (b >= 1.0 - 1e-3).all():  # it is slowed by next to nothing
         return None
     rate = np.sqrt(b)
     took = 2.0 * dt / (rate[:-1] + rate[1:])

@@ -13,18 +13,21 @@ programs of a person have ten degrees of freedom a frame instead of 55.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
 from typing import NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.motion.trajectory.banded_qp import Answer, BandedQP
+from wholebody.motion.trajectory.banded_program import Answer, BandedQP
+from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
-from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import (
     ONE_STEP,
     SOFT,
     Limits,
+    Step,
     active,
     foreseen,
     lay_out,
@@ -33,27 +36,49 @@ from wholebody.motion.trajectory.program import (
     within_reach,
 )
 
-RADIUS = 0.25  # rad, m: first trust region; larger = fewer programs on clear ways, more that are refused
-LARGEST, SMALLEST = 0.5, 1e-4
-WITHIN = 0.1  # m: pairs nearer than this have rows; it is what a radius moves the end of a limb by
 MET = 2e-5  # m, rad: a row missed by no more is met; a fifth of what a check allows
-HELD = 0.2  # of a missed equality counts: a check allows 1 mm of it, and 0.1 mm of an overlap
-STILL = 2e-3  # rad, m: a step no larger ends the iterations where everything is met; larger = rougher optima, faster
-GAIN = 5e-3  # share of the objective: a step that brings no more ends them too
-PENALTY, HIGHEST = 1e3, 1e6  # 1/m, of a shortfall: first, and most
-RAISE = 10.0
-HALVED = 0.5  # of a shortfall: a step that leaves more of it than this raises the penalty
-SMALL_STEPS = 2  # steps one after the other that bring little and leave as much missed, until the trust region shrinks
-STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
-EARLY = 10  # steps until an early exit; more = longer where normals mislead, fewer = more other starts
-STEPS, STALLED = 3, 0.8  # it also ends where so many steps leave more than this share of the worst shortfall
-LOST = 0.01  # m, rad: if it was never less; what was nearer is on the right side, and has contacts that bend
-SHRUNK = 0.5  # of its first trust region: a smaller one is an early exit too
-FAR = 2e-3  # m, rad: with a shortfall no larger it goes on
-ADDED = 2  # solutions of a program by its near rows, before it gets all that are within reach
-MARGIN = 1e-2  # of a shortfall: by how much a step must be better than the filter
+FAR = 2e-3  # m, rad: with a shortfall no larger, a run that may end early goes on, and a rough run ends
+
 Cancel = Callable[[int, float], bool]
 """Told the number of steps and the worst shortfall; true ends the iterations."""
+
+
+@dataclass(frozen=True)
+class SQPSettings:
+    """Numbers of the iterations.
+
+    Attributes:
+        radius: first trust region, radians and metres; larger = fewer programs on clear ways, more that are refused.
+        largest: largest trust region.
+        smallest: a smaller one ends the iterations, or raises the penalty.
+        within: metres; pairs nearer than this have rows: what a radius moves the end of a limb by.
+        still: radians and metres; a step no larger ends the iterations where everything is met. Larger = rougher
+            optima, faster.
+        gain: share of the objective; a step that brings no more ends them too.
+        penalty: of a shortfall at first, 1/m; it is raised tenfold where a step leaves more than half of a shortfall.
+        highest: penalty, 1/m.
+    """
+
+    radius: float = 0.25
+    largest: float = 0.5
+    smallest: float = 1e-4
+    within: float = 0.1
+    still: float = 2e-3
+    gain: float = 5e-3
+    penalty: float = 1e3
+    highest: float = 1e6
+
+
+SETTINGS = SQPSettings()
+
+
+class End(Enum):
+    """Why iterations ended: at an optimum or at their last step, as little was missed, in vain, or by the caller."""
+
+    LAST = "last"
+    ROUGH = "rough"
+    EARLY = "early"
+    CANCELLED = "cancelled"
 
 
 class SQPResult(NamedTuple):
@@ -63,21 +88,20 @@ class SQPResult(NamedTuple):
         x: (n, nv) deviations.
         objective: there, loads beyond their bounds included.
         worst: largest shortfall of any row but of loads, metres or radians.
-        met: whether it is at most `MET`.
         programs: how many programs were solved.
-        cancelled: whether the caller ended it.
-        early: whether it ended early, with much missed still.
-        roughly: whether it ended as little was missed, before the objective was least.
+        end: why they ended.
     """
 
     x: Array
     objective: float
     worst: float
-    met: bool
     programs: int
-    cancelled: bool
-    early: bool = False
-    roughly: bool = False
+    end: End = End.LAST
+
+    @property
+    def met(self) -> bool:
+        """Whether all rows are met."""
+        return self.worst <= MET
 
 
 class _At(NamedTuple):
@@ -90,6 +114,48 @@ class _At(NamedTuple):
     worst: float
 
 
+class _Filter:
+    """Which points are accepted, and the trust region and penalty that follow from this."""
+
+    def __init__(self, radius: float | None, largest: float | None) -> None:
+        self.radius = SETTINGS.radius if radius is None else radius
+        self._largest = SETTINGS.largest if largest is None else largest
+        self.penalty, self._little = SETTINGS.penalty, 0
+        self._entries: list[tuple[float, float]] = []
+
+    def takes(self, there: _At, here: _At) -> bool:
+        """Whether the filter takes a point."""
+        if there.worst <= MET:
+            gained = here.objective - there.objective
+            return here.worst > MET or gained >= -1e-12 * max(1.0, here.objective)
+        known = [*self._entries, (0.99 * here.total, here.objective)]
+        return all(there.total < total or there.objective < least - 1e-2 * there.total for total, least in known)
+
+    def accept(self, here: _At, there: _At, longest: float, small: bool) -> None:
+        """Adapt to a step that was taken."""
+        self._entries.append((0.99 * here.total, here.objective))
+        left = there.worst > MET and there.total > 0.5 * here.total
+        self._little = self._little + 1 if left and small else 0
+        if left and longest < 0.9 * self.radius:
+            self.penalty = min(10.0 * self.penalty, SETTINGS.highest)
+        # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
+        if self._little >= 2:
+            self.radius = 0.5 * min(self.radius, longest)
+        elif longest > 0.9 * self.radius and not self._little:
+            self.radius = min(2.0 * self.radius, self._largest)
+
+    def refuse(self, here: _At, longest: float) -> bool:
+        """Adapt to a step that was not taken; whether there is another one to try."""
+        self.radius = 0.5 * min(self.radius, longest)
+        if self.radius >= SETTINGS.smallest:
+            return True
+        if here.worst <= MET or self.penalty >= SETTINGS.highest:
+            return False
+        self.penalty, self.radius = min(10.0 * self.penalty, SETTINGS.highest), 0.1 * SETTINGS.radius
+        self._entries.clear()
+        return True
+
+
 class WindowProgram:
     """One window: what is minimised, what holds, and the iterations.
 
@@ -98,13 +164,9 @@ class WindowProgram:
     """
 
     def __init__(
-        self,
-        evaluator: NodeEvaluator,
-        objective: Objective,
-        limits: Limits,
-        solve: Callable[[BandedQP], Answer],
+        self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, solve: Callable[[BandedQP], Answer],
         iterations: int,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Take what is needed.
 
         Args:
@@ -129,96 +191,66 @@ class WindowProgram:
         self.nodes = sorted({*self.nodes, *nodes})
 
     def run(
-        self,
-        x: Array,
-        cancel: Cancel,
-        radius: float = RADIUS,
-        largest: float = LARGEST,
-        early_exit: float | None = None,
-        rough: bool = False,
-    ) -> SQPResult:
+        self, x: Array, cancel: Cancel, radius: float | None = None, largest: float | None = None,
+        early: bool = False, rough: bool = False,
+    ) -> SQPResult:  # fmt: skip
         """Iterate from deviations x (n, nv).
 
         Args:
             x: (n, nv) deviations.
             cancel: told how far it is.
-            radius: first trust region.
-            largest: largest trust region.
-            early_exit: end early where much is missed still and no longer less, or the objective is larger than this,
-                for there are other deviations to begin with; None to go on.
+            radius: first trust region; None for that of the settings.
+            largest: largest trust region; None for that of the settings.
+            early: end where much is missed still and no longer less, for there are other deviations to begin with.
             rough: end as soon as little is missed, however much less the objective could be.
         """
-        here = self._at(x)
-        penalty = PENALTY
+        here, ways, programs, missed = self._at(x), _Filter(radius, largest), 0, list[float]()
         multipliers = [np.zeros(len(one.equal)) for one in here.rows]
-        entries: list[tuple[float, float]] = []
         counts = self._counts(here)
-        programs, smallest, missed, small_steps = 0, SHRUNK * radius, list[float](), 0
         for number in range(self._iterations):
             missed.append(here.worst)
-            if (
-                early_exit is not None
-                and here.worst > FAR
-                and (number >= EARLY or radius < smallest or here.objective > early_exit or _stalled(missed))
-            ):
-                return SQPResult(here.x, here.objective, here.worst, False, programs, False, True)
+            if early and here.worst > FAR and _stalled(missed):
+                return SQPResult(here.x, here.objective, here.worst, programs, End.EARLY)
             if cancel(number, here.worst):
-                return SQPResult(here.x, here.objective, here.worst, here.worst <= MET, programs, True)
+                return SQPResult(here.x, here.objective, here.worst, programs, End.CANCELLED)
+            if rough and number and here.worst <= FAR:
+                return SQPResult(here.x, here.objective, here.worst, programs, End.ROUGH)
             if not counts.any():
                 break
-            if rough and number and here.worst <= FAR:
-                return SQPResult(here.x, here.objective, here.worst, False, programs, False, roughly=True)
             dofs: Indices = np.flatnonzero(counts).astype(np.intp)
-            there_x, solved = self._step(here, dofs, radius, penalty, multipliers)
+            there_x, solved = self._step(here, dofs, ways, multipliers)
             programs += solved
             step = there_x - here.x
             longest = float(np.abs(step).max(initial=0.0))
-            more = self._joined(here, step, counts)
-            there = self._at(there_x)
-            gained = here.objective - there.objective
-            small = longest <= STILL or (abs(gained) <= GAIN * max(here.objective, 1e-9))
-            if self._accepted(there, here, entries, gained):
-                entries.append(((1.0 - MARGIN) * here.total, here.objective))
-                multipliers = [self._shifted(old, one) for old, one in zip(multipliers, there.rows, strict=True)]
-                left = there.worst > MET and there.total > HALVED * here.total
-                small_steps = small_steps + 1 if left and small else 0
-                if left and longest < 0.9 * radius:
-                    penalty = min(RAISE * penalty, HIGHEST)
-                # nothing is gained and as much is missed, by contacts that bend: shorter steps bend less
-                if small_steps >= SMALL_STEPS:
-                    radius = 0.5 * min(radius, longest)
-                elif longest > 0.9 * radius and not small_steps:
-                    radius = min(2.0 * radius, largest)
+            more, there = self._joined(here, step, counts), self._at(there_x)
+            gained = abs(here.objective - there.objective)
+            small = longest <= SETTINGS.still or gained <= SETTINGS.gain * max(here.objective, 1e-9)
+            taken = ways.takes(there, here)
+            if taken:
+                ways.accept(here, there, longest, small)
+                multipliers = [
+                    np.clip(old + one.equal, -0.05, 0.05) for old, one in zip(multipliers, there.rows, strict=True)
+                ]
                 here = there
                 counts = counts | more | self._counts(here)
-                if here.worst <= MET and small and not (more & ~counts).any():
-                    break
-            elif here.worst <= MET and small and not (more & ~counts).any():
-                break  # what a shorter step could bring is less still
-            else:
-                radius = 0.5 * min(radius, longest)
-                if radius < SMALLEST:
-                    if here.worst <= MET or penalty >= HIGHEST:
-                        break
-                    penalty, radius = min(RAISE * penalty, HIGHEST), 0.1 * RADIUS
-                    entries.clear()
-        return SQPResult(here.x, here.objective, here.worst, here.worst <= MET, programs, False)
+            if here.worst <= MET and small and not (more & ~counts).any():
+                break  # what another step could bring is less still
+            if not taken and not ways.refuse(here, longest):
+                break
+        return SQPResult(here.x, here.objective, here.worst, programs)
 
-    def _step(
-        self, here: _At, dofs: Indices, radius: float, penalty: float, multipliers: Sequence[Array]
-    ) -> tuple[Array, int]:
+    def _step(self, here: _At, dofs: Indices, ways: _Filter, multipliers: Sequence[Array]) -> tuple[Array, int]:
         """Deviations (n, nv) after the step of a program, and how many programs were solved for it.
 
         Most rows within reach stay far from being missed. So a program begins with the near ones. Those that its step
-        would miss are added, and it is solved again; the last time it gets all that are within reach.
+        would miss are added, and it is solved again; the third time it gets all that are within reach.
         """
-        possible = [within_reach(one, dofs, radius) for one in here.rows]
-        kept = [mask & likely(one, radius) for one, mask in zip(here.rows, possible, strict=True)]
+        possible = [within_reach(one, dofs, ways.radius) for one in here.rows]
+        kept = [mask & likely(one, ways.radius) for one, mask in zip(here.rows, possible, strict=True)]
         solved = 0
         while True:
-            layout = lay_out(
-                self._objective, here.rows, here.x, dofs, self._limits, radius, penalty, multipliers, STIFFNESS, kept
-            )
+            step = Step(here.x, here.rows, dofs, ways.radius, ways.penalty, multipliers, kept)
+            layout = lay_out(self._objective, self._limits, step)
             x, solved = layout.deviations(self._solve(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
             missed = [
@@ -227,28 +259,19 @@ class WindowProgram:
             ]
             if not any(mask.any() for mask in missed):
                 return x, solved
-            more = left if solved == ADDED else missed
+            more = left if solved == 2 else missed
             kept = [keep | mask for keep, mask in zip(kept, more, strict=True)]
 
     def _at(self, x: Array) -> _At:
-        rows = [self._evaluator.at(node, x, WITHIN) for node in self.nodes]
-        shortfalls = [np.concatenate([one.shortfalls, np.abs(one.equal)]) for one in rows if not one.node.soft]
+        """The rows at deviations, the objective and the shortfalls; a fifth of what an equality misses counts."""
+        rows = [self._evaluator.at(node, x, SETTINGS.within) for node in self.nodes]
         beyond = SOFT * float(sum(one.shortfalls.sum() for one in rows if one.node.soft))
-        past = self._limits.passed(x)
-        total = float(sum(one.sum() for one in shortfalls) + past.sum())
-        missed = [one.shortfalls for one in rows if not one.node.soft]
-        missed += [HELD * np.abs(one.equal) for one in rows]
-        worst = max(max((float(one.max(initial=0.0)) for one in missed), default=0.0), float(past.max(initial=0.0)))
+        past, hard = self._limits.passed(x), [one for one in rows if not one.node.soft]
+        total = float(sum(one.shortfalls.sum() + np.abs(one.equal).sum() for one in hard) + past.sum())
+        # a check allows 1 mm of an equality, and 0.1 mm of an overlap
+        missed = [past, *(one.shortfalls for one in hard), *(0.2 * np.abs(one.equal) for one in rows)]
+        worst = max(float(one.max(initial=0.0)) for one in missed)
         return _At(x, rows, self._objective.value(x) + beyond, total, worst)
-
-    def _accepted(self, there: _At, here: _At, entries: Sequence[tuple[float, float]], gained: float) -> bool:
-        """Whether the filter takes a point."""
-        if there.worst <= MET:
-            return here.worst > MET or gained >= -1e-12 * max(1.0, here.objective)
-        known = [*entries, ((1.0 - MARGIN) * here.total, here.objective)]
-        return all(
-            there.total < total or there.objective < objective - MARGIN * there.total for total, objective in known
-        )
 
     def _counts(self, here: _At) -> Mask:
         """(nv,) degrees of freedom that move what is missed, or are away from zero."""
@@ -277,14 +300,13 @@ class WindowProgram:
                 return found
             found = more
 
-    def _shifted(self, old: Array, one: Rows) -> Array:
-        """Multipliers of equalities, divided by the stiffness."""
-        return np.clip(old + one.equal, -0.05, 0.05)
-
 
 def _stalled(missed: Sequence[float]) -> bool:
-    """Whether the last steps brought too little of the worst shortfalls, one for each step; see `STEPS`."""
-    if len(missed) <= STEPS or min(missed) <= LOST:
+    """Whether the last three steps left more than 80 % of the worst shortfall, and brought less than they asked for.
+
+    What was within a centimetre is on the right side, and has contacts that bend.
+    """
+    if len(missed) <= 3 or min(missed) <= 0.01:
         return False
-    before = min(missed[:-STEPS])
-    return min(missed[-STEPS:]) > max(STALLED * before, before - ONE_STEP)
+    before = min(missed[:-3])
+    return min(missed[-3:]) > max(0.8 * before, before - ONE_STEP)

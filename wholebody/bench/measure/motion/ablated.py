@@ -6,8 +6,10 @@ A constant decides something here where it changes whether a clip is free, its f
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -15,7 +17,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.bench.report import render
-from wholebody.bench.suite.ablation import FACTORS, Constant, changed, constants_in
+from wholebody.bench.suite.ablation import FACTORS, Constant, changed, constants_in, replaced
 
 CASES: tuple[tuple[str, str, str, int], ...] = (
     ("arms crossed", "torus", "trajectory", 2),
@@ -35,22 +37,13 @@ USED: dict[str, tuple[str, ...]] = {
     "trajectory.program": ("trajectory",),
     "trajectory.nodes": ("trajectory",),
     "trajectory.banded_qp": ("trajectory",),
-    "trajectory.starts": ("trajectory",),
-    "bisection.method": ("bisection",),
     "bisection.prediction": ("bisection",),
-    "bisection.recursion": ("bisection",),
-    "per_frame": ("frames",),
-    "following": ("bisection", "frames"),
-    "one_side": ("bisection", "frames"),
+    "one_side": ("trajectory", "bisection", "frames"),
     "repair": ("bisection", "frames"),
-    "faults": ("bisection", "frames"),
-    "dips": ("trajectory", "bisection", "frames"),
-    "stance_places": ("trajectory", "bisection", "frames"),
+    "faults": ("trajectory", "bisection", "frames"),
+    "stance": ("trajectory", "bisection", "frames"),
 }
 """Modules of `wholebody.motion`, and the methods on whose cases their constants are changed."""
-
-INPUTS = ("MOST_FRAMES", "MOST_BUFFER", "MOST_ROOM", "NAMED", "GOLDEN")
-"""Limits of what may be given, of messages, and a number of mathematics."""
 
 NOTICED = 1e-3
 """Millimetres, parts of the original's jerk and, ten times, radians: smaller changes of a figure are of rounding."""
@@ -121,7 +114,7 @@ def freed(cases: Sequence[tuple[str, str, str, int]], figure: Any) -> Freed:
     from wholebody.motion import measures
     from wholebody.motion.avoidance import avoid
     from wholebody.motion.clip import Clip
-    from wholebody.motion.ready_equipment import dressed
+    from wholebody.motion.worn_equipment import dressed
 
     free, answers, figures, spent = list[bool](), list[Array](), list[tuple[float, ...]](), 0.0
     for name, worn, method, every in cases:
@@ -168,14 +161,31 @@ def ablation(
         if not mine:
             continue
         before = _together([whole[case] for case in mine])
-        for constant in constants_in([f"wholebody.motion.{module}"])[0]:
-            for change, factor in FACTORS.items() if constant.name not in INPUTS else ():
+        name = f"wholebody.motion.{module}"
+        for constant in (*constants_in([name])[0], *_settings(name)):
+            for change, factor in FACTORS.items():
                 value = constant.times(factor)
                 if value != constant.value:
-                    with changed(constant, value):
+                    with changed(constant, value) if "." not in constant.name else _set(constant, value):
                         rows.append(_row(constant, module, change, before, freed(mine, figure)))
                     tell(str(rows[-1]))
     return _together(list(whole.values())), rows
+
+
+def _settings(module: str) -> list[Constant]:
+    """The numbers of a module's record `SETTINGS`, if it has one; named "SETTINGS.radius"."""
+    record = getattr(import_module(module), "SETTINGS", None)
+    values = {} if record is None else asdict(record)
+    return [Constant(module, f"SETTINGS.{name}", value) for name, value in values.items()]
+
+
+@contextmanager
+def _set(constant: Constant, value: Any) -> Iterator[None]:
+    """Give a number of a module's settings another value for a while."""
+    owner = import_module(constant.module)
+    settings = owner.SETTINGS
+    with replaced([(owner, "SETTINGS")], replace(settings, **{constant.name.partition(".")[2]: value})):
+        yield
 
 
 def _row(constant: Constant, module: str, change: str, before: Freed, after: Freed) -> Row:

@@ -16,7 +16,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.reading import read_clip
-from wholebody.motion.ready_equipment import NOTHING, READY
+from wholebody.motion.worn_equipment import NOTHING, READY
 
 RATE = 30.0  # Hz: of all clips
 LONGEST = 12.0  # s: longer recordings are cut

@@ -146,7 +146,7 @@ def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     from wholebody.figures import load
     from wholebody.motion.checking import check
     from wholebody.motion.reading import read_clip
-    from wholebody.motion.ready_equipment import dressed
+    from wholebody.motion.worn_equipment import dressed
 
     allow_processor(most)
     figure = load(FIGURE)
@@ -234,7 +234,7 @@ def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck, missed:
         dips=found.dips,
         deepest_mm=1e3 * found.deepest,
         between_mm=1e3 * found.deepest_between,
-        deeper=measures.share_deeper(found),
+        deeper=float((found.depth > 0.01).mean()),
         limit=excess,
         angle=apart.angle,
         distance_mm=1e3 * apart.distance,

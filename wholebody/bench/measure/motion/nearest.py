@@ -16,9 +16,8 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import Given, frame_terms
 from wholebody.motion.measures import deviation
 from wholebody.motion.trajectory.banded_qp import banded_solver
-from wholebody.motion.trajectory.chart import Chart
+from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.nodes import NodeEvaluator
-from wholebody.motion.trajectory.objective import Objective
 from wholebody.motion.trajectory.program import Limits
 from wholebody.motion.trajectory.sqp import MET, WindowProgram
 from wholebody.scene.scene import Scene

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.cones import guards
+from wholebody.methods.ccd.cones import cone_guards
+from wholebody.methods.ccd.guards import guards
 from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
 from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
 from wholebody.methods.ccd.sweep import carried, distance, moving_all
@@ -43,6 +44,7 @@ class ChainResolver:
         foreign: frozenset[int],
         tip: int,
         cones: Sequence[str] | None = None,
+        ranges: Sequence[str] = (),
         exact: bool = True,
     ) -> None:
         """Prepare a chain.
@@ -55,13 +57,15 @@ class ChainResolver:
             foreign: joints of the other chains.
             tip: index of the frame at its end.
             cones: names of the reach cones to keep; None for all of the figure's.
+            ranges: names of the ranges of motion to keep.
             exact: see `LinkFinder`.
         """
         self.name = name
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
-        self._guards = guards(scene.figure, self.limbs, cones)
+        self._guards = guards(scene.figure, self.limbs, cones, ranges)
+        self._cones = cone_guards(scene.figure, self.limbs, cones)
         self._tip = _three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(workspace)
         self.reach = self._reaches(workspace)
@@ -90,16 +94,16 @@ class ChainResolver:
         self.limbs.read(q, data)
         self.limbs.forward()
         for guard in self._guards:
-            guard.read(data)
+            guard.read(q, data)
 
     def in_cones(self, data: Any) -> bool:
         """Whether the limbs are in their reach cones at the joint placements in `data`; `read` is not needed."""
-        return all(guard.holds(data) for guard in self._guards)
+        return all(cone.holds(data) for cone in self._cones)
 
-    def keep_cones(self) -> bool:
-        """Turn limbs that have left their reach cones back into them; true if all are inside."""
-        inside = [guard.keep() for guard in self._guards]
-        return all(inside)
+    def keep_ranges(self) -> None:
+        """Bring limbs that have left their reach cones, or joints their ranges of motion, back into them."""
+        for guard in self._guards:
+            guard.keep()
 
     def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
         """The overlapping link nearest to the root; see `LinkFinder.nearest_root`."""
@@ -141,7 +145,7 @@ class ChainResolver:
         for _ in range(SWEEPS):
             carried(limbs, here, there, ALIKE[:1], plan)
             limbs.forward()
-            self.keep_cones()
+            self.keep_ranges()
             here[0] = moved(limbs.frame(node), *local)
             before, left = left, distance(here, there, ALIKE[:1])
             if left < CLOSE or left > SLOW * before:
@@ -165,7 +169,7 @@ class ChainResolver:
             limbs.forward()
             if change < CLOSE:
                 break
-        self.keep_cones()
+        self.keep_ranges()
 
     def _inner(self, link: Link) -> tuple[int, ...]:
         """The nodes inwards of the link's own: those that move the previous link."""

@@ -68,6 +68,7 @@ class OverlapResolver:
         clearances: Array | None = None,
         fixed: frozenset[int] = frozenset(),
         cones: Sequence[str] | None = None,
+        ranges: Sequence[str] = (),
         tolerance: float = TOLERANCE,
         exact: bool = True,
         control: Control | None = None,
@@ -80,6 +81,7 @@ class OverlapResolver:
             clearances: (pairs,) clearance of every collision pair, metres; None for zero.
             fixed: Pinocchio's indices of joints that must not move.
             cones: names of the reach cones that are kept; None for all of the figure's.
+            ranges: names of the ranges of motion that are kept.
             tolerance: largest overlap that is ignored, metres.
             exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
             control: may end the removal early.
@@ -93,7 +95,7 @@ class OverlapResolver:
         self._joints = workspace.table.joint.tolist()
         self.counts = Counts()
         self.deepest = 0.0
-        self._fixed, self._cones = fixed, cones
+        self._fixed, self._cones, self._ranges = fixed, cones, ranges
 
     @cached_property
     def chains(self) -> dict[str, ChainResolver]:
@@ -105,7 +107,15 @@ class OverlapResolver:
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
         return {
             name: ChainResolver(
-                self.scene, self.workspace, name, joints, everything - set(joints), tip, self._cones, self.exact
+                self.scene,
+                self.workspace,
+                name,
+                joints,
+                everything - set(joints),
+                tip,
+                self._cones,
+                self._ranges,
+                self.exact,
             )
             for name, (joints, tip) in named.items()
             if joints
@@ -195,7 +205,7 @@ class OverlapResolver:
         for chain in self.chains.values():
             if not chain.in_cones(self._data):
                 chain.read(q, self._data)
-                chain.keep_cones()
+                chain.keep_ranges()
                 chain.limbs.write(q)
                 pin.forwardKinematics(self.scene.model, self._data, q)
         return q

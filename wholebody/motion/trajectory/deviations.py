@@ -1,4 +1,4 @@
-"""Postures of a clip as deviations from the original postures, and rows carried over to these deviations.
+"""Postures of a clip as deviations from the original postures, and what is minimised of these deviations.
 
 The posture of frame t is ``q_t = integrate(r_t, x_t)`` with the original posture r_t and the deviation x_t (nv,).
 For a joint of one degree of freedom x_t is a difference of angles. For a free root it is the logarithm of the motion
@@ -100,3 +100,39 @@ class Chart:
         curved, result = self.curved, np.array(rows)
         result[:, curved] = rows[:, curved] @ matrix[self._both]
         return result
+
+
+def second_differences(frames: int, seam_before: bool, seam_after: bool) -> Array:
+    """(k, n) second differences over n frames, those across a seam included: beyond it everything is zero."""
+    full = np.zeros((frames + 2, frames + 4))
+    rows = np.arange(frames + 2)
+    full[rows, rows], full[rows, rows + 1], full[rows, rows + 2] = 1.0, -2.0, 1.0
+    inside = full[0 if seam_before else 2 : None if seam_after else frames, 2 : frames + 2]
+    return inside
+
+
+class Objective:
+    """The objective of one window. It is quadratic in the deviations and does not change.
+
+    Attributes:
+        bands: (n, n) of a degree of freedom of weight 1: the second derivative over the frames, five bands.
+        weights: (nv,) of the degrees of freedom.
+    """
+
+    def __init__(self, frames: int, weights: Array, time: float, dt: float, seams: tuple[bool, bool]) -> None:
+        """Lay out the bands.
+
+        Args:
+            frames: of the window.
+            weights: (nv,) positive.
+            time: tau, seconds.
+            dt: seconds from frame to frame.
+            seams: whether the clip goes on before and after the window.
+        """
+        differences = second_differences(frames, *seams)
+        self.bands: Array = np.eye(frames) + (time / dt) ** 4 * differences.T @ differences
+        self.weights = weights
+
+    def value(self, x: Array) -> float:
+        """Of deviations (n, nv)."""
+        return 0.5 * float(np.einsum("ti,ti,i->", x, self.bands @ x, self.weights))

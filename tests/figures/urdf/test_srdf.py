@@ -1,0 +1,100 @@
+"""SRDF files: groups, states and pairs are MoveIt's, and lines that name nothing are told."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.base.errors import FileFormatError
+
+BALL = '<collision><geometry><sphere radius="0.02"/></geometry></collision>'
+LINKS = "".join(f'<link name="l{k}">{BALL}</link>' for k in range(5))
+JOINTS = "".join(
+    f'<joint name="j{k}" type="{"continuous" if k == 3 else "revolute"}"><parent link="l{k - 1}"/><child link="l{k}"/>'
+    '<origin xyz="0.2 0 0"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" velocity="1" effort="1"/></joint>'
+    for k in range(1, 5)
+)
+SRDF = """<robot name="r">
+  <group name="arm"><chain base_link="l0" tip_link="l2"/></group>
+  <group name="hand"><joint name="j4"/><link name="l3"/><joint name="gone"/></group>
+  <group name="whole"><group name="arm"/><group name="hand"/></group>
+  <group_state name="home" group="arm"><joint name="j1" value="0.5"/><joint name="j3" value="-0.4"/></group_state>
+  <group_state name="open" group="hand"><joint name="j4" value="0.3"/></group_state>
+  <group_state name="open" group="arm"><joint name="j1" value="0.1"/></group_state>
+  <disable_collisions link1="l0" link2="l3" reason="Never"/>
+  <disable_collisions link1="l0" link2="elsewhere" reason="Never"/>
+</robot>"""
+
+
+def files(folder: Path, srdf: str = SRDF) -> tuple[Path, Path]:
+    (folder / "r.urdf").write_text(f'<robot name="r">{LINKS}{JOINTS}</robot>')
+    (folder / "r.srdf").write_text(srdf)
+    return folder / "r.urdf", folder / "r.srdf"
+
+
+def test_groups_states_and_pairs_are_read(tmp_path: Path) -> None:
+    urdf, srdf = files(tmp_path)
+    plain, figure = wb.load(urdf), wb.load(urdf, srdf=srdf)
+    assert figure.groups["arm"] == ("j1", "j2")
+    assert figure.groups["hand"] == ("j3", "j4")
+    assert figure.groups["whole"] == ("j1", "j2", "j3", "j4")
+    values = figure.joint_values(figure.posture("home"))
+    assert (values["j1"], values["j2"], values["j3"]) == pytest.approx((0.5, 0.0, -0.4))
+    assert figure.joint_values(figure.posture("hand/open"))["j4"] == pytest.approx(0.3)
+    reasons = {frozenset((pair.a, pair.b)): pair.reason for pair in figure.excluded_pairs}
+    assert reasons[frozenset(("l0:0", "l3:0"))] == "the SRDF disables them: Never"
+    assert len(figure.geometry.collisionPairs) == len(plain.geometry.collisionPairs) - 1
+    assert any("'elsewhere' is not in the URDF" in note for note in figure.notes)
+
+
+def test_a_wrong_srdf_is_one_sentence(tmp_path: Path) -> None:
+    urdf, srdf = files(tmp_path, SRDF.replace('value="0.5"', 'value="0,5"'))
+    with pytest.raises(FileFormatError, match=r"state 'home': joint 'j1' has the value '0,5'"):
+        wb.load(urdf, srdf=srdf)
+    srdf.write_text("<mujoco/>")
+    with pytest.raises(FileFormatError, match="give an SRDF"):
+        wb.load(urdf, srdf=srdf)
+    with pytest.raises(FileFormatError, match=r"gone\.srdf"):
+        wb.load(urdf, srdf=tmp_path / "gone.srdf")
+
+
+@pytest.mark.parametrize("axis", [(0.0, 0.0, 1.0), (1.0, 0.0, 0.0), (0.6, 0.0, 0.8)])
+def test_a_planar_joint_moves_in_the_plane_normal_to_its_axis(axis: tuple[float, ...], tmp_path: Path) -> None:
+    (tmp_path / "p.urdf").write_text(
+        f'<robot name="p"><link name="a"/><link name="b">{BALL}</link><link name="c">{BALL}</link>'
+        '<joint name="flat" type="planar"><parent link="a"/><child link="b"/>'
+        '<origin xyz="0.1 0.2 0.3" rpy="0.3 0 0.4"/>'
+        f'<axis xyz="{axis[0]} {axis[1]} {axis[2]}"/></joint><joint name="j" type="revolute"><parent link="b"/>'
+        '<child link="c"/><origin xyz="0 0.1 0.2"/><axis xyz="0 1 0"/>'
+        '<limit lower="-1" upper="1" velocity="1" effort="1"/></joint></robot>'
+    )
+    figure = wb.load(tmp_path / "p.urdf")
+    start = figure.placement(figure.neutral, "b")
+    assert start.translation == pytest.approx([0.1, 0.2, 0.3])
+    hinge = start.actInv(figure.placement(figure.neutral, "c"))
+    assert hinge.translation == pytest.approx([0.0, 0.1, 0.2])
+    assert hinge.rotation == pytest.approx(np.eye(3))
+    normal = start.rotation @ np.array(axis)
+    flat = figure.model.joints[figure.joint_id("flat")]
+    for x, y, angle in ((0.3, 0.0, 0.0), (0.0, -0.2, 0.0), (0.1, 0.4, 0.7)):
+        q = figure.neutral.copy()
+        q[flat.idx_q : flat.idx_q + 4] = x, y, np.cos(angle), np.sin(angle)
+        moved = figure.placement(q, "b")
+        step = moved.translation - start.translation
+        assert normal @ step == pytest.approx(0.0, abs=1e-12)
+        assert np.linalg.norm(step) == pytest.approx(np.hypot(x, y))
+        assert moved.rotation @ np.array(axis) == pytest.approx(normal)
+
+
+def test_a_follower_stays_within_its_own_limits(tmp_path: Path) -> None:
+    limit = '<limit lower="-2" upper="2" velocity="1" effort="1"/></joint><joint name="j3"'
+    own = limit.replace('lower="-2" upper="2"', 'lower="-0.4" upper="1"')
+    text = JOINTS.replace(limit, f'<mimic joint="j1" multiplier="2"/>{own}')
+    (tmp_path / "r.urdf").write_text(f'<robot name="r">{LINKS}{text}</robot>')
+    figure = wb.load(tmp_path / "r.urdf")
+    slot = figure.model.joints[figure.joint_id("j1")].idx_q
+    ends = figure.model.lowerPositionLimit[slot], figure.model.upperPositionLimit[slot]
+    assert ends == pytest.approx((-0.2, 0.5))

@@ -1,0 +1,86 @@
+"""BVH as programs write it: static roots above moving hips, channels of positions, text of every kind."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from wholebody.motion.reading import read_skeleton
+from wholebody.motion.skeleton import SkeletonMotion
+
+LIMB = """JOINT Spine {{ OFFSET 0 20 0 CHANNELS {spine}
+JOINT Head {{ OFFSET 0 40 0 CHANNELS 3 Zrotation Xrotation Yrotation
+End Site {{ OFFSET 0 20 0 }} }} }}
+JOINT LeftLeg {{ OFFSET 10 -5 0 CHANNELS 3 Zrotation Xrotation Yrotation
+End Site {{ OFFSET 0 -80 0 }} }}"""
+SIX = "6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"
+PLAIN = "3 Zrotation Xrotation Yrotation"
+
+
+def text(body: str, rows: np.ndarray, motion: str = "MOTION\nFrames: {n}\nFrame Time: 0.01\n") -> str:
+    broken = body.replace("{", "\n{\n").replace("}", "\n}\n").replace(" CHANNELS", "\nCHANNELS")
+    return f"HIERARCHY\n{broken}\n{motion.format(n=len(rows))}" + "\n".join(
+        " ".join(map(repr, row)) for row in rows.tolist()
+    )
+
+
+def hips(spine: str = PLAIN) -> str:
+    limb = LIMB.format(spine=spine)
+    return f"ROOT Hips {{ OFFSET 0 0 0 CHANNELS {SIX}\n{limb} }}"
+
+
+@pytest.fixture
+def rows() -> np.ndarray:
+    rng = np.random.default_rng(0)
+    places = np.cumsum(rng.normal(0.0, 2.0, (8, 3)), axis=0) + (0.0, 90.0, 0.0)
+    return np.hstack([places, rng.uniform(-40.0, 40.0, (8, 12))])
+
+
+def read(folder: Path, content: str | bytes) -> SkeletonMotion:
+    path = folder / "a.bvh"
+    path.write_bytes(content.encode() if isinstance(content, str) else content)
+    return read_skeleton(path, unit="centimetres", up="y")
+
+
+def test_hips_that_move_below_a_still_root_move_the_skeleton(tmp_path: Path, rows: np.ndarray) -> None:
+    plain = read(tmp_path, text(hips(), rows))
+    limb = hips().replace("ROOT Hips", "JOINT Hips").replace("OFFSET 0 0 0", "OFFSET 0 90 0")
+    for angle in (0.0, 30.0):
+        above = f"ROOT Reference {{ OFFSET 0 0 0 CHANNELS {SIX}\n{limb} }}"
+        still = np.tile([1.0, 2.0, 3.0, 0.0, 0.0, angle], (8, 1))
+        found = read(tmp_path, text(above, np.hstack([still, rows])))
+        assert found.names == plain.names
+        assert "Hips moves below Reference, which is left out" in found.notes
+        turn = Rotation.from_euler("z", angle, degrees=True).as_matrix()  # y of the file is up: z of the motion
+        np.testing.assert_allclose(found.positions, plain.positions @ turn.T + (0.03, 0.01, 0.02), atol=1e-12)
+
+
+def test_positions_of_joints_are_offsets_or_added_to_them(tmp_path: Path, rows: np.ndarray) -> None:
+    plain = read(tmp_path, text(hips(), rows))
+    for there in ((0.0, 20.0, 0.0), (0.0, 0.0, 0.0)):
+        given = np.hstack([rows[:, :6], np.tile(there, (8, 1)), rows[:, 6:]])
+        np.testing.assert_allclose(read(tmp_path, text(hips(SIX), given)).positions, plain.positions, atol=1e-12)
+
+
+def test_text_of_every_kind_is_read(tmp_path: Path, rows: np.ndarray) -> None:
+    usual = text(hips(), rows)
+    plain = read(tmp_path, usual)
+    header, numbers = usual.rsplit("0.01\n", 1)
+    wrapped = header + "0.01\n" + "\n".join(" ".join(numbers.split()[k : k + 7]) for k in range(0, 120, 7))
+    variants: dict[str, str | bytes] = {
+        "tabs": usual.replace("OFFSET ", "OFFSET\t").replace("CHANNELS ", "CHANNELS\t ").replace("ROOT ", "ROOT\t"),
+        "blanks": usual.replace("Frames:", "Frames :").replace("Frame Time:", "Frame Time :\t").replace("\n", "  \n"),
+        "UTF-16": usual.encode("utf-16"),
+        "Latin-1": usual.replace("Hips", "Hüfte").encode("latin-1"),
+        "lines of DOS and its end": usual.replace("\n", "\r\n").encode() + b"\r\n\x1a",
+        "wrapped frames": wrapped,
+    }
+    for name, content in variants.items():
+        np.testing.assert_allclose(read(tmp_path, content).positions, plain.positions, atol=1e-12, err_msg=name)
+    twice = read(tmp_path, usual.replace("JOINT Head", "JOINT Spine"))
+    assert "a second joint is called 'Spine'; it is 'Spine_2' here" in twice.notes
+    still = read(tmp_path, text(hips().replace(SIX, PLAIN), rows[:, 3:]))
+    assert np.ptp(still.positions[:, 0]) == 0.0

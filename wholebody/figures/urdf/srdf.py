@@ -1,0 +1,154 @@
+"""The SRDF beside a URDF, as MoveIt writes it: groups of joints, named states, pairs of links that are not tested."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import NamedTuple
+from xml.etree.ElementTree import Element
+
+import numpy as np
+import pinocchio as pin
+
+from wholebody.base.arrays import Array
+from wholebody.base.checks import shown
+from wholebody.base.errors import FileFormatError
+from wholebody.figures.urdf.xml_reading import read_xml
+
+
+class Srdf(NamedTuple):
+    """What an SRDF says of a robot.
+
+    Attributes:
+        groups: group to joints that move.
+        states: name to the values of joints; "<group>/<state>" where several groups have a state of that name.
+        disabled: two links -> why they are never tested.
+        notes: sentences on lines that name what the URDF does not have.
+    """
+
+    groups: Mapping[str, tuple[str, ...]]
+    states: Mapping[str, Mapping[str, float]]
+    disabled: Mapping[frozenset[str], str]
+    notes: tuple[str, ...]
+
+    def postures(self, model: pin.Model, neutral: Array) -> dict[str, Array]:
+        """The states as postures (nq,): joints of no state are neutral."""
+        found = {}
+        for name, values in self.states.items():
+            q = np.array(neutral)
+            for joint, value in values.items():
+                made = model.joints[model.getJointId(joint)]
+                q[made.idx_q : made.idx_q + made.nq] = (value,) if made.nq == 1 else (np.cos(value), np.sin(value))
+            found[name] = q
+        return found
+
+
+def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
+    """Read an SRDF.
+
+    Args:
+        path: the file.
+        model: of the URDF that it belongs to.
+        links: of this URDF.
+
+    Raises:
+        FileFormatError: a file that is no SRDF, or a value that is no number.
+    """
+    robot = read_xml(path, "SRDF")
+    if robot.tag != "robot":
+        raise FileFormatError(f"{path}: the outermost element is <{robot.tag}>, not <robot>; give an SRDF")
+    reader = _Reader(path, robot, model, links)
+    groups = {name: reader.joints(group, (name,)) for name, group in reader.groups.items()}
+    return Srdf(groups, reader.states(), reader.disabled(), tuple(dict.fromkeys(reader.notes)))
+
+
+class _Reader:
+    """One file while it is read."""
+
+    def __init__(self, path: Path, robot: Element, model: pin.Model, links: tuple[str, ...]) -> None:
+        self._path, self._robot, self._model, self._links = path, robot, model, links
+        self.groups = {str(group.get("name")): group for group in robot.findall("group")}
+        self.notes: list[str] = []
+        self._movable = {
+            name: index
+            for index, name in enumerate(model.names)
+            if index and model.joints[index].nv == 1 and model.joints[index].shortname() != "JointModelMimic"
+        }
+
+    def joints(self, group: Element, inside: tuple[str, ...]) -> tuple[str, ...]:
+        """Joints of a group that move, in the order of the model."""
+        found: set[str] = set()
+        for part in group:
+            name = str(part.get("name"))
+            if part.tag == "joint":
+                found |= {name} & self._movable.keys()
+            elif part.tag == "link" and self._known(name):
+                found |= {self._model.names[self._carrier(name)]} & self._movable.keys()
+            elif part.tag == "chain":
+                ends = str(part.get("base_link")), str(part.get("tip_link"))
+                if self._both_known(ends):
+                    below = set(self._model.supports[self._carrier(ends[1])])
+                    above = set(self._model.supports[self._carrier(ends[0])])
+                    found |= {self._model.names[joint] for joint in below - above} & self._movable.keys()
+            elif part.tag == "group" and name in self.groups and name not in inside:
+                found |= set(self.joints(self.groups[name], (*inside, name)))
+            elif part.tag == "group":
+                self.notes.append(f"SRDF: group {shown(inside[-1])} names {shown(name)}, which is no other group")
+        return tuple(sorted(found, key=self._movable.__getitem__))
+
+    def states(self) -> dict[str, dict[str, float]]:
+        """Named states."""
+        elements = self._robot.findall("group_state")
+        names = [str(state.get("name")) for state in elements]
+        found: dict[str, dict[str, float]] = {}
+        for state, name in zip(elements, names, strict=True):
+            values = {}
+            for joint in state.findall("joint"):
+                known = str(joint.get("name"))
+                if known not in self._movable:
+                    self.notes.append(f"SRDF: state {shown(name)} names the joint {shown(known)}, which does not move")
+                    continue
+                try:
+                    values[known] = float(str(joint.get("value")))
+                except ValueError:
+                    values[known] = np.nan
+                if not np.isfinite(values[known]):
+                    raise FileFormatError(
+                        f"{self._path}: state {shown(name)}: joint {shown(known)} has the value "
+                        f"{shown(joint.get('value'))}; give one finite number"
+                    )
+            found[name if names.count(name) == 1 else f"{state.get('group')}/{name}"] = values
+        return found
+
+    def disabled(self) -> dict[frozenset[str], str]:
+        """Pairs of links that are not tested."""
+        found: dict[frozenset[str], str] = {}
+        for element in self._robot.findall("disable_default_collisions"):
+            name = str(element.get("link"))
+            if self._known(name):
+                found |= {
+                    frozenset((name, other)): "the SRDF disables its link" for other in self._links if other != name
+                }
+        for pair, _ in self._pairs("enable_collisions"):
+            found.pop(pair, None)
+        for pair, reason in self._pairs("disable_collisions"):
+            found[pair] = f"the SRDF disables them{f': {reason}' if reason else ''}"
+        return found
+
+    def _pairs(self, tag: str) -> Iterator[tuple[frozenset[str], str]]:
+        for element in self._robot.findall(tag):
+            ends = str(element.get("link1")), str(element.get("link2"))
+            if self._both_known(ends):
+                yield frozenset(ends), element.get("reason") or ""
+
+    def _known(self, link: str) -> bool:
+        if link not in self._links:
+            self.notes.append(f"SRDF: link {shown(link)} is not in the URDF, so what is said of it is left out")
+        return link in self._links
+
+    def _both_known(self, ends: tuple[str, str]) -> bool:
+        first, second = (self._known(end) for end in ends)
+        return first and second
+
+    def _carrier(self, link: str) -> int:
+        return int(self._model.frames[self._model.getFrameId(link, pin.FrameType.BODY)].parentJoint)

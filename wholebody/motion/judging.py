@@ -1,0 +1,228 @@
+"""The judge of clips that were freed: it looks at all pairs, and shares nothing with the methods.
+
+A clip is solved if nothing overlaps by more than 0.1 mm in its frames and between them, joint limits hold, what is held
+is missed by at most 1 mm or 1 mrad, speeds that were given by at most 2 %, and jerk, speed and deviation are within
+`MotionBounds`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from wholebody.assessment.motion import limit_violation
+from wholebody.base.arrays import Array
+from wholebody.motion.avoider import MethodResult
+from wholebody.motion.checking import ClipCheck, check
+from wholebody.motion.clip import Clip
+from wholebody.motion.clip_torques import LoadChange
+from wholebody.motion.following import Work
+from wholebody.motion.frame_terms import FrameTerms
+from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.tasks.base import filled
+
+COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
+FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
+HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
+ROUNDING = 1e-6  # rad, m: by which limits may be missed
+
+
+@dataclass(frozen=True, repr=False)
+class AvoidanceReport:
+    """What a method did to a clip, and what it left.
+
+    Attributes:
+        solved: whether the clip is free, limits hold and what is held is missed by at most 1 mm or 1 mrad, by a check
+            that shares nothing with the methods.
+        message: one sentence that says what is left, or that all is free.
+        method: name of the method.
+        seconds: wall time of the method, without the judgement.
+        posture_solves: how many postures were solved for on their own.
+        programs: how many quadratic programs were solved.
+        frames_changed: how many postures are others than those of the clip before at the same place of its timing.
+        missed: largest miss of a constraint in any frame, metres or radians.
+        stretch: factor by which the clip was slowed most, anywhere; 1 where its timing is as it was.
+        duration: of the answer, seconds.
+        times: (m,) seconds of the clip as it was at which each frame of the answer is.
+        before: the check of the clip as it was.
+        after: the check of the answer.
+        loads: torques and the zero moment point before and after, where `dynamics` was asked for; else None.
+        beside: by how much a frame is held at most beside its place at another one, because it overlaps what it is
+            held at there, metres; 0 where nothing does.
+        jerk: largest root mean square jerk over half a second, in parts of the original's; see `MotionBounds`.
+        speed: largest speed of a joint, in parts of the original's nearby; see `wb.motion.MotionBounds`.
+        deviation: largest change of a posture that was free, radians or metres.
+        smoothed: windows of frames that were too rough and were made smooth after the method.
+        rough: whether jerk, speed or deviation are beyond their bounds, and nothing else is wrong.
+    """
+
+    solved: bool
+    message: str
+    method: str
+    seconds: float
+    posture_solves: int
+    programs: int
+    frames_changed: int
+    missed: float
+    stretch: float
+    duration: float
+    times: Array
+    before: ClipCheck
+    after: ClipCheck
+    loads: LoadChange | None = None
+    beside: float = 0.0
+    jerk: float = 1.0
+    speed: float = 1.0
+    deviation: float = 0.0
+    smoothed: int = 0
+    rough: bool = False
+
+    def __str__(self) -> str:
+        """Three lines: what is left, before and after, and what it took."""
+        was, now = self.before, self.after
+        return (
+            f"{'free' if self.solved else 'not free'}: {self.message}\n"
+            f"frames in collision {was.colliding} before, {now.colliding} after; deepest {1e3 * was.deepest:.2f} mm "
+            f"before, {1e3 * now.deepest:.2f} mm after; {now.dips} dips between frames\n"
+            f"{self.method}: {self.seconds:.2f} s, {self.programs} programs, {self.posture_solves} postures; "
+            f"{self.frames_changed} of {len(now.clip)} frames changed"
+        )
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"AvoidanceReport({self.method!r}, solved={self.solved}, {self.message!r})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Avoided:
+    """The answer of `avoid`.
+
+    Attributes:
+        clip: the clip that the method made.
+        report: what is known of it.
+    """
+
+    clip: Clip
+    report: AvoidanceReport
+
+    def __str__(self) -> str:
+        """The name of the clip, and the three lines of its report."""
+        return f"{self.clip.name}, {self.report}"
+
+    def __repr__(self) -> str:
+        """One line."""
+        return f"Avoided({self.clip.name!r}, {self.report!r})"
+
+
+def judged(
+    was: ClipCheck, terms: FrameTerms, asked: MotionBounds, result: MethodResult, work: Work, method: str,
+    loads: LoadChange | None = None,
+) -> AvoidanceReport:  # fmt: skip
+    """The report on what a method made of a clip; its wall time is not known here.
+
+    Args:
+        was: check of the clip before.
+        terms: what holds in its frames.
+        asked: bounds on jerk, speed and deviation, resolved for it.
+        result: what the method made of it.
+        work: what that took.
+        method: name of the method.
+        loads: before and after, where they are asked for.
+    """
+    before, after = was.clip, was.clip.with_q(result.q)
+    now = check(after, terms.scene, depth=COLLISION)
+    times = before.times if result.times is None else result.times
+    timed = terms if result.times is None else terms.at(times)
+    seen = excess(before.with_q(timed.q), after, filled(asked, largest=timed.largest))
+    missed, said = _missed(timed, after)
+    held = not said and (loads is None or loads.kept)
+    if loads is not None and not loads.kept:
+        said.append("loads are beyond their bounds")
+    solved = now.free and held and not seen.said
+    left = [result.message] if result.message else []
+    left += [*_collisions(now), *said, *seen.said]
+    if solved:
+        noted = f"; {method} says: {result.message}" if result.message else ""
+        message = f"nothing collides, in the frames and between them, to 0.1 mm{noted}"
+    else:
+        message = "; ".join(left or ["something collides between two frames that collide"])
+    message += "".join(f"; {part}" for part in _added(before, now, terms, result, loads))
+    return AvoidanceReport(
+        solved=solved,
+        message=message,
+        method=method,
+        seconds=0.0,
+        posture_solves=work.posture_solves,
+        programs=work.programs,
+        frames_changed=int((np.abs(after.q - timed.q) > 1e-9).any(axis=1).sum()),  # more than rounding
+        missed=missed,
+        stretch=result.stretch,
+        duration=after.duration,
+        times=times,
+        before=was,
+        after=now,
+        loads=loads,
+        beside=terms.beside,
+        jerk=seen.jerk,
+        speed=seen.speed,
+        deviation=seen.deviation,
+        rough=now.free and held and not solved,
+    )
+
+
+def _missed(terms: FrameTerms, clip: Clip) -> tuple[float, list[str]]:
+    """By how much what is held is missed most, metres or radians, and sentences on what is missed by too much."""
+    state, said = terms.scene.state(clip.q[0]), list[str]()
+    misses = [terms.worst(frame, state.update(q)) for frame, q in enumerate(clip.q)]
+    past = [terms.past_speed(frame, q, following) for frame, (q, following) in enumerate(pairwise(clip.q))]
+    beyond, faster = limit_violation(terms.scene.figure, clip.q), max(past, default=0.0)
+    at = max(range(len(misses)), key=lambda frame: misses[frame].by)
+    if not beyond <= ROUNDING:
+        said.append(f"a joint limit is missed by {beyond:.3g} rad or m")
+    if not misses[at].by <= HELD:
+        said.append(f"{misses[at].name} is missed by {misses[at].by:.3g} m or rad, at {at * clip.dt:.2f} s")
+    if not faster <= FASTER:
+        when = f"{past.index(faster) * clip.dt:.2f} s"
+        said.append(f"a speed that was given is exceeded by {faster:.1%} of it, at {when}")
+    return misses[at].by, said
+
+
+def _collisions(now: ClipCheck) -> list[str]:
+    """Sentences on frames that collide, and on motions that dip between free frames."""
+    said, dt = list[str](), now.clip.dt
+    if now.colliding:
+        frame = int(np.argmax(now.depth))
+        where = f"{_deepest_pair(now, frame, between=False)} at {frame * dt:.2f} s"
+        said.append(f"{now.colliding} frames collide, {1e3 * now.deepest:.3g} mm deep at most: {where}")
+    if now.dips:
+        ends = np.maximum(now.depth[:-1], now.depth[1:])
+        gap = int(np.argmax(np.where(ends <= now.tolerance, now.between, 0.0)))
+        where = f"{_deepest_pair(now, gap, between=True)} from {gap * dt:.2f} s on"
+        said.append(f"{now.dips} motions between frames dip, {1e3 * now.between[gap]:.3g} mm deep at most: {where}")
+    return said
+
+
+def _added(
+    before: Clip, now: ClipCheck, terms: FrameTerms, result: MethodResult, loads: LoadChange | None
+) -> list[str]:
+    """What is said of every answer, solved or not: its timing, grips that are held beside, loads."""
+    said = list[str]()
+    if result.times is not None:
+        after = now.clip.duration
+        said.append(f"slowed from {before.duration:.2f} to {after:.2f} s, by {result.stretch:.3g} at most")
+        if now.speeds:
+            fast = now.speeds[0]
+            said.append(f"{fast.joint} is still faster than its limit of {fast.limit:.3g} rad/s or m/s")
+    if terms.beside:
+        away = f"{1e3 * terms.beside:.3g} mm"
+        said.append(f"parts held at each other are too near in the clip: they are held up to {away} beside")
+    if loads is not None:
+        said.append(str(loads))
+    return said
+
+
+def _deepest_pair(found: ClipCheck, place: int, *, between: bool) -> str:
+    """The pair that is deepest in a frame, or in the gap after it."""
+    return max(found.contacts, key=lambda each: (each.between if between else each.depth)[place]).names
