@@ -308,6 +308,7 @@ def compiled_kernel() -> Any:
         terms, np.zeros(2), np.zeros(2), masks, numbers_of(1.0, 1.0), floats, index, np.zeros(2, dtype=bool)
     )
     tracking_kernel.solve(at, state, index, bodies, True, False, 0.0)
-    rows = tracking_kernel.parts.py_func(state, 1, 0, 0, 0, 0).rows
+    parts: Any = tracking_kernel.parts
+    rows = parts.py_func(state, 1, 0, 0, 0, 0).rows
     tracking_kernel.run_ahead(none, rows, none, 0.0, 0.0, 0.0, state.before)
     return tracking_kernel

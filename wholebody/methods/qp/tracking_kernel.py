@@ -130,7 +130,8 @@ def _run_ahead_of(
         resting = resting and abs(shift[r]) < rest
     if not resting:
         shift[:goals] = 0.0
-    return max(least_damping, damping * min(1.0, float(before[last + m]) / error))
+    own: float = damping * min(1.0, before[last + m] / error)
+    return max(least_damping, own)
 
 
 @compiled(inner=True, forceinline=True)
