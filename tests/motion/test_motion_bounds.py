@@ -13,8 +13,7 @@ from wholebody.bench.measure.motion.cases import synthetic
 from wholebody.figures.figure import Figure
 from wholebody.motion.avoidance import METHODS
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.measures import jerk_ratio
-from wholebody.motion.motion_bounds import excess, resolved
+from wholebody.motion.measures import excess, jerk_ratio, resolved
 
 DT = 1 / 30
 FRAMES = 90

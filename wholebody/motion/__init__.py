@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from wholebody.motion.clip_torques import Torques, torques
     from wholebody.motion.fade import Fade
     from wholebody.motion.judging import AvoidanceReport, Avoided
-    from wholebody.motion.motion_bounds import MotionBounds
+    from wholebody.motion.measures import MotionBounds
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_skeleton
     from wholebody.motion.skeleton import SkeletonMotion
@@ -56,7 +56,7 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
         "wholebody.motion.fade": "Fade",
-        "wholebody.motion.motion_bounds": "MotionBounds",
+        "wholebody.motion.measures": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",
         "wholebody.motion.skeleton": "SkeletonMotion",

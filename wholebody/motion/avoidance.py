@@ -28,7 +28,7 @@ from wholebody.motion.clip_torques import load_change, torques
 from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
-from wholebody.motion.motion_bounds import MotionBounds, resolved
+from wholebody.motion.measures import MotionBounds, resolved
 from wholebody.motion.soles import usual_feet
 from wholebody.motion.stance import StanceFeet, has_feet
 from wholebody.motion.strength import Strength

@@ -19,7 +19,7 @@ from wholebody.base.checks import a, listed
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.motion.grips import grip_shifts
-from wholebody.motion.motion_bounds import MotionBounds
+from wholebody.motion.measures import MotionBounds
 from wholebody.motion.stance import StanceFeet, held_feet, shifts, standing
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold

@@ -20,7 +20,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import LoadChange
 from wholebody.motion.following import Work
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.motion.measures import MotionBounds, excess
 from wholebody.tasks.base import filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides

@@ -1,13 +1,22 @@
-"""How one clip differs from another that it was made from: what is reported of ways to free a clip of collisions."""
+"""How one clip differs from another that it was made from: measures of the change, and bounds on what the eye sees.
+
+A clip can be free of collisions and hold everything, and still jump. So bounds on jerk, speed and deviation are part of
+what `wb.avoid` asks. They are relative to the original motion nearby: what follows a fast motion may be fast.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
+from numpy.lib.stride_tricks import sliding_window_view
 
-from wholebody.base.arrays import Array
+from wholebody.assessment.motion import root_mean_square, third_differences, velocities
+from wholebody.base import checks
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
@@ -15,6 +24,7 @@ from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import paths, standing_points
 from wholebody.motion.windows import runs
+from wholebody.tasks.base import filled
 
 
 @dataclass(frozen=True)
@@ -174,3 +184,184 @@ def _same(before: Clip, after: Clip, what: str) -> None:
 
 def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
+
+
+SPAN = 0.5
+"""Seconds over which jerk and speed are compared: a tenth of it would compare single frames, and the whole clip would
+hide a jump of one frame among many calm ones."""
+
+TURN, TIME = 1.0, 0.5
+"""Radians and seconds of a plain movement of one joint. Where the original is calmer than it, the new motion may be as
+fast as this movement, which has the least jerk of all of its size and duration (Flash and Hogan 1985, Journal of
+Neuroscience 5(7): 1688)."""
+
+PLAIN_SPEED = 15.0 / 8.0 * TURN / TIME
+"""Largest speed of that movement, rad/s."""
+
+PLAIN_JERK = math.sqrt(720.0) * TURN / TIME**3
+"""Root mean square jerk of that movement, rad/s^3."""
+
+LARGEST = 1e6  # times; rad, m
+ROUNDING = 1e-6  # times, rad, m: by which a bound may be exceeded
+
+
+@dataclass(frozen=True)
+class MotionBounds:
+    """Bounds on jerk, speed and deviation of a changed clip: a term for the `constraints` of `wb.avoid`.
+
+    `wb.avoid` asks for `MotionBounds()` where none is given. Jerk and speed are those of the joints, and apart from
+    them of a free root. They are compared with the original within 0.25 s on both sides, and with a movement of one
+    joint by 1 rad in 0.5 s where the original is calmer than this.
+
+    Attributes:
+        jerk: largest root mean square jerk over half a second, in parts of the original's there or in the whole clip,
+            whichever is more; None for any.
+        speed: largest speed of a joint, in parts of the largest of the original within 0.25 s; None for any.
+        deviation: by how much a posture may differ from an original one that is free of collisions, within limits, and
+            meets what is held, radians and metres; None for any.
+        keep_ends: whether the first and the last posture stay as they are where they are free.
+        largest: (n,) largest deviation of each frame, radians and metres; inf for none; once resolved.
+
+    Raises:
+        InputError: a value out of range.
+    """
+
+    jerk: float | None = 2.0
+    speed: float | None = 1.5
+    deviation: float | None = 0.75
+    keep_ends: bool = False
+    largest: Array | None = field(init=False, default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        """Check the values."""
+        for name, least in (("jerk", 1.0), ("speed", 1.0), ("deviation", 0.0)):
+            if getattr(self, name) is not None:
+                checks.number(getattr(self, name), f"MotionBounds: {name}", least, LARGEST)
+        checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
+        checks.flag(self.keep_ends, "MotionBounds: keep_ends")
+
+
+class Excess(NamedTuple):
+    """What a changed clip has of jerk, speed and deviation, and where that is beyond its bounds.
+
+    Attributes:
+        jerk: largest jerk over half a second, in parts of the original's.
+        speed: largest speed, in parts of the original's.
+        deviation: largest deviation of a posture that was free, radians or metres.
+        beyond: (n,) frames that are beyond a bound.
+        said: what is beyond its bound, and by how much; empty where nothing is.
+    """
+
+    jerk: float
+    speed: float
+    deviation: float
+    beyond: Mask
+    said: tuple[str, ...]
+
+
+def resolved(bounds: MotionBounds, free: Mask, passed: Mask) -> MotionBounds:
+    """Bounds with the largest deviation of each frame.
+
+    Args:
+        bounds: as they were given.
+        free: (n,) original postures that need not change.
+        passed: (n,) those beside a motion to the next frame, or from the one before, that passes through something.
+    """
+    most = np.inf if bounds.deviation is None else bounds.deviation
+    largest = np.where(free & ~passed, most, np.inf)
+    if bounds.keep_ends:
+        largest[[0, -1]] = np.where(free[[0, -1]], 0.0, largest[[0, -1]])
+    return filled(bounds, largest=largest)
+
+
+def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
+    """Compare a changed clip with the original at the same timing.
+
+    Args:
+        before: the original.
+        after: as many frames of the same figure.
+        bounds: resolved for these frames.
+    """
+    model, dt, count = before.figure.model, before.dt, len(before)
+    jerk, speed = _jerk_ratios(before, after), _speed_ratios(before, after)
+    away = np.abs([pin.difference(model, *each) for each in zip(before.q, after.q, strict=True)]).max(axis=1, initial=0)
+    largest = np.full(count, np.inf) if bounds.largest is None else bounds.largest
+    free = np.isfinite(largest) if bounds.deviation is not None else largest == 0.0
+    beyond, said = np.zeros(count, dtype=bool), list[str]()
+    rough = _beyond(jerk, bounds.jerk)
+    fast = _beyond(speed, bounds.speed)
+    for first in np.flatnonzero(rough).tolist():
+        beyond[first : first + 4] = True
+    for first in np.flatnonzero(fast).tolist():
+        beyond[first : first + 2] = True
+    far = ~(away <= largest + ROUNDING)
+    beyond |= far
+    for name, ratio, marks, most in (("jerk", jerk, rough, bounds.jerk), ("speed", speed, fast, bounds.speed)):
+        if marks.any():
+            at = int(np.argmax(ratio))
+            said.append(
+                f"{name} is {ratio[at]:.3g} times the original's at {at * dt:.2f} s, where {most:g} times are allowed"
+            )
+    if far.any():
+        at = int(np.argmax(np.where(far, away - largest, -np.inf)))
+        kept = "is to stay" if largest[at] == 0.0 else f"may move by {largest[at]:g}"
+        said.append(f"the posture at {at * dt:.2f} s, which was free and {kept}, moved by {away[at]:.3g} rad or m")
+    rough_most, fast_most = (float(ratio.max(initial=0.0)) for ratio in (jerk, speed))
+    return Excess(rough_most, fast_most, float(away[free].max(initial=0.0)), beyond, tuple(said))
+
+
+def _beyond(ratio: Array, most: float | None) -> Mask:
+    """Which ratios are not within a bound; NaN is not."""
+    return np.zeros(len(ratio), dtype=bool) if most is None else ~(ratio <= most + ROUNDING)
+
+
+def _jerk_ratios(before: Clip, after: Clip) -> Array:
+    """(n - 3,) jerk over `SPAN`, in parts of the original's there, of its whole clip, or of a plain movement."""
+    model, dt = before.figure.model, before.dt
+    old, new = (third_differences(model, clip.q, dt) for clip in (before, after))
+    found = np.zeros(len(old))
+    for part in _parts(before):
+        squares = [_mean_near(root_mean_square(each[:, part]) ** 2, dt) for each in (old, new)]
+        plain = PLAIN_JERK**2 / max(1, old[:, part].shape[1])
+        usual = max(plain, float((old[:, part] ** 2).mean()) if old[:, part].size else 0.0)
+        found = np.maximum(found, np.sqrt(squares[1] / np.maximum(squares[0], usual)))
+    return found
+
+
+def _speed_ratios(before: Clip, after: Clip) -> Array:
+    """(n - 1,) largest speed from frame to frame, in parts of the original's near it or of a plain movement."""
+    model, dt = before.figure.model, before.dt
+    old, new = (np.abs(velocities(model, clip.q, dt)) for clip in (before, after))
+    found = np.zeros(len(old))
+    for part in _parts(before):
+        most = _largest_near(old[:, part].max(axis=1, initial=0.0), dt)
+        found = np.maximum(found, new[:, part].max(axis=1, initial=0.0) / np.maximum(most, PLAIN_SPEED))
+    return found
+
+
+def _parts(clip: Clip) -> tuple[slice, ...]:
+    """Columns of the free root, if there is one, and of the joints."""
+    return (slice(0, 6), slice(6, None)) if clip.figure.root == "free" else (slice(None),)
+
+
+def _mean_near(values: Array, dt: float) -> Array:
+    """(k,) the mean of values (k,) within half of `SPAN` on both sides."""
+    reach = _reach(dt)
+    sums = np.concatenate([[0.0], np.cumsum(values)])
+    places = np.arange(len(values))
+    first, end = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
+    found: Array = (sums[end] - sums[first]) / (end - first)
+    return found
+
+
+def _largest_near(values: Array, dt: float) -> Array:
+    """(k,) the largest of values (k,) within half of `SPAN` on both sides."""
+    reach = _reach(dt)
+    near = sliding_window_view(np.pad(values, reach), 2 * reach + 1)
+    found: Array = near.max(axis=1)[: len(values)]
+    return found
+
+
+def _reach(dt: float) -> int:
+    """Half of `SPAN` in frames."""
+    return max(1, round(0.5 * SPAN / dt))

@@ -19,7 +19,7 @@ import numpy as np
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.avoider import Run
 from wholebody.motion.faults import Faults, dip_depth, dips
-from wholebody.motion.motion_bounds import MotionBounds, excess
+from wholebody.motion.measures import MotionBounds, excess
 from wholebody.motion.one_side import SHALLOW, keep_back, one_sided
 from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.deviations import Chart, Objective

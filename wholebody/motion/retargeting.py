@@ -10,7 +10,7 @@ import pinocchio as pin
 from scipy.linalg import LinAlgError, solveh_banded
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.base.checks import function
+from wholebody.base.checks import function, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
@@ -179,7 +179,8 @@ def retarget(
         motion: the skeleton, from `wb.motion.read_skeleton`.
         figure: the figure.
         names: which joint of the skeleton and which frame of the figure are which part of a body: a TOML file or a
-            mapping; see docs/motion.md. CMU, Mixamo, LAFAN1, SMPL and DeepMimic are known.
+            mapping; see docs/motion.md. Names of CMU, Mixamo, LAFAN1, SMPL, DeepMimic, Bandai-Namco, Biovision, Xsens,
+            Poser, Daz, 3ds Max (biped), Unreal, VRM, VRoid, Rokoko and Motive are known.
         progress: called now and then with the share of the work that is done.
 
     Returns:
@@ -194,6 +195,11 @@ def retarget(
     check_figure(figure, "retarget")
     function(progress, "progress")
     roles = matched(motion.names, figure, names)
+    if roles.missing:
+        warn(
+            f"retarget: no joint of {motion.name} is known for {', '.join(roles.missing)}, so these follow nothing; "
+            'name them with names={"skeleton": {"left_wrist": "hand.L"}}'
+        )
     steps = footfalls(motion, roles) if figure.root == "free" else Footfalls({}, {})  # no floor moves with a pelvis
     wanted = targets(motion, figure, roles, steps)
     if not wanted.points:

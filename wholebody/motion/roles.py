@@ -30,12 +30,14 @@ class Roles(NamedTuple):
         frames: role to frame of the figure.
         turns: role to the frame of the figure that has the orientation of the role.
         table: name of the table that matched the skeleton.
+        missing: roles of the figure that no joint of the skeleton is known to have.
     """
 
     joints: dict[str, str]
     frames: dict[str, str]
     turns: dict[str, str]
     table: str
+    missing: tuple[str, ...] = ()
 
 
 def matched(
@@ -78,21 +80,26 @@ def matched(
         {role: frames[role] for role in common},
         {role: segments.get(role, frames[role]) for role in common},
         table,
+        tuple(role for role in ROLES if role in frames and role not in found),
     )
 
 
 def _recognised(joints: tuple[str, ...]) -> tuple[str, dict[str, str]]:
     """The column of the table that names most joints, six or more, and those."""
-    # without a name space such as mixamorig:
-    plain = {re.sub(r"^.*[:|]", "", joint).lower(): joint for joint in reversed(joints)}
+    plain = {_plain(joint): joint for joint in reversed(joints)}
     best: tuple[str, dict[str, str]] = ("", {})
     for title in ROWS[0]:
         if title in ("role", "person", "person_turn"):  # no skeletons
             continue
-        found = {role: plain[name.lower()] for role, name in _column(title).items() if name.lower() in plain}
+        found = {role: plain[_plain(name)] for role, name in _column(title).items() if _plain(name) in plain}
         if len(found) >= 6 and len(found) > len(best[1]):
             best = title, found
     return best
+
+
+def _plain(joint: str) -> str:
+    """A name in small letters, without a name space such as mixamorig:, blanks and strokes, and zeros of "Bip001"."""
+    return re.sub(r"bip0*(\d)", r"bip\1", re.sub(r"[^a-z0-9]", "", re.sub(r"^.*[:|]", "", joint).lower()))
 
 
 def _column(title: str) -> dict[str, str]:

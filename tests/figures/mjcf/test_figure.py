@@ -87,7 +87,8 @@ def configuration(model: object, figure: wb.Figure, seed: int) -> tuple[np.ndarr
 
 
 @pytest.mark.parametrize("first", range(0, 40, 10))
-def test_random_files_are_mujocos(first: int, tmp_path: Path) -> None:
+def test_random_files_are_mujocos(first: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)  # MuJoCo writes its log there
     for seed in range(first, first + 10):
         path = written(tmp_path, mjcf(seed), f"m{seed}.xml")
         model, figure = mujoco.MjModel.from_xml_path(str(path)), wb.load(path, samples=0)

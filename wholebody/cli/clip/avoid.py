@@ -157,7 +157,7 @@ def _batch(arguments: argparse.Namespace, methods: list[str], worn: list[str]) -
     from rich.console import Console
 
     from wholebody.motion.batch import BatchProgress, avoid_many
-    from wholebody.motion.motion_bounds import MotionBounds
+    from wholebody.motion.measures import MotionBounds
 
     # letters that a line of a batch's table needs
     console, folder = Console(width=max(120, Console().width)), arguments.out or Path(FOLDER)

@@ -42,14 +42,16 @@ class WindowSettings:
         jerk: parts of the original's; an answer with more is made smoother.
         share: of the squared deviation; acceleration that costs less leaves little to gain.
         rounds: of sweeping and adding places between frames.
+        brief: frames; shorter windows are looked at between frames at their optimum only.
     """
 
     first: float = 0.1
     rougher: float = 0.4
     smoother: float = 1.5
     jerk: float = 1.2
-    share: float = 0.03
+    share: float = 0.1
     rounds: int = 12
+    brief: int = 20
 
 
 SETTINGS = WindowSettings()
@@ -271,7 +273,7 @@ class ClipRun:
         for number in range(SETTINGS.rounds):
             # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
             # before the optimum; from the third round on it is nearly free, and what is missed then seldom is
-            early, rough = way.early and number < 2, way.early and not number
+            early, rough = way.early and number < 2, way.early and not number and len(x) > SETTINGS.brief
             found = program.run(x, told, radius, way.largest, early, rough)
             work.programs += found.programs
             if found.end is End.ROUGH:
