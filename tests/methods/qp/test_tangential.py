@@ -7,6 +7,7 @@ import pytest
 
 from tests.reference import active_set as reference
 from wholebody.base.records import with_values
+from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.solvers.registry import make_solver
@@ -25,7 +26,7 @@ def parts(program: QuadraticProgram, shift: np.ndarray = NO_SHIFT) -> tuple[Part
     """The parts of the program's answer, and the answer."""
     solver = make_solver("active_set")
     answer = solver.solve_cold(program)
-    return parts_of(program, answer, shift), answer
+    return parts_of(program, answer, shift, room_for(program).work), answer
 
 
 def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_program):

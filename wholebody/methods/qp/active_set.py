@@ -73,13 +73,14 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     return QPSolution(x, active, True, 0) if settled else None
 
 
-def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array) -> Array | None:
+def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array, work: Array) -> Array | None:
     """Minimiser of a program with g = 0 and its active set fixed.
 
     Args:
         program: what to solve.
         active: the set.
         target: (m,) targets of the soft rows, in the place of the program's.
+        work: room; see `room_for`.
 
     Returns:
         (n,) the minimiser, clipped to the box; None where it is not finite.
@@ -87,7 +88,7 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
     x = np.empty(program.size)
     program.check_shapes(active)
     free = with_values(program, linear=np.zeros(program.size), target=target).packed()
-    return x if compiled_kernel().minimise_with(free, active, CORRECTIONS, room_for(program).work, x) else None
+    return x if compiled_kernel().minimise_with(free, active, CORRECTIONS, work, x) else None
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:

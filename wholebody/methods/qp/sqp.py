@@ -145,7 +145,7 @@ class SQP:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat, multipliers = answer.x, None, False, None
         if self.measures and here.violation.total <= DESCENT.width:
-            parts = parts_of(program, answer, self._shift)
+            parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:

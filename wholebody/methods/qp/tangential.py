@@ -35,7 +35,7 @@ class Parts(NamedTuple):
     tangential: Array
 
 
-def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Parts | None:
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, work: Array) -> Parts | None:
     """The parts of the answer of a program; None where its face has no normal part.
 
     Where the answer went to a bound that was some way off, it is the measures that pull there. The way to that bound
@@ -45,6 +45,7 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Par
         program: of a step.
         answer: its answer.
         shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
+        work: room; see `active_set.room_for`.
     """
     target = program.target.copy()
     target[: len(shift)] += shift
@@ -55,11 +56,11 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array) -> Par
     )
     left = (active.lower & ~lower) | (active.upper & ~upper)
     if left.any():
-        normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target)
+        normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target, work)
         if normal is not None and not ((program.lower < normal) & (normal < program.upper))[left].all():
             normal = None
     if normal is None:
-        normal = without_gradient(program, active, target)
+        normal = without_gradient(program, active, target, work)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 

@@ -63,13 +63,14 @@ class WorkingSet:
         assert self.held is not None
         active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
         program.check_shapes(active)
-        rounds = self._kernel.solve_growing(program, key, self.pushing, active, CORRECTIONS, self._room_for(program), x)
+        rounds = self._kernel.solve_growing(program, key, self.pushing, active, CORRECTIONS, self.room(program), x)
         if rounds < 0:
             return None
         self._remember(active, key)
         return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
 
-    def _room_for(self, program: QuadraticProgram) -> Room:
+    def room(self, program: QuadraticProgram) -> Room:
+        """Room of the compiled loops for a program, kept from one to the next."""
         size = self._kernel.work_size(program.size, len(program.target), len(program.least))
         room = self._room
         if room is None or size > len(room.work) or len(program.least) > len(room.chosen):
