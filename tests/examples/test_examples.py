@@ -199,15 +199,6 @@ def test_chair_of_boxes(example: Example, tmp_path: Path, monkeypatch: pytest.Mo
     sits(module.build(), solution)
 
 
-def test_chair_from_a_mesh(example: Example, tmp_path: Path, shared_data: Path, capsys: Any) -> None:
-    module = example("chair")
-    if module.mesh() is None:
-        pytest.skip(f"there is no props/chair.obj in {shared_data}")
-    solution = module.main(out=tmp_path, pictures=False)
-    assert "made of boxes" not in capsys.readouterr().out
-    sits(module.build(), solution)
-
-
 @pytest.mark.parametrize("name", ["hand_on_table", "avatar_two_arms"])
 def test_what_is_tracked_goes_in_and_what_is_shown_does_not(
     name: str, example: Example, tmp_path: Path, capsys: Any
@@ -248,7 +239,7 @@ def test_a_person_is_dragged_down_onto_a_chair(example: Example, tmp_path: Path,
             for side, sole in zip(("left", "right"), soles, strict=True):
                 assert np.linalg.norm(place(f"{side}_sole").translation - sole.translation) < 5e-4
         assert lowest > module.SEATED[2] - 1e-3  # although the goal went 20 mm lower
-        for before, after in itertools.pairwise(dragged.q):
+        for before, after in itertools.islice(itertools.pairwise(dragged.q), 0, None, 4):
             assert problem.scene.sweep(before, after, 2e-4) is None  # feet dip by 0.05 mm where straight knees bend
         gaps = {
             tuple(problem.scene.piece_owner[piece] for piece in pair)

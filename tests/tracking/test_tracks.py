@@ -98,12 +98,18 @@ def test_files_give_back_what_was_written(hand: wb.Figure, tmp_path: Path) -> No
             lambda lines: [lines[0].replace("right_thumb_ip_flexion", "thumb"), *lines[1:]],
             "line 1: no column .*'thumb'",
         ),
-        (lambda lines: [line.rsplit(",", 1)[0] for line in lines], "line 1: the columns lack right_thumb_ip_flexion"),
+        (lambda lines: [line.partition(",")[2] for line in lines], "line 1: the columns lack time"),
+        (lambda lines: [lines[0].replace("root_qw", "time_2"), *lines[1:]], "line 1: no column is called 'time_2'"),
+        (
+            lambda lines: [",".join(line.split(",")[:1] + line.split(",")[2:]) for line in lines],
+            "columns lack root_x; 1",
+        ),
+        (lambda lines: [line.replace(".", "\0").replace(",", ";").replace("\0", ",") for line in lines], "semicolons"),
         (lambda lines: [*lines[:3], lines[3] + ",1.0", *lines[4:]], "line 4: 27 values for 26 columns"),
         (lambda lines: [*lines[:2], lines[2].replace("0.5", "x", 1), *lines[3:]], "line 3: 'x' is no number"),
         (lambda lines: [*lines[:3], "9" + lines[3], *lines[4:]], "line 4: the time step changes"),
         (lambda lines: lines[:2], "line 2: .*at least two frames"),
-        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step is 0 s; give one between 1e-06 and 1e.06 s"),
+        (lambda lines: [*lines[:2], *lines[1:]], "line 3: the time step changes"),
         (
             lambda lines: [lines[0], *(f"{k}e-9,{line.partition(',')[2]}" for k, line in enumerate(lines[1:]))],
             "line 3: the time step is 1e-09 s; give one between 1e-06 and 1e.06 s",
@@ -131,6 +137,30 @@ def test_broken_files_are_named_by_line(hand: wb.Figure, tmp_path: Path, change:
     path.write_text("\n".join(change(path.read_text().splitlines())))
     with pytest.raises(wb.WholebodyError, match=message):
         read_track(path, hand)
+
+
+@pytest.mark.parametrize("rate", [119.88, 120.0, 60.0, 30.0])
+def test_times_of_three_decimals_have_their_mean_step(rate: float, hand: wb.Figure, tmp_path: Path) -> None:
+    path = write_track(track(hand), tmp_path / "glove.csv")
+    header, *lines = path.read_text().splitlines()
+    values = [line.partition(",")[2] for line in lines]
+    made = [f"{k / rate:.3f},{values[k % len(values)]}" for k in range(600)]
+    path.write_text("\n".join([header, *made]))
+    assert 1.0 / read_track(path, hand).dt == pytest.approx(rate, rel=5e-4)
+    path.write_text("\n".join([header, *made[:300], *made[302:]]))
+    with pytest.raises(wb.FileFormatError, match="line 302: the time step changes"):
+        read_track(path, hand)
+
+
+def test_columns_may_be_few_and_in_degrees(hand: wb.Figure, tmp_path: Path) -> None:
+    path = tmp_path / "glove.csv"
+    path.write_text("time,right_index_mcp_flexion [deg]\n0.0,0\n0.1,45\n0.2,90\n")
+    with pytest.warns(UserWarning, match=r"no column for root_x.* and \d+ more; they stay as in the neutral posture"):
+        read = read_track(path, hand)
+    found = [hand.joint_values(q) for q in read.q]
+    neutral = hand.joint_values(hand.neutral)
+    assert [values["right_index_mcp_flexion"] for values in found] == pytest.approx([0.0, np.pi / 4, np.pi / 2])
+    assert all(values["right_thumb_ip_flexion"] == neutral["right_thumb_ip_flexion"] for values in found)
 
 
 def test_scripts_are_smooth_and_seeded(hand: wb.Figure) -> None:

@@ -183,14 +183,13 @@ class SolvingTracker(NotCopyable):
     unswept = 0.0
     leaves_overlap = False
 
-    def __init__(self, method: Method, problem: Problem, dt: float, rough: Method | None = None) -> None:
+    def __init__(self, method: Method, problem: Problem, dt: float) -> None:
         """Set up.
 
         Args:
             method: solves the steps.
             problem: the problem.
             dt: seconds a step.
-            rough: solves frames during a motion; None for the method itself.
 
         Raises:
             InputError: dt is not a positive finite number, the scene changed after the problem was made, or the
@@ -198,7 +197,7 @@ class SolvingTracker(NotCopyable):
         """
         self.problem, self.dt = check_problem(problem, "tracker: problem"), time_step(dt, "dt")
         self.workspace = problem.workspace()
-        self._method, self._rough = method, method if rough is None else rough
+        self._method = method
         self._asked = copy.copy(problem)  # one for all steps, so that methods can reuse what they build for it
 
     def step(self, q: Array) -> SolvedStep:
@@ -211,10 +210,10 @@ class SolvingTracker(NotCopyable):
         return with_values(step, collisions=judged(self.workspace, motion, q, step.q))
 
     def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
-        """A whole solve from the posture q (nq,): by the method, or without a tolerance by the rough method."""
+        """A whole solve from the posture q (nq,)."""
         if tolerance is not None:
             tolerance = TOLERANCE(tolerance, "tolerance")
-        solution = (self._rough if tolerance is None else self._method).solve(self._begun(q))
+        solution = self._method.solve(self._begun(q))
         return SolvedStep(self.bounded(q, solution.q), solution.iterations, solution.assessment.seconds)
 
     def solve(self, q: Array) -> Solution:

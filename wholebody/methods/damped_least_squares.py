@@ -15,7 +15,6 @@ it, and the step is computed again without that joint.
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
@@ -27,13 +26,15 @@ from wholebody.assessment.posture import goal_errors
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked
 from wholebody.figures.state import State
-from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
-from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress
+from wholebody.methods.base import UnsupportedTermError, refusal
+from wholebody.methods.conclusion import Ending
+from wholebody.methods.control import Control
+from wholebody.methods.descents import Descends
 from wholebody.methods.differential import REST
 from wholebody.methods.inputs import DAMPING, Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.problem import Problem
-from wholebody.solution import Solution, TraceEntry
+from wholebody.scene.workspace import Workspace
+from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import values
 from wholebody.tasks.checks import undefined, values_and_rows
 
@@ -43,7 +44,7 @@ RANK = 1e-8  # squared singular values below this share of the largest count as 
 
 
 @dataclass(frozen=True)
-class DampedLeastSquares(Checked, SolvesAnew):
+class DampedLeastSquares(Checked, Descends):
     """Damped least squares, the textbook method: goals and equalities, limits by clamping, without contacts.
 
     Takes every goal, and constraints that are equalities (`Hold`, `Plane` with side "on"); bounds such as `Freeze` too.
@@ -74,22 +75,11 @@ class DampedLeastSquares(Checked, SolvesAnew):
         """None if all constraints are equalities; otherwise the sentence that names the others."""
         return refusal(self.name, _unsupported(check_problem(problem, "DampedLeastSquares.accepts: problem")))
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture. Goals out of reach are answers, not errors; contacts are ignored.
-
-        Args:
-            problem: the problem.
-            progress: see `wholebody.methods.control.Progress`.
-
-        Raises:
-            InputError: the problem has a constraint that is not an equality, or its scene changed after it was made.
-        """
-        check_problem(problem, "DampedLeastSquares.solve: problem")
-        began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
-            descent = _Descent(problem, self, workspace.state, control)
-            converged = descent.run()
-        ending = Ending(
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`; contacts are ignored."""
+        descent = _Descent(problem, self, workspace.state, control)
+        converged = descent.run()
+        return Ending(
             descent.best,
             converged,
             descent.steps,
@@ -98,7 +88,6 @@ class DampedLeastSquares(Checked, SolvesAnew):
             unit="steps",
             caveat="contacts are not seen by this method",
         )
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
 
 
 class _Descent:

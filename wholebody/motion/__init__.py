@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from wholebody.motion.batch import BatchProgress, avoid_many, read_many
     from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
+    from wholebody.motion.bones import bone_errors
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip_torques import Torques, torques
     from wholebody.motion.fade import Fade
@@ -40,6 +41,7 @@ __all__ = [
     "Torques",
     "Trajectory",
     "avoid_many",
+    "bone_errors",
     "equipment",
     "read_many",
     "read_skeleton",
@@ -53,6 +55,7 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.batch": "BatchProgress avoid_many read_many",
         "wholebody.motion.batch_table": "AvoidedCase",
         "wholebody.motion.bisection.method": "Bisection",
+        "wholebody.motion.bones": "bone_errors",
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
         "wholebody.motion.fade": "Fade",

@@ -13,6 +13,7 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import function, warn
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.motion.bones import errors_of, said_of
 from wholebody.motion.clip import Clip
 from wholebody.motion.posture_fit import Fitter, Goals
 from wholebody.motion.retarget_targets import Footfalls, Targets, footfalls, has_trunk, targets
@@ -207,7 +208,10 @@ def retarget(
             f"the roles that {motion.name} and {figure.name} have in common ({', '.join(roles.joints)}) make no bone; "
             "name both ends of one"
         )
-    return Clip(figure, _Retargeting(motion, figure, roles, wanted, steps, progress).run(), motion.dt, motion.name)
+    clip = Clip(figure, _Retargeting(motion, figure, roles, wanted, steps, progress).run(), motion.dt, motion.name)
+    if told := said_of(errors_of(motion, clip, roles)):
+        warn(f"retarget: {motion.name}: {told}; see wb.motion.bone_errors(motion, clip)")
+    return clip
 
 
 class _Retargeting:

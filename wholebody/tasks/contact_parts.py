@@ -18,7 +18,7 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, faces_met, foot, nearest
+from wholebody.tasks.surfaces import MOST_FACES, Face, Nearest, Surface, bends, edge_normals, faces_met, foot, nearest
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
 ROUND_DEPTH = 8e-6  # m: by which a round end may be inside: four fifths of the usual tolerance
@@ -100,11 +100,12 @@ class Gap(NamedTuple):
         return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
 
     def planes(self, state: State) -> SupportingPlanes:
-        """Of faces that a touching point is not beyond, and of the angle between the normals at a round end."""
+        """Of faces and edges that what touches is not beyond, and of the angle between the normals at a round end."""
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
-        found = [*faces_met(self.first, self.second, near.pieces, state)]
+        edges = edge_normals(self.first, self.second, near, state)
+        found = [*faces_met(self.first, self.second, near.pieces, state, edges)]
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
         joints = [(near.against, near.joint)] * len(found)
         found += [with_values(plane, key=plane.key + MOST_FACES) for plane in back]

@@ -28,7 +28,11 @@ FACES = 8  # most faces of a piece that are looked at, those first that are near
 MOST_FACES = 256  # more than a piece ever has
 SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
 GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
+STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
+EDGE = 1e-3  # m: by which pieces are moved along each other to find the normals of edges that cross near a contact
 TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
+
+NO_NORMALS: Array = np.zeros((0, 3))
 
 
 class Surface(NamedTuple):
@@ -228,25 +232,57 @@ def foot(surface: Surface, number: int, point: Array, state: State) -> Array:
     return np.array(found.getNearestPoint2())
 
 
-def faces_met(first: Surface, second: Surface, pieces: tuple[int, int], state: State) -> list[FacePlane]:
+def faces_met(
+    first: Surface, second: Surface, pieces: tuple[int, int], state: State, others: Array = NO_NORMALS
+) -> list[FacePlane]:
     """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
 
-    Faces that another piece of the second surface goes on beyond are no end of it, and are left out.
+    Faces beyond which another piece of the second surface goes on where it is touched are no end of it, and are left
+    out.
+
+    Args:
+        first: the surface that meets them.
+        second: the one that has them.
+        pieces: the nearest ones.
+        state: at the posture.
+        others: (k, 3) normals that count as those of faces too: where edges cross, neither piece has a face.
     """
     i, j = pieces
     swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
         return []
     ours, theirs = first.placed(i, state), second.placed(j, state)
-    normals = swept.faces[:, :3] @ theirs.rotation.T
-    offsets = swept.faces[:, 3] + normals @ theirs.translation
+    normals = np.vstack([swept.faces[:, :3] @ theirs.rotation.T, others])
+    corners = swept.points @ theirs.rotation.T + theirs.translation
+    faces = swept.faces[:, 3] + normals[: len(swept.faces)] @ theirs.translation
+    offsets = np.append(faces, (corners @ others.T).max(axis=0))
     points = np.array([_behind(first, i, ours, normal) for normal in normals])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     found = []
     for key in np.argsort(-values)[:FACES].tolist():
-        if not _goes_on(second, j, normals[key], offsets[key], points[key], state):
-            found.append(FacePlane(float(values[key]), normals[key], points[key], key))
+        plane = FacePlane(float(values[key]), normals[key], points[key], key)
+        if not _goes_on(second, j, plane, first.shapes[i], ours, state):
+            found.append(plane)
     return found
+
+
+def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Normals (k, 3) from the second surface to the first, of what meets where their pieces slide along each other.
+
+    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has.
+    There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
+    """
+    i, j = near.pieces
+    sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
+    if not sharp or abs(near.distance) > STEP:
+        return NO_NORMALS
+    a, b, found = first.placed(i, state), second.placed(j, state), []
+    for way in across(near.normal)[:2]:
+        for step in (-EDGE, EDGE):
+            slid = pin.SE3(b.rotation, b.translation + step * way)
+            found.append(-np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
+    normals = np.array(found)
+    return normals[np.linalg.norm(normals, axis=1) > 0.5]
 
 
 def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
@@ -286,15 +322,19 @@ def _behind(surface: Surface, number: int, placement: pin.SE3, normal: Array) ->
     return np.asarray(points[int(np.argmin(points @ normal))])
 
 
-def _goes_on(thing: Surface, number: int, normal: Array, offset: float, point: Array, state: State) -> bool:
-    """Whether another piece than `number` reaches beyond a plane near a point (3,)."""
-    for other, shape in enumerate(thing.shapes):
+def _goes_on(thing: Surface, number: int, plane: FacePlane, shape: Any, placed: pin.SE3, state: State) -> bool:
+    """Whether another piece than `number` reaches beyond a plane near its point, and a placed shape touches it."""
+    offset = float(plane.normal @ plane.point) - plane.value
+    for other, own in enumerate(thing.shapes):
         if other != number:
             place = thing.placed(other, state)
-            if float(np.linalg.norm(place.translation - point)) < thing.reach[other] + GOES_ON:
-                if not np.isfinite(thing.reach[other]):
-                    return True
-                if float((outermost(shape, place, normal, thing.swept[other]) @ normal).max()) > offset + ACCURACY:
+            if float(np.linalg.norm(place.translation - plane.point)) < thing.reach[other] + GOES_ON:
+                beyond = (
+                    not np.isfinite(thing.reach[other])
+                    or float((outermost(own, place, plane.normal, thing.swept[other]) @ plane.normal).max())
+                    > offset + ACCURACY
+                )
+                if beyond and between_pieces(shape, placed, own, place).min_distance <= STEP:
                     return True
     return False
 

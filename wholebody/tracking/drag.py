@@ -158,10 +158,11 @@ class Drag(NotCopyable, Generic[Answer]):
     """Follows a goal that is moved from frame to frame, of a problem by any method or of an assembly.
 
     "qp" solves one quadratic program a frame, seldom up to three; "newton" takes a few Newton steps. Other methods
-    solve every frame anew from the present posture, "ccd" to a millimetre. No method restarts from other postures. If
-    the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that frame. If a thing
-    was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with `over`) "qp" gets out
-    of the way as they come; the others meet them where they end. What they could not avoid is named in the answer.
+    solve every frame anew from the present posture, "ccd" and "placo" to a millimetre. No method restarts from other
+    postures. If the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that
+    frame. If a thing was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with
+    `over`) "qp" gets out of the way as they come; the others meet them where they end. What they could not avoid is
+    named in the answer.
 
     A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
     """

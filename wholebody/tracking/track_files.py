@@ -5,12 +5,13 @@ from __future__ import annotations
 import csv
 import io
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
-from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED, instance, is_number, known, shown, warn
 from wholebody.base.checks import path as checked_path
 from wholebody.base.errors import FileFormatError, InputError
 from wholebody.base.files import checked_target, read_text, write
@@ -22,6 +23,7 @@ ROOT_COLUMNS = ("root_x", "root_y", "root_z", "root_qx", "root_qy", "root_qz", "
 LARGEST = 200_000_000  # bytes: an hour of a person at 60 frames a second
 LATEST = 1e9  # s
 TIME = "time"
+DEGREES = ("[deg]", "(deg)", "[degrees]", "(degrees)")
 
 
 def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
@@ -44,18 +46,31 @@ def write_track(track: Track, path: str | os.PathLike[str]) -> Path:
 def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     """Read a track of a figure; its columns may have any order.
 
+    The time step is the mean of the file's, whose times may be rounded to the decimals that they have. A column such as
+    "left_knee_flexion [deg]" is in degrees. Joints without a column stay as in the neutral posture, and a free root
+    without its seven columns where it is in that posture; a warning names them.
+
     Raises:
         FileFormatError: the file cannot be read, a line has another length, a value is no finite number, or the time
             step changes or is not within `TIME_STEP`; the line is named.
         UnknownNameError: a column that is no joint of the figure.
-        InputError: joints are missing, or a quaternion is not of unit length; the frame is named.
+        InputError: no time or no joint has a column, a root has some of its columns, or a quaternion is not of unit
+            length; the frame is named.
     """
     path = checked_path(path, "path")
     check_figure(figure, "read_track")
     text = read_text(path, "track", LARGEST)
     lines = _lines(path, text)
     number, first = next(lines, (1, []))
-    names = [name.strip() for name in first]
+    if len(first) == 1 and ";" in first[0]:
+        raise FileFormatError(
+            f"{path.name}, line {number}: the columns are separated by semicolons; write commas between them, "
+            "and points in numbers"
+        )
+    in_degrees = [name.strip().lower().endswith(DEGREES) for name in first]
+    names = [
+        re.sub(r"\s*[\[(](deg|degrees|rad|radians)[\])]$", "", name.strip(), flags=re.IGNORECASE) for name in first
+    ]
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
     for name in names:
         known(name, wanted, "column", f"{path.name}, line {number}")
@@ -63,11 +78,16 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     if twice:
         raise FileFormatError(f"{path.name}, line {number}: the column {twice[0]} stands there twice; leave one out")
     missing = [name for name in wanted if name not in names]
-    if missing:
+    root = [name for name in missing if name in ROOT_COLUMNS]
+    if TIME in missing or len(missing) >= len(wanted) - 1 or 0 < len(root) < len(ROOT_COLUMNS):
+        lacked = [TIME] if TIME in missing else root if 0 < len(root) < len(ROOT_COLUMNS) else missing
         raise InputError(
-            f"{path.name}, line {number}: the columns lack {', '.join(missing[:4])}; {len(missing)} are missing"
+            f"{path.name}, line {number}: the columns lack {', '.join(lacked[:4])}; {len(missing)} are missing"
         )
-    rows, places = [], []
+    if missing:
+        more = f" and {len(missing) - 4} more" if len(missing) > 4 else ""
+        warn(f"{path.name}: no column for {', '.join(missing[:4])}{more}; they stay as in the neutral posture")
+    rows, places, decimals, at = [], [], 0, names.index(TIME)
     for number, line in lines:
         if len(line) != len(names):
             raise FileFormatError(f"{path.name}, line {number}: {len(line)} values for {len(names)} columns")
@@ -77,21 +97,23 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
             wrong = next(value for value in line if not is_number(value))
             raise FileFormatError(f"{path.name}, line {number}: {shown(wrong)} is no number") from None
         places.append(number)
+        decimals = max(decimals, len(line[at].strip().partition(".")[2]) if "e" not in line[at].lower() else 17)
     if len(rows) < 2:
         raise FileFormatError(
             f"{path.name}, line {number}: a track has a line of names and at least two frames; the file is cut off"
         )
     table = np.array(rows)
-    order = [names.index(name) for name in wanted]
-    time = table[:, order[0]]
+    table[:, in_degrees] = np.radians(table[:, in_degrees])
+    time = table[:, at]
     if not (np.abs(time) < LATEST).all():
         bad = int(np.flatnonzero(~(np.abs(time) < LATEST))[0])
         raise FileFormatError(f"{path.name}, line {places[bad]}: the time is {time[bad]:g}; give seconds")
-    dt = float(time[1] - time[0])
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
     if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
         raise FileFormatError(f"{path.name}, line {places[1]}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
-    # share of the time step by which the time of a line may differ
-    late = np.flatnonzero(np.abs(np.diff(time) - dt) > 1e-3 * abs(dt))
+    # a step may differ by a thousandth, and by what rounding both of its times makes
+    steps = np.diff(time)
+    late = np.flatnonzero(np.abs(steps - np.median(steps)) > 1e-3 * dt + min(1.001 * 10.0**-decimals, 0.4 * dt))
     if len(late):
         line_number = places[int(late[0]) + 1]
         raise FileFormatError(f"{path.name}, line {line_number}: the time step changes; resample to a fixed one")
@@ -102,7 +124,11 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
             f"{path.name}, line {places[row]}: {names[column]} is {table[row, column]:g}; {len(broken)} values are not "
             f"finite or beyond {LARGEST_VALUE:g}; correct or cut those frames"
         )
-    track = Track.of(figure, table[:, order[1:]], dt, path.name)
+    q = np.tile(figure.neutral, (len(table), 1))
+    for column, name in enumerate(wanted[1:]):
+        if name in names:
+            q[:, column] = table[:, names.index(name)]
+    track = Track.of(figure, q, dt, path.name)
     track.check(figure)
     return track
 

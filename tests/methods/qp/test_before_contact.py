@@ -21,3 +21,19 @@ def test_toes_come_to_rest_at_the_edge_of_a_pedal(number: int) -> None:
     """At an edge the distance has a kink, at which the last tenth of a millimetre was not gone."""
     solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
     assert solution.solved, solution
+
+
+@pytest.mark.parametrize("number", [8, 13])
+def test_contacts_are_met_from_an_end_in_front_of_all_faces(number: int) -> None:
+    """The first descents end 0.2 m away, or in front of the faces, whence feasibility alone stalls at 1 cm."""
+    solution = wb.solve(problem_set("drivers").make(number, 0).problem, wb.QP(measures=False, time_limit=30.0))
+    assert solution.solved, solution
+
+
+def test_goals_out_of_reach_are_not_tried_from_all_starts() -> None:
+    scene = wb.Scene(wb.load("human")).add(wb.HalfSpace(), name="floor")
+    goal = wb.Point("right_index_tip", (0.5, -0.3, 2.6))
+    feet = [wb.Stand("floor"), wb.Hold("left_foot"), wb.Hold("right_foot")]
+    solution = wb.solve(wb.Problem(scene, "standing", goals=[goal], constraints=feet))
+    assert solution.status == "unreachable"
+    assert sum(entry.note.startswith("before contact") for entry in solution.trace) <= 3 * 40

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
@@ -15,18 +14,20 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import posture
 from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
-from wholebody.methods.base import SolvingTracker, UnsupportedTermError
+from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
 from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.reaching import Reach
-from wholebody.methods.ccd.terms import read
-from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.ccd.terms import Request, read
+from wholebody.methods.conclusion import Ending
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
-from wholebody.methods.control import Control, Progress
+from wholebody.methods.control import Control
+from wholebody.methods.descents import Descends, DescentTracker
 from wholebody.methods.inputs import CCD_TOLERANCE, Iterations, Restarts, Seed, TimeLimit, check_problem
 from wholebody.problem import Problem
+from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
-from wholebody.solution import Solution, TraceEntry
+from wholebody.solution import TraceEntry
 
 DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the present posture; later ones begin anywhere
 ROUNDS = 6  # alternations of reaching and overlap resolution, from one start
@@ -51,7 +52,7 @@ class _Trial:
 
 
 @dataclass(frozen=True)
-class CCD(Checked):
+class CCD(Checked, Descends):
     """Cyclic coordinate descent: one joint at a time, each to its best value, from the tip inwards.
 
     Takes Point, Frame and Orientation goals. A goal on a chain of the figure moves the joints of that chain up to its
@@ -74,6 +75,7 @@ class CCD(Checked):
             ends after four seconds of processor time.
     """
 
+    on_the_way = ON_THE_WAY
     tolerance: Annotated[float, CCD_TOLERANCE] = 1e-4
     iterations: Iterations = 400
     restarts: Restarts = 12
@@ -93,43 +95,17 @@ class CCD(Checked):
             return str(error)
         return None
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture.
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`."""
+        return _Search(self, problem, _Shared(problem.scene, workspace), control).end()
 
-        Goals out of reach and starts in penetration are answers, not errors.
-
-        Args:
-            problem: the problem.
-            progress: see `wholebody.methods.control.Progress`.
-
-        Raises:
-            UnsupportedTermError: the problem has terms that this method cannot take.
-            InputError: the scene changed after the problem was made.
-        """
-        check_problem(problem, "CCD.solve: problem")
-        began = time.perf_counter()
-        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
-            search = _Search(self, problem, workspace, control)
-            best = search.run()
-        turns = len(search.trace)
-        ending = Ending(
-            best.q,
-            best.converged,
-            search.sweeps,
-            tuple(search.trace),
-            "from the start" if turns == 1 else f"at turn {turns}",
-            unit="sweeps",
-            contradictions=search.contradictions,
-        )
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
-
-    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
-        """A tracker that solves the problem anew at every step; frames during a motion to a millimetre.
+    def tracker(self, problem: Problem, dt: float) -> CCDTracker:
+        """A tracker that searches anew at every step; frames during a motion to a millimetre.
 
         Raises:
             InputError: dt is not a positive finite number, or the scene changed after the problem was made.
         """
-        return _CCDTracker(self, problem, dt, replace(self, tolerance=ON_THE_WAY))
+        return CCDTracker(self, problem, dt)
 
     def pushed_out(self, problem: Problem, q: Array) -> Array:
         """The result of overlap resolution at the posture q (nq,), without regard to the goals.
@@ -143,44 +119,72 @@ class CCD(Checked):
         check_problem(problem, "CCD.pushed_out: problem")
         q = posture(q, problem.scene.model.nq)
         with problem.borrow() as workspace:
-            return _Search(self, problem, workspace, Control(np.inf)).pushed_out(q)
+            return _Search(self, problem, _Shared(problem.scene, workspace), Control(np.inf)).pushed_out(q)
 
 
-class _CCDTracker(SolvingTracker):
-    """Follows by solves; its ways out resolve overlap with things that were moved into the figure."""
+class CCDTracker(DescentTracker[CCD]):
+    """Follows by searches; its ways out resolve overlap with things that were moved into the figure."""
 
-    def __init__(self, method: CCD, problem: Problem, dt: float, rough: CCD) -> None:
-        super().__init__(method, problem, dt, rough)
-        self._ccd = method
+    def __init__(self, method: CCD, problem: Problem, dt: float) -> None:
+        """Set up; arguments and errors as for `DescentTracker`."""
+        super().__init__(method, problem, dt)
+        self._shared = _Shared(problem.scene, self.workspace)
+
+    def search(self, method: CCD, problem: Problem, control: Control) -> Ending:
+        """The end of a search."""
+        return _Search(method, problem, self._shared, control).end()
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """The result of overlap resolution at the posture q (nq,), as far as bounds on velocities allow."""
-        return (self.bounded(q, self._ccd.pushed_out(self.problem, q)),)
+        search = _Search(self._exact, self._begun(q), self._shared, Control(np.inf))
+        return (self.bounded(q, search.pushed_out(posture(q, self.workspace.model.nq))),)
+
+
+class _Shared:
+    """What searches share that move the same joints: kinematics of the limbs, and what resolves overlap."""
+
+    def __init__(self, scene: Scene, workspace: Workspace) -> None:
+        self.workspace, self._scene = workspace, scene
+        self._key: tuple[object, ...] = ()
+
+    def ready(self, request: Request, control: Control) -> tuple[Reach, OverlapResolver]:
+        """Both, made anew if the request moves or keeps something else than the last one."""
+        key = (request.joints, request.fixed, request.cones, request.ranges)
+        if key != self._key:
+            self._key, kept = key, (request.fixed, request.cones, request.ranges)
+            self._reach = Reach(self._scene.figure, request, control)
+            self._resolver = OverlapResolver(self._scene, self.workspace, None, *kept)
+        self._reach.begin(request, control)
+        return self._reach, self._resolver
 
 
 class _Search:
     """One solve: starts, and from each of them reaching and overlap resolution in alternation."""
 
-    def __init__(self, method: CCD, problem: Problem, workspace: Workspace, control: Control) -> None:
+    def __init__(self, method: CCD, problem: Problem, shared: _Shared, control: Control) -> None:
         self._method, self._problem, self._control = method, problem, control
-        request = read(problem)
-        self._reach = Reach(problem.scene.figure, request, control)
+        self._reach, self._resolver = shared.ready(read(problem, shared.workspace.state), control)
         self._tolerance = min(TOLERANCE, SHARE * method.tolerance)
-        self._resolver = OverlapResolver(
-            problem.scene,
-            workspace,
-            problem.clearances,
-            fixed=request.fixed,
-            cones=request.cones,
-            ranges=request.ranges,
-            tolerance=self._tolerance,
-            control=control,
-        )
+        self._resolver.begin(problem.clearances, self._tolerance, control)
         self._rng = np.random.default_rng(method.seed)
         self.sweeps = 0
         self.contradictions: tuple[Contradiction, ...] = ()
-        self._workspace = workspace
+        self._workspace = shared.workspace
         self.trace: list[TraceEntry] = []
+
+    def end(self) -> Ending:
+        """The end of the search."""
+        best = self.run()
+        turns = len(self.trace)
+        return Ending(
+            best.q,
+            best.converged,
+            self.sweeps,
+            tuple(self.trace),
+            "from the start" if turns == 1 else f"at turn {turns}",
+            unit="sweeps",
+            contradictions=self.contradictions,
+        )
 
     def run(self) -> _Trial:
         """The best result of all starts, or the first that meets goals and clearances."""

@@ -15,12 +15,13 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, floats, seen_from
 from wholebody.methods.ccd.sweep import Aims, sweep
 
 INWARD = 1e-9  # margin inside a range, as a share of an ellipse and in radians of a twist; larger than rounding
 SWEEPS = 12  # over the joints that turn a limb: more than two are needed only where one of them is at its limit
 ROUNDING = 1e-12  # rad
+AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 class _Sum:
@@ -136,6 +137,8 @@ class TwistGuard:
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
         """Find the nodes between the reference and the limb."""
         self._part, self._limbs = part, limbs
+        self._center = floats(pin.SE3(part.center, np.zeros(3)))
+        self._slope: list[float] = (part.slope @ part.center).tolist()
         self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (part.limb, part.reference))
         self.nodes = limbs.between(self._base.node, self._limb.node)
 
@@ -155,7 +158,7 @@ class TwistGuard:
         targets = [limb.direction(*column) for column in back.T.tolist()]
         for _ in range(SWEEPS):
             aims = Aims()
-            for axis, target in zip(np.eye(3).tolist(), targets, strict=True):
+            for axis, target in zip(AXES, targets, strict=True):
                 aims.add(limb.node, limb.direction(*axis), target, direction=True)
             sweep(limbs, aims, aims.plan(limbs, self.nodes))
             limbs.forward()
@@ -164,11 +167,13 @@ class TwistGuard:
 
     def _excess(self) -> float:
         """The twist beyond its bound, radians; negative inside."""
-        part = self._part
-        axes = [self._base.seen(*self._limb.direction(*axis)) for axis in np.eye(3).tolist()]
-        seen = part.center.T @ np.array(axes).T
-        twist = atan2(seen[1, 0] - seen[0, 1], seen[0, 0] + seen[1, 1])
-        return float(part.sign * twist - part.bound - part.slope @ part.center @ seen[:, 2])
+        (a, b, _), (d, e, _), z = (self._seen(*axis) for axis in AXES)
+        along = sum(w * part for w, part in zip(self._slope, z, strict=True))
+        return float(self._part.sign * atan2(b - d, a + e) - self._part.bound - along)
+
+    def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+        """A direction of the limb in the axes of the central rotation."""
+        return seen_from(self._center, *self._base.seen(*self._limb.direction(x, y, z)))
 
 
 RangeGuard = CoupledGuard | EllipticGuard | TwistGuard

@@ -79,11 +79,15 @@ class Reach:
 
     def __init__(self, figure: Figure, request: Request, control: Control) -> None:
         """Prepare the joints."""
-        self._control = control
-        self._model, self._request = figure.model, request
+        self._model = figure.model
+        self.begin(request, control)
         self.limbs = Limbs(figure.model, request.joints)
         self._guards = guards(figure, self.limbs, request.cones, request.ranges)
         self._data = figure.model.createData()
+
+    def begin(self, request: Request, control: Control) -> None:
+        """Begin a run for the goals of a request with the same joints, cones and ranges."""
+        self._goals, self._control = request.goals, control
 
     def run(self, q: Array, tolerance: float, most: int) -> tuple[Array, Reached]:
         """Descend from a posture q (nq,) until every goal is met to a tolerance, at most `most` sweeps."""
@@ -95,7 +99,7 @@ class Reach:
         for guard in self._guards:
             guard.read(q, self._data)
             guard.keep()
-        goals = _Goals(self._model, limbs, self._data, self._request.goals)
+        goals = _Goals(self._model, limbs, self._data, self._goals)
         goals.carry()
         aims = goals.aims
         steps = aims.plan(limbs)

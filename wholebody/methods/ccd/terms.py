@@ -63,8 +63,8 @@ class Request:
     ranges: tuple[str, ...]
 
 
-def read(problem: Problem) -> Request:
-    """Convert a problem.
+def read(problem: Problem, state: State | None = None) -> Request:
+    """Convert a problem; `state`, if given, is moved to the problem's start.
 
     Raises:
         UnsupportedTermError: it has terms that this method cannot take; all of them are listed.
@@ -86,7 +86,7 @@ def read(problem: Problem) -> Request:
     cones: dict[str, None] = {}
     ranges: dict[str, None] = {}
     moving = _dofs(figure, joints)
-    state = State(problem.scene.model).update(problem.start)
+    state = (State(problem.scene.model) if state is None else state).update(problem.start)
     support = joint_support(problem.scene.model)
     left_out = {id(term) for term in problem.defaults if not isinstance(term, (ReachCones, RangeOfMotion))}
     for number, term in enumerate(problem.constraints):

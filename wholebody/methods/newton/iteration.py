@@ -73,6 +73,7 @@ class Iteration:
         """Use the present equations at x."""
         self.active_system.arrive(x)
         self.system, self.algebra = self.active_system.system, self.active_system.algebra
+        self.share = np.ones(len(self.system.goal)) if self.active_system.even else self.system.share
         self.goal_rows = np.flatnonzero(self.system.goal)
         self.objective = np.flatnonzero(self.system.objective)
         self.one_sided = np.flatnonzero(self.system.inequality)
@@ -225,7 +226,7 @@ class Iteration:
         asked[self.goal_rows] = self.residual[self.goal_rows] * min(goal_share, share)
         diagonal = np.full(len(asked), HARD_DAMPING + HARD_SHARE * damping * damping)
         softness = (GOAL_DAMPING if goal_share else RESTORING_DAMPING) + damping if goals else FREE
-        diagonal[self.goal_rows] = softness / self.system.share[self.goal_rows] ** 2
+        diagonal[self.goal_rows] = softness / self.share[self.goal_rows] ** 2
         asked[self.objective] = 0.0
         if measures == "lower":
             asked[self.objective] = self.residual[self.objective] / (1.0 + damping / FIRST_DAMPING)
@@ -265,7 +266,7 @@ class Iteration:
     def _norms(self, residual: Array) -> tuple[float, float]:
         """Norms of the errors of the constraints, and of the goals."""
         error = self._error(residual)
-        goal = error[self.goal_rows] * self.system.share[self.goal_rows]
+        goal = error[self.goal_rows] * self.share[self.goal_rows]
         error[self.goal_rows] = 0.0
         return sqrt(float(error @ error)), sqrt(float(goal @ goal))
 

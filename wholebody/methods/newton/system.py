@@ -162,9 +162,11 @@ class ActiveSystem:
         longest: largest motion of any part of a body in a step, metres.
         control: may end the iteration early.
         path: the accepted states (7 n,), where a system records them.
+        even: whether goals count alike, whatever their weights.
     """
 
     path: tuple[Array, ...] = ()
+    even = False
     longest = np.inf
     control = Control(np.inf)
 

@@ -15,7 +15,7 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import Method, begun, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, satisfy
+from wholebody.methods.newton.feasibility import FRAME_ITERATIONS, FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.linear_algebra.base import Pattern
 from wholebody.methods.newton.multistart import SHARPER, Search, Settings
@@ -25,6 +25,7 @@ from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
 
+TRADED = 0.5  # greater = weights count in more frames, and light goals wait in more
 FRAME_TOLERANCE = 1e-4  # m, rad: in the frames of a drag; its end is solved to the method's tolerance
 
 
@@ -99,6 +100,9 @@ class NewtonTracker(NotCopyable):
     def frame(self, q: Array, tolerance: float | None = None) -> NewtonStep:
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
+        Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
+        weights if that lessened light goals at the expense of heavy ones.
+
         Args:
             q: posture at the beginning of the frame.
             tolerance: of the goals, metres and radians; `FRAME_TOLERANCE` where None.
@@ -116,7 +120,20 @@ class NewtonTracker(NotCopyable):
                 state = self.workspace.state.update(q)
                 ranges = np.array([bound.bounds(state, self.dt) for bound in self.problem.bounds])
                 active_system.bodies.bound_step(q, ranges[:, 0].max(axis=0), ranges[:, 1].min(axis=0))
-            found = satisfy(
+            found, spent = None, 0
+            if len({goal.weight for goal in self.problem.goals}) > 1:
+                found = self._satisfied(active_system, q, enough, even=True)
+                spent = found.iterations
+            if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
+                found = self._satisfied(active_system, q, enough, even=False)
+                spent += found.iterations
+            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.patterns.structures)
+
+    def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
+        """The end of the iteration from the posture q (nq,); goals count alike if `even`."""
+        active_system.even = even
+        try:
+            return satisfy(
                 active_system,
                 active_system.variables(q),
                 tolerance=SHARPER * self._settings.tolerance,
@@ -125,9 +142,22 @@ class NewtonTracker(NotCopyable):
                 kind=self._settings.inequalities,
                 early_exit=True,
             )
-            return NewtonStep(
-                active_system.posture(found.x), found.iterations, found.systems, active_system.patterns.structures
-            )
+        finally:
+            active_system.even = False
+
+    def _trades(self, before: Array, after: Array) -> bool:
+        """Whether light goals were lessened at the expense of heavy ones, from one posture (nq,) to another.
+
+        They were where the weighted error lessened by a smaller share than half of that of the error without weights.
+        """
+        goals = self.problem.goals
+        weights = np.sqrt([goal.weight for goal in goals])
+        errors = []
+        for q in (before, after):
+            state = self.workspace.state.update(q)
+            errors.append(np.array([np.linalg.norm(goal.error(state)) for goal in goals]))
+        even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
+        return bool(1.0 - weighted < TRADED * (1.0 - even))
 
     def nearest(self, q: Array) -> Solution:
         """The method's answer from q (nq,), with measures relative to q."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -10,27 +9,28 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.fields import Checked
-from wholebody.methods.base import SolvesAnew, UnsupportedTermError, refusal
-from wholebody.methods.conclusion import Ending, concluded
-from wholebody.methods.control import Control, Progress
+from wholebody.methods.base import UnsupportedTermError, refusal
+from wholebody.methods.conclusion import Ending
+from wholebody.methods.control import Control
+from wholebody.methods.descents import Descends
 from wholebody.methods.differential import MEASURES, REGULAR, TOOL, Iteration, Settings, StepError
 from wholebody.methods.inputs import Iterations, TimeLimit, Tolerance, check_problem
 from wholebody.methods.placo.robot import SWELL, Robot
 from wholebody.methods.placo.terms import add_terms, named_frames, unsupported
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
-from wholebody.solution import Solution
 
 STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
 LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
 HOLDS = {"hard": 0.0, "soft": 100.0}
 """What `Placo.holds` may be -> the weight of holds as soft tasks, 0 for hard ones."""
+ON_THE_WAY = 1e-3  # m, rad: tolerance of the goals in frames of a motion before its end
 DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
 
 
 @dataclass(frozen=True)
-class Placo(Checked, SolvesAnew):
+class Placo(Checked, Descends):
     """placo's `KinematicsSolver`, by its documented tasks, iterated.
 
     Goals are soft tasks and holds hard ones. Joint limits and placo's self-collision constraint, whose model includes
@@ -50,6 +50,7 @@ class Placo(Checked, SolvesAnew):
             hard tasks contradict each other or what keeps pairs apart.
     """
 
+    on_the_way = ON_THE_WAY
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 200
     time_limit: TimeLimit = None
@@ -81,32 +82,21 @@ class Placo(Checked, SolvesAnew):
         check_problem(problem, "Placo.pairs: problem")
         return np.arange(len(problem.clearances))
 
-    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
-        """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
-
-        Args:
-            problem: the problem.
-            progress: see `wholebody.methods.control.Progress`.
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """See `Descends._descend`.
 
         Raises:
-            InputError: placo cannot express the problem, or its scene changed after it was stated.
+            UnsupportedTermError: placo cannot express the problem.
             MissingPackageError: placo is not installed.
         """
-        check_problem(problem, "Placo.solve: problem")
-        began = time.perf_counter()
-        with (
-            problem.borrow() as workspace,
-            problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache,
-            Control(self.time_limit, progress) as control,
-        ):
+        with problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
             robot = cache.robot(problem, workspace, self.pairs(problem))
             stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])
             settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
-        ending = Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
-        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+        return Ending(run.q, run.converged, run.steps, tuple(run.trace), f"in {run.steps} programs", failure=failure)
 
 
 class _RobotCache:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -143,7 +142,8 @@ def _goal(solver: Any, robot: Robot, problem: Problem, name: str, goal: Any) -> 
 
 def _posture(solver: Any, robot: Robot, problem: Problem, name: str, goal: Posture) -> None:
     figure, dofs = problem.scene.figure, set(np.asarray(goal.dofs).tolist())
-    values = _joint_values(robot, problem, goal.resolved_target, dofs)
+    joints = _joint_values(robot, problem, goal.resolved_target)
+    values = {name: value for dof, name, value in joints if dof in dofs}
     if values:
         task = solver.add_joints_task()
         task.set_joints(values)
@@ -198,24 +198,21 @@ def _freeze(solver: Any, robot: Robot, problem: Problem, bound: Freeze) -> None:
 def _measure(solver: Any, robot: Robot, problem: Problem, measure: Effort | Displacement, tasks: Tasks) -> None:
     """Weighted squared distance from a posture: a joints task for every distinct weight."""
     weights = measure.distance.weights
-    for value in sorted(set(weights[weights > 0.0].tolist())):
-        values = _joint_values(robot, problem, measure.distance.reference, np.flatnonzero(weights == value).tolist())
-        if values:
+    groups: dict[float, dict[str, float]] = {}
+    for dof, name, value in _joint_values(robot, problem, measure.distance.reference):
+        groups.setdefault(float(weights[dof]), {})[name] = value
+    for weight in sorted(groups):
+        if weight > 0.0:
             task = solver.add_joints_task()
-            task.set_joints(values)
-            tasks.measures.append((task, measure.weight * value / float(weights.max())))
+            task.set_joints(groups[weight])
+            tasks.measures.append((task, measure.weight * weight / float(weights.max())))
 
 
-def _joint_values(robot: Robot, problem: Problem, q: Array, dofs: Iterable[int]) -> dict[str, float]:
-    """Joints with these degrees of freedom, by their names in placo -> their values in the posture q (nq,)."""
-    figure, chosen = problem.scene.figure, set(dofs)
-    values = figure.joint_values(q)
-    ids = {name: figure.joint_id(name) for name in values}
-    return {
-        robot.joint_name(ids[name]): value
-        for name, value in values.items()
-        if figure.model.joints[ids[name]].idx_v in chosen
-    }
+def _joint_values(robot: Robot, problem: Problem, q: Array) -> list[tuple[int, str, float]]:
+    """Degree of freedom, name in placo, and value in the posture q (nq,), of each joint with one."""
+    figure = problem.scene.figure
+    ids = [(figure.joint_id(name), value) for name, value in figure.joint_values(q).items()]
+    return [(figure.model.joints[joint].idx_v, robot.joint_name(joint), value) for joint, value in ids]
 
 
 def _corners(normals: Array, offsets: Array) -> Array:

@@ -8,7 +8,7 @@ lowered there.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from itertools import chain, islice, takewhile
+from itertools import chain, takewhile
 from typing import NamedTuple
 
 import numpy as np
@@ -117,10 +117,8 @@ class Multistart:
         least = least_left(self.contradictions)
         if least is None:
             return
-        contacts = self._before_contact()
-        yield Attempt(islice(contacts, 1), self._feasibility_first, "from before contact")
+        yield Attempt(self._before_contact(), lambda q: self._descend(q, full_step=True), "from before contact")
         yield Attempt([start], self._feasibility_first, "by feasibility first")
-        yield Attempt(contacts, self._feasibility_first, "from before contact")
         hooked = [*self.lineariser.defined(hooked_hands(self.problem, state, start))]
         yield Attempt(self._while_open(hooked), self._relaxed, "from another start")
         yield Attempt(hooked, self._feasibility_first, "from hooked hands")
@@ -346,11 +344,11 @@ class Multistart:
         return np.concatenate([np.zeros(0), *(np.atleast_1d(goal.error(state)) for goal in self.problem.goals)])
 
     def _descend(
-        self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None
+        self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
     ) -> LocalSolution:
         """Descend from a start; where that ends with something that must hold not holding, restore it."""
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
-        local = self._descent(iterations, None, note, measures=measures).run(start)
+        local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
         self.spent += local.iterations
         ended = most is None or local.iterations < most
         if ended and not held(local, self.budget.tolerance):

@@ -152,10 +152,15 @@ class ChainResolver:
                 return
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], tracked: Any) -> None:
-        """Move the link by pure translation: its joint's origin moves, and its own joints keep its orientation."""
+        """Move the link by pure translation: its joint's origin moves, and its orientation stays.
+
+        Its own joints keep its orientation, and inner ones whose axes pass through the origin: the rotation of an upper
+        arm about its long axis moves no elbow.
+        """
         limbs = self.limbs
         own = tuple(node for node in link.nodes if node not in inner)
         first = limbs.frame(own[-1])
+        own += tuple(node for node in inner if self._passes(node, first[9:]))
         there = _columns(limbs.frames[link.node]).copy()
         if tracked is not None:
             wanted = np.ascontiguousarray(tracked.oMi[limbs.joints[link.node]].rotation.T)
@@ -170,6 +175,13 @@ class ChainResolver:
             if change < CLOSE:
                 break
         self.keep_ranges()
+
+    def _passes(self, node: int, point: Sequence[float]) -> bool:
+        """Whether the axis of a node passes through a point (3,)."""
+        ux, uy, uz, px, py, pz = self.limbs.lines[node].tolist()
+        x, y, z = point[0] - px, point[1] - py, point[2] - pz
+        along = ux * x + uy * y + uz * z
+        return not self.limbs.slides(node) and x * x + y * y + z * z - along * along < SHORT * SHORT
 
     def _inner(self, link: Link) -> tuple[int, ...]:
         """The nodes inwards of the link's own: those that move the previous link."""

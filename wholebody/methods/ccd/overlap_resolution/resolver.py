@@ -86,16 +86,20 @@ class OverlapResolver:
             exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
             control: may end the removal early.
         """
-        self.control = Control(np.inf) if control is None else control
         self.exact, self.margin = exact, MARGIN
         self.tracked: Any = None
-        self.scene, self.workspace, self.clearances, self.tolerance = scene, workspace, clearances, tolerance
-        self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
+        self.scene, self.workspace = scene, workspace
+        self.begin(clearances, tolerance, Control(np.inf) if control is None else control)
         self._data = scene.model.createData()
         self._joints = workspace.table.joint.tolist()
-        self.counts = Counts()
         self.deepest = 0.0
         self._fixed, self._cones, self._ranges = fixed, cones, ranges
+
+    def begin(self, clearances: Array | None, tolerance: float, control: Control) -> None:
+        """Begin a run; see the constructor for the arguments."""
+        self.clearances, self.tolerance, self.control = clearances, tolerance, control
+        self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
+        self.counts = Counts()
 
     @cached_property
     def chains(self) -> dict[str, ChainResolver]:

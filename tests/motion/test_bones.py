@@ -1,0 +1,56 @@
+"""The angles between the bones of a recording and those of a figure are measured, and great ones are told."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+import wholebody as wb
+from wholebody.motion.bones import said_of
+from wholebody.motion.skeleton import SkeletonMotion
+
+NAMES = {"skeleton": {"left_shoulder": "a", "left_elbow": "b", "left_wrist": "c"}}
+
+
+@pytest.fixture(scope="module")
+def human() -> wb.Figure:
+    return wb.load("human")
+
+
+def arm(human: wb.Figure, turn: float) -> tuple[SkeletonMotion, wb.Clip]:
+    """A figure that keeps still, and its own arm whose forearm is turned by an angle about an axis across it."""
+    q = human.neutral
+    at = [human.placement(q, f"left_{part}").translation for part in ("shoulder", "elbow", "wrist")]
+    upper, lower = at[1] - at[0], at[2] - at[1]
+    across = np.cross(lower, (1.0, 0.0, 0.0))
+    across /= np.linalg.norm(across)
+    lower = np.cos(turn) * lower + np.sin(turn) * np.cross(across, lower)
+    motion = SkeletonMotion.moved(
+        ("a", "b", "c"), np.array([-1, 0, 1]), np.array([np.zeros(3), upper, lower]),
+        np.tile(np.eye(3), (3, 3, 1, 1)), np.tile(at[0], (3, 1)), 0.02,
+    )  # fmt: skip
+    return motion, wb.Clip(human, np.array([q] * 3), 0.02)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.2, 0.5])
+def test_the_angle_of_a_turned_bone_is_found(turn: float, human: wb.Figure) -> None:
+    errors = wb.motion.bone_errors(*arm(human, turn), NAMES)
+    assert errors["left_shoulder to left_elbow"] == pytest.approx(np.zeros(3), abs=1e-7)
+    assert errors["left_elbow to left_wrist"] == pytest.approx(np.full(3, turn), abs=1e-7)
+    told = said_of(errors)
+    assert told == (
+        "" if turn < 0.26 else "bones differ from the recording's (median): left_elbow to left_wrist by 29 degrees"
+    )
+
+
+def test_a_figure_that_cannot_follow_is_told(human: wb.Figure) -> None:
+    motion, clip = arm(human, -1.2)  # the elbow does not bend backwards
+    with pytest.warns(UserWarning, match=r"retarget: motion: bones differ .*left_elbow to left_wrist by \d+ degrees"):
+        wb.retarget(motion, human, NAMES)
+    with pytest.raises(wb.InputError, match="2 frames and the motion 3"):
+        wb.motion.bone_errors(motion, wb.Clip(human, clip.q[:2], 0.02), NAMES)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert max(map(np.max, wb.motion.bone_errors(motion, clip, NAMES).values())) == pytest.approx(1.2)

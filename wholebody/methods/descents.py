@@ -1,0 +1,98 @@
+"""Methods whose solve is one search in a workspace: its end becomes a solution, or the next posture of a drag."""
+
+from __future__ import annotations
+
+import time
+from abc import ABC, abstractmethod
+from dataclasses import replace
+from typing import Any, Generic, TypeVar
+
+from wholebody.base.arrays import Array
+from wholebody.methods.base import SolvedStep, SolvingTracker
+from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.control import Control, Progress
+from wholebody.methods.inputs import TOLERANCE, check_problem
+from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
+from wholebody.solution import Solution
+
+
+class Descends(ABC):
+    """A dataclass of settings with `tolerance` and `time_limit`, and a search that `solve` and `tracker` run.
+
+    Attributes:
+        on_the_way: metres and radians to which goals are met in frames of a motion before its end, if that is more than
+            the tolerance.
+    """
+
+    on_the_way = 0.0
+    tolerance: Any
+    time_limit: Any
+
+    @property
+    @abstractmethod
+    def name(self) -> str:
+        """Name for tables."""
+
+    @abstractmethod
+    def _descend(self, problem: Problem, workspace: Workspace, control: Control) -> Ending:
+        """Search from the problem's start in a workspace on its scene.
+
+        Raises:
+            UnsupportedTermError: the problem has terms that this method cannot take.
+        """
+
+    def solve(self, problem: Problem, progress: Progress | None = None) -> Solution:
+        """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
+
+        Args:
+            problem: the problem.
+            progress: see `wholebody.methods.control.Progress`.
+
+        Raises:
+            UnsupportedTermError: the problem has terms that this method cannot take.
+            InputError: the scene changed after the problem was made.
+        """
+        check_problem(problem, f"{type(self).__name__}.solve: problem")
+        began = time.perf_counter()
+        with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
+            ending = self._descend(problem, workspace, control)
+        return concluded(problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began)
+
+    def tracker(self, problem: Problem, dt: float) -> SolvingTracker:
+        """A tracker that searches anew at every step, from the present posture.
+
+        Raises:
+            InputError: dt is not a positive finite number, or the scene changed after the problem was made.
+        """
+        return DescentTracker(self, problem, dt)
+
+
+Kind = TypeVar("Kind", bound=Descends)
+
+
+class DescentTracker(SolvingTracker, Generic[Kind]):
+    """Follows by the searches of a method: a frame takes the end of a search, without an assessment or a message."""
+
+    def __init__(self, method: Kind, problem: Problem, dt: float) -> None:
+        """Set up; arguments and errors as for `SolvingTracker`."""
+        super().__init__(method, problem, dt)  # type: ignore[arg-type] # a method also says what it accepts
+        rough: Any = method
+        self._exact = method
+        self._rough: Kind = replace(rough, tolerance=max(method.tolerance, method.on_the_way))
+
+    def frame(self, q: Array, tolerance: float | None = None) -> SolvedStep:
+        """The end of a search from the posture q (nq,); without a tolerance to that of frames on the way."""
+        if tolerance is not None:
+            TOLERANCE(tolerance, "tolerance")
+        method = self._rough if tolerance is None else self._exact
+        problem = self._begun(q)
+        problem.check_fresh()
+        self.workspace.refresh()
+        with Control(method.time_limit) as control:
+            ending = self.search(method, problem, control)
+        return SolvedStep(self.bounded(q, ending.q), ending.iterations, 0.0)
+
+    def search(self, method: Kind, problem: Problem, control: Control) -> Ending:
+        """The end of the method's search; a tracker may keep what searches share."""
+        return method._descend(problem, self.workspace, control)
