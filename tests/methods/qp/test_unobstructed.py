@@ -12,7 +12,8 @@ from wholebody.figures.description import Limits
 from wholebody.figures.state import State
 from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
-from wholebody.methods.qp.unobstructed import PlainChain, compiled_kernel, takes, unobstructed
+from wholebody.methods.qp.rows import Goals
+from wholebody.methods.qp.unobstructed import compiled_kernel, plain_chain, reach, takes, unobstructed
 from wholebody.tasks.base import Goal
 
 START = np.array([-0.4, 0.5, 0.9, 0.0, 0.5, 0.0])
@@ -50,15 +51,12 @@ def test_joints_are_where_pinocchio_has_them():
         turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
         place = pin.SE3(turn * np.sign(np.linalg.det(turn)), rng.normal(size=3))
         model.addJoint(parent, kind, place, f"joint {number}")
-    chain, state = PlainChain(model, Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))), State(model)
-    assert chain.plain
+    chain, state = plain_chain(model, Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0)))), State(model)
+    assert chain is not None
+    goals = Goals(np.zeros((0, 36)), np.zeros((0, 7), dtype=np.int64), state.support.astype(np.int8))
     for _ in range(20):
         q = rng.uniform(-3.0, 3.0, model.nq)
-        compiled_kernel().reach(
-            chain.parents, chain.places, chain.turns, chain.slides, state.support.astype(np.int8), np.zeros((0, 36)),
-            np.zeros((0, 7), dtype=np.int64), chain.lower, chain.upper, 0.0, 1.0, 0, chain.joints, chain.columns,
-            np.zeros((0, model.nv)), chain.free, q, np.empty((1, 2)),
-        )  # fmt: skip
+        compiled_kernel().reach(chain, goals, 0.0, 1.0, np.zeros((0, model.nv)), q, np.empty((1, 2)))
         state.update(q)
         np.testing.assert_allclose(chain.joints, state.joints, atol=1e-13)
         np.testing.assert_allclose(chain.columns, state.columns, atol=1e-13)
@@ -72,9 +70,9 @@ def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
     problem = wb.Problem(wb.Scene(two_arms), start, goals=goals)
     with problem.borrow() as workspace:
         plan, state = problem.lineariser(workspace).plan, State(two_arms.model)
-        chain = PlainChain(two_arms.model, two_arms.limits)
-        rows = np.empty((plan.goal_rows, 7))
-        chain._descend(plan, start.copy(), 0.0, 1, rows)
+        chain = plain_chain(two_arms.model, two_arms.limits)
+        assert chain is not None
+        _, _, rows = reach(chain, plan, start, 0.0, 1)
 
     def errors(q):
         state.update(q)
@@ -96,9 +94,10 @@ def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
         problem = wb.Problem(wb.Scene(figure), start, goals=[random_goal(figure, frame, rng, turned)])
         with problem.borrow() as workspace:
             plan = problem.lineariser(workspace).plan
-        chain = PlainChain(figure.model, figure.limits)
+        chain = plain_chain(figure.model, figure.limits)
+        assert chain is not None
         for most in (1, 2, 3):
-            q, seen = chain.reach(plan, start, 1e-12, most)
+            q, seen, _ = reach(chain, plan, start, 1e-12, most)
             textbook = DampedLeastSquares(iterations=most, tolerance=1e-9).solve(problem)
             if seen[-1, 0] == seen[:, 0].min():
                 stopped += bool(np.isin(q, (*figure.limits.lower, *figure.limits.upper)).any())

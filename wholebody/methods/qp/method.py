@@ -11,8 +11,7 @@ from wholebody.base.fields import Checked
 from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
-from wholebody.methods.qp.multistart import Search
-from wholebody.methods.qp.screening import Settings
+from wholebody.methods.qp.multistart import Budget, Multistart
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
@@ -103,7 +102,7 @@ class QP(Checked):
         """
         check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
-        settings = Settings(
+        budget = Budget(
             self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
             self.restarts_for_measure,
         )  # fmt: skip
@@ -113,7 +112,7 @@ class QP(Checked):
             if met is not None and judgement is not None and meets(judgement, self.tolerance):
                 ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
             else:
-                search = Search(problem, workspace, self._qp_solver(), settings, control)
+                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
                 begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
                 best = search.run(begin)
                 ending = Ending(

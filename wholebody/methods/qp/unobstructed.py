@@ -19,6 +19,7 @@ from wholebody.base.arrays import Array
 from wholebody.figures.description import Limits
 from wholebody.figures.state import extended_columns
 from wholebody.methods.control import Control
+from wholebody.methods.qp.rows import Chain, Goals
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
@@ -41,55 +42,53 @@ class Met(NamedTuple):
     trace: tuple[TraceEntry, ...]
 
 
-class PlainChain:
-    """A model of joints of one degree of freedom each, as arrays, with room for one descent.
+def plain_chain(model: pin.Model, limits: Limits) -> Chain | None:
+    """A model as a chain; None where a joint does not turn about an axis or slide along one, or follows another."""
+    joints = list(model.joints)[1:]  # the first is the world
+    if not joints or not all(map(_is_plain, joints)) or extended_columns(model) is not None:
+        return None
+    size = model.nv
+    subspaces = np.array([np.asarray(joint.createData().S).ravel() for joint in joints], dtype=float)
+    lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
+    lower[limits.idx_v], upper[limits.idx_v] = limits.lower, limits.upper
+    placed = np.zeros((size + 1, 4, 3))
+    placed[0, :3] = np.eye(3)
+    return Chain(
+        parents=np.array(list(model.parents)[1:], dtype=np.intp),
+        places=np.array([[*M.rotation.T, M.translation] for M in list(model.jointPlacements)[1:]], dtype=float),
+        turns=subspaces[:, 3:].copy(),
+        slides=subspaces[:, :3].copy(),
+        lower=lower,
+        upper=upper,
+        joints=placed,
+        columns=np.empty((size, 6)),
+        free=np.empty(size, dtype=bool),
+    )
 
-    Attributes:
-        plain: whether it is one: every joint turns about an axis or slides along one, and follows no other.
+
+def reach(chain: Chain, plan: TermPlan, start: Array, tolerance: float, most: int) -> tuple[Array, Array, Array]:
+    """Descend from a posture (nq,) within limits.
+
+    Args:
+        chain: what moves; its room is used.
+        plan: of goals that `takes` accepts.
+        start: (nq,).
+        tolerance: norm of all errors at which they are met, metres and radians.
+        most: steps.
+
+    Returns:
+        The answer (nq,); norm of the errors at each posture and longest entry of the step to it, (postures, 2); and
+        derivatives (rows, nq) of the errors where the last step began.
     """
-
-    def __init__(self, model: pin.Model, limits: Limits) -> None:
-        """Read the joints of a model."""
-        joints = list(model.joints)[1:]  # the first is the world
-        self.plain = bool(joints) and all(map(_is_plain, joints)) and extended_columns(model) is None
-        if not self.plain:
-            return
-        size = model.nv
-        subspaces = np.array([np.asarray(joint.createData().S).ravel() for joint in joints], dtype=float)
-        self.parents = np.array(list(model.parents)[1:], dtype=np.intp)
-        self.places = np.array([[*M.rotation.T, M.translation] for M in list(model.jointPlacements)[1:]], dtype=float)
-        self.slides, self.turns = subspaces[:, :3].copy(), subspaces[:, 3:].copy()
-        self.lower, self.upper = np.full(size, -np.inf), np.full(size, np.inf)
-        self.lower[limits.idx_v], self.upper[limits.idx_v] = limits.lower, limits.upper
-        self.joints = np.zeros((size + 1, 4, 3))
-        self.joints[0, :3] = np.eye(3)
-        self.columns, self.free = np.empty((size, 6)), np.empty(size, dtype=bool)
-        self.trace = np.empty((STEPS + 1, 2))
-
-    def reach(self, plan: TermPlan, start: Array, tolerance: float, most: int) -> tuple[Array, Array]:
-        """Descend from a posture (nq,) within limits; the answer (nq,), and the trace as `reach` has it.
-
-        Args:
-            plan: of goals that `takes` accepts.
-            start: (nq,).
-            tolerance: norm of all errors at which they are met, metres and radians.
-            most: steps.
-        """
-        q = start.copy()
-        seen = self._descend(plan, q, tolerance, min(most, STEPS), np.empty((plan.goal_rows, len(q))))
-        return q, self.trace[:seen]
-
-    def _descend(self, plan: TermPlan, q: Array, tolerance: float, most: int, rows: Array) -> int:
-        """Move q; `rows` (rows, nv) get the derivatives of the errors of goals where the last step began."""
-        first, count, width, first_integer, _, integers = plan.layout[RESIDUAL].tolist()
-        seen: int = compiled_kernel().reach(
-            self.parents, self.places, self.turns, self.slides, plan.support,
-            plan.floats[first : first + count * width].reshape(count, width),
-            plan.integers[first_integer : first_integer + count * integers].reshape(count, integers),
-            self.lower, self.upper, tolerance, DAMPING**2, most, self.joints, self.columns, rows, self.free, q,
-            self.trace,
-        )  # fmt: skip
-        return seen
+    q, trace, rows = start.copy(), np.empty((min(most, STEPS) + 1, 2)), np.empty((plan.goal_rows, len(start)))
+    first, count, width, first_integer, _, integers = plan.layout[RESIDUAL].tolist()
+    goals = Goals(
+        plan.floats[first : first + count * width].reshape(count, width),
+        plan.integers[first_integer : first_integer + count * integers].reshape(count, integers),
+        plan.support,
+    )
+    seen: int = compiled_kernel().reach(chain, goals, tolerance, DAMPING**2, rows, q, trace)
+    return q, trace[:seen], rows
 
 
 def unobstructed(problem: Problem, workspace: Workspace, tolerance: float, most: int, control: Control) -> Met | None:
@@ -107,15 +106,15 @@ def unobstructed(problem: Problem, workspace: Workspace, tolerance: float, most:
         goals are not met with everything held.
     """
     built = problem.scene.built
-    with built.pool(PlainChain, lambda: PlainChain(built.model, problem.scene.figure.limits)).borrow() as chain:
-        if not chain.plain:
+    with built.pool(plain_chain, lambda: plain_chain(built.model, problem.scene.figure.limits)).borrow() as chain:
+        if chain is None:
             return None
         lineariser = problem.lineariser(workspace)
         if not takes(lineariser.plan):
             return None
-        q, seen = chain.reach(lineariser.plan, problem.scene.figure.clamp(problem.start), tolerance, most)
-        entries = tuple(TraceEntry(left, 0.0, 0.0, step, "unobstructed") for left, step in seen[1:].tolist())
-        left = float(seen[-1, 0])
+        q, seen, _ = reach(chain, lineariser.plan, problem.scene.figure.clamp(problem.start), tolerance, most)
+    entries = tuple(TraceEntry(left, 0.0, 0.0, step, "unobstructed") for left, step in seen[1:].tolist())
+    left = float(seen[-1, 0])
     if not left <= tolerance:
         return None
     at = lineariser.at(q, 0.0)
@@ -146,9 +145,9 @@ def compiled_kernel() -> Any:
     from wholebody.methods.qp import unobstructed_kernel
 
     joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
-    unobstructed_kernel.reach(
-        joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), np.zeros((0, 36)),
-        np.zeros((0, 7), dtype=np.int64), one, one, 0.0, 0.0, 0, np.zeros((2, 4, 3)), np.zeros((1, 6)),
-        np.zeros((0, 1)), np.zeros(1, dtype=bool), one.copy(), np.zeros((1, 2)),
-    )  # fmt: skip
+    chain = Chain(
+        joint, np.zeros((1, 4, 3)), axis, axis, one, one, np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros(1, dtype=bool)
+    )
+    goals = Goals(np.zeros((0, 36)), np.zeros((0, 7), dtype=np.int64), np.zeros((2, 1), dtype=np.int8))
+    unobstructed_kernel.reach(chain, goals, 0.0, 0.0, np.zeros((0, 1)), one.copy(), np.zeros((1, 2)))
     return unobstructed_kernel

@@ -3,69 +3,39 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import solve
-from wholebody.terms.entries import Integers
+from wholebody.methods.qp.rows import Chain, Goals
 from wholebody.terms.residual_kernel import residuals
 
 
 @compiled(error_model="numpy")
-def reach(
-    parents: Indices,
-    places: Array,
-    turns: Array,
-    slides: Array,
-    support: NDArray[np.int8],
-    tables: Array,
-    entries: Integers,
-    lower: Array,
-    upper: Array,
-    tolerance: float,
-    damping: float,
-    most: int,
-    joints: Array,
-    columns: Array,
-    jacobian: Array,
-    free: Mask,
-    q: Array,
-    trace: Array,
-) -> int:
+def reach(chain: Chain, goals: Goals, tolerance: float, damping: float, jacobian: Array, q: Array, trace: Array) -> int:
     """Step from a posture until the errors of the goals are as small as they get, or the steps are used up.
 
     Args:
-        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
-        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
-        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
-        slides: (n, 3) axis that it slides along; zero for one that turns.
-        support: (n + 1, n) 1 where a column moves a joint.
-        tables: (e, 36) floats of the goals, as in `term_entries.RESIDUAL`.
-        entries: (e, 7) their integers.
-        lower: (n,) least values of the joints.
-        upper: (n,) greatest values.
+        chain: what moves.
+        goals: of its joints.
         tolerance: norm of all errors at which the goals are met, metres and radians.
         damping: squared, of a step at the goals.
-        most: steps.
-        joints: (n + 1, 4, 3) room for the placements of the joints; the first is the world's.
-        columns: (n, 6) room for the columns of the joint Jacobian.
-        jacobian: (rows, n) room for the rows of the goals.
-        free: (n,) room.
+        jacobian: (rows, n) becomes the rows of the goals where the last step began.
         q: (n,) where to begin; becomes the answer.
-        trace: (most + 1, 2) written: norm of the errors at each posture, and the longest entry of the step to it.
+        trace: (steps + 1, 2) written: norm of the errors at each posture, and the longest entry of the step to it.
 
     Returns:
         How many postures were looked at; the last one is the answer.
     """
+    lower, upper, free, most = chain.lower, chain.upper, chain.free, len(trace) - 1
     rows, size = jacobian.shape
     wrench, value, right = np.empty((rows, 6)), np.empty(rows), np.empty(rows)
     system, dq = np.empty((rows, rows)), np.empty(size)
     longest = 0.0
     for count in range(most + 1):
-        _place(parents, places, turns, slides, q, joints, columns)
+        _place(chain, q)
         wrench[:] = 0.0
-        residuals(tables, entries, joints, wrench, value)
+        residuals(goals.tables, goals.entries, chain.joints, wrench, value)
         square = 0.0
         for r in range(rows):
             square += value[r] * value[r]
@@ -74,7 +44,7 @@ def reach(
         met = left <= tolerance
         if count == most or left == 0.0 or (met and count and left > 0.5 * trace[count - 1, 0]):
             return count + 1
-        _rows(tables, entries, wrench, support, columns, jacobian)
+        _rows(goals, wrench, chain.columns, jacobian)
         for i in range(size):
             free[i], dq[i] = True, 0.0
         held = True
@@ -114,13 +84,12 @@ def reach(
 
 
 @compiled(inner=True, error_model="numpy")
-def _place(
-    parents: Indices, places: Array, turns: Array, slides: Array, q: Array, joints: Array, columns: Array
-) -> None:
+def _place(chain: Chain, q: Array) -> None:
     """Placements of the joints, and the columns of their Jacobian in the world, linear part at its origin first."""
+    joints, turns, slides = chain.joints, chain.turns, chain.slides
     axis = np.empty(3)
-    for k in range(len(parents)):
-        base, place, joint, column = joints[parents[k]], places[k], joints[k + 1], columns[k]
+    for k in range(len(q)):
+        base, place, joint, column = joints[chain.parents[k]], chain.places[k], joints[k + 1], chain.columns[k]
         for i in range(3):
             joint[3, i] = base[3, i]
             for m in range(3):
@@ -149,14 +118,13 @@ def _place(
 
 
 @compiled(inner=True)
-def _rows(
-    tables: Array, entries: Integers, wrench: Array, support: NDArray[np.int8], columns: Array, jacobian: Array
-) -> None:
+def _rows(goals: Goals, wrench: Array, columns: Array, jacobian: Array) -> None:
     """Rows of the goals: the rates at which their wrenches work on the motion of a joint relative to another."""
-    for e in range(len(tables)):
+    entries = goals.entries
+    for e in range(len(entries)):
         for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
             for k in range(len(columns)):
-                moved = support[entries[e, 1], k] - support[entries[e, 2], k]
+                moved = goals.support[entries[e, 1], k] - goals.support[entries[e, 2], k]
                 jacobian[r, k] = 0.0
                 if moved != 0:
                     for i in range(6):
