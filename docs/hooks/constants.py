@@ -1,4 +1,4 @@
-"""Write the tables of constants of docs/theory/qp.md anew: ``python docs/hooks/constants.py``.
+"""Write the tables of docs/theory/qp_constants.md anew: ``python docs/hooks/constants.py``.
 
 Names and values come from the code. A heading of the section names the modules whose constants stand below it; modules
 of the QP method that no heading names are added. What a constant trades is kept as the page has it; of a new one it is
@@ -12,7 +12,7 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs/theory/qp.md"
+PAGE = ROOT / "docs/theory/qp_constants.md"
 BEGIN, END = "## Constants\n", "\n## Sources\n"
 HEADING = re.compile(r"^### .*?: (?P<modules>`wholebody.*)$")
 ROW = re.compile(r"^\| `(?P<name>[A-Z_]+)` \| .*? \| (?P<text>.*) \|$")
