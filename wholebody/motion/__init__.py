@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from wholebody.motion.bones import bone_errors
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip_torques import Torques, torques
-    from wholebody.motion.fade import Fade
     from wholebody.motion.judging import AvoidanceReport, Avoided
     from wholebody.motion.measures import MotionBounds
     from wholebody.motion.per_frame import PerFrame
@@ -32,7 +31,6 @@ __all__ = [
     "Bisection",
     "ClipCheck",
     "Equipment",
-    "Fade",
     "MotionBounds",
     "PerFrame",
     "SkeletonMotion",
@@ -58,7 +56,6 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.bones": "bone_errors",
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
-        "wholebody.motion.fade": "Fade",
         "wholebody.motion.measures": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",

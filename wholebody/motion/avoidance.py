@@ -41,7 +41,6 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
         "frames": ("wholebody.motion.per_frame", "PerFrame"),
         "bisection": ("wholebody.motion.bisection.method", "Bisection"),
-        "fade": ("wholebody.motion.fade", "Fade"),
     }
 )
 """Methods by name: module and class of the settings."""
@@ -97,7 +96,7 @@ def avoid(
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "fade", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
+        method: "trajectory", "frames", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless

@@ -23,8 +23,6 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.motion.trajectory.banded_program import BandedQP
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.windows import Window, windows
 from wholebody.scene.scene import Scene
@@ -156,6 +154,8 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     """
     import scipy.sparse as sp
 
+    from wholebody.motion.trajectory.interior_point import BandedQP, minimise
+
     count = len(window)
     seams = window.first > 0, window.end < len(q)
     bands = Objective(count, np.ones(3), 0.1, dt, seams).bands  # tau is 0.1 s
@@ -164,7 +164,6 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + 100.0 * across)  # c is 100
     shifts = np.zeros((count, 3))
     places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]
-    _, solve = banded_solver(None)
     for _ in range(8):  # the normals turn less each time
         rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
         if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
@@ -172,7 +171,7 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
         G = sp.vstack([sp.csr_matrix(_over_frames(row, count)) for row in rows], format="csc")
         lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
         most = np.full(3 * count, 0.05)  # m: what needs a larger shift is no grip, and stays as it is
-        answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
+        answer = minimise(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
         if not answer.solved:
             return None
         shifts = answer.z.reshape(count, 3)

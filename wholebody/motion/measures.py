@@ -19,7 +19,6 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure
 from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import paths, standing_points
@@ -102,56 +101,6 @@ def foot_sliding(before: Clip, after: Clip) -> float:
     return most
 
 
-def hand_error(before: Clip, after: Clip, hand: str, other: str) -> float:
-    """By how much a hand leaves its place in the frame of the other one, which holds a weapon: metres.
-
-    Args:
-        before: the clip in which both hands hold it.
-        after: the clip that was made from it.
-        hand: frame that holds the weapon firmly.
-        other: frame of the other hand.
-
-    Returns:
-        The greatest change of the position of the other hand, in the axes of the first, in any frame.
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: two clips of different figures or lengths.
-    """
-    _same(before, after, "hand_error")
-    ids = before.figure.frame_id(hand), before.figure.frame_id(other)
-    held = [_relative(clip.figure, clip.q, *ids) for clip in (before, after)]
-    return float(np.linalg.norm(held[0] - held[1], axis=1).max())
-
-
-def hand_off_weapon(before: Clip, after: Clip, hand: str, other: str) -> float:
-    """By how much a hand leaves a straight weapon that both hands hold, along which it may slide: metres.
-
-    The weapon lies along the line between both frames in each posture of the clip before.
-
-    Args:
-        before: the clip in which both hands hold it.
-        after: the clip that was made from it.
-        hand: frame that holds the weapon firmly.
-        other: frame of the other hand.
-
-    Returns:
-        The greatest distance by which the change of the other hand's position leaves that line, in any frame.
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: two clips of different figures or lengths.
-    """
-    _same(before, after, "hand_off_weapon")
-    ids = before.figure.frame_id(hand), before.figure.frame_id(other)
-    held, now = (_relative(clip.figure, clip.q, *ids) for clip in (before, after))
-    length = np.linalg.norm(held, axis=1, keepdims=True)
-    line = np.divide(held, length, out=np.zeros_like(held), where=length > 0.0)
-    change = now - held
-    off = change - (change * line).sum(axis=1, keepdims=True) * line
-    return float(np.linalg.norm(off, axis=1).max())
-
-
 def _centres(clip: Clip) -> Array:
     """(n, njoints - 1, 3) centres of the joints in the world, metres."""
     model, data = clip.figure.model, clip.figure.model.createData()
@@ -159,16 +108,6 @@ def _centres(clip: Clip) -> Array:
     for k, q in enumerate(clip.q):
         pin.forwardKinematics(model, data, q)
         found[k] = [place.translation for place in data.oMi.tolist()[1:]]
-    return found
-
-
-def _relative(figure: Figure, q: Array, first: int, second: int) -> Array:
-    """(n, 3) position of the second frame in the axes of the first."""
-    data, found = figure.model.createData(), np.zeros((len(q), 3))
-    for k, posture in enumerate(q):
-        pin.forwardKinematics(figure.model, data, posture)
-        base = pin.SE3(pin.updateFramePlacement(figure.model, data, first))
-        found[k] = base.actInv(pin.updateFramePlacement(figure.model, data, second)).translation
     return found
 
 

@@ -34,7 +34,7 @@ CASES: tuple[Case, ...] = (
 )
 USED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(
-        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.banded_qp"),
+        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.interior_point"),
         ("trajectory",),
     ),
     "bisection.prediction": ("bisection",),

@@ -16,8 +16,6 @@ from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.soles import standing_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
 from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
@@ -39,8 +37,6 @@ class Trajectory:
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
             brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s.
         margin: seconds before and after a collision in which frames may be changed.
-        solver: of the quadratic programs: "banded", which is the package's own and the fastest, "piqp", "osqp", or None
-            for "banded".
         iterations: most steps of one run of a window; a step takes one to three quadratic programs.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
@@ -50,14 +46,11 @@ class Trajectory:
 
     Raises:
         InputError: a value out of range.
-        UnknownNameError: there is no such solver.
-        MissingPackageError: the solver is not installed.
     """
 
     clearance: float = 0.0
     time: float | None = None
     margin: float = 0.5
-    solver: str | None = None
     iterations: int = 40
     stretch: float = 1.0
     dynamics: Strength | None = None
@@ -72,36 +65,31 @@ class Trajectory:
         checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
-        banded_solver(self.solver)
 
     @property
     def name(self) -> str:
         """Name for tables."""
-        return "trajectory" if self.solver is None else f"trajectory/{self.solver}"
+        return "trajectory"
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
-        _, solve = banded_solver(self.solver)
         loads, q = None, run.terms.q
         if self.dynamics is not None:
             clip = Clip(run.scene.figure, q, run.terms.dt)
             loads = ClipLoads.original(clip, standing_feet(clip, run.feet), self.dynamics, run.terms, self.stretch)
-        freed, missed = self._freed(run, solve, run.terms.q, loads, self.stretch)
-        new = None if run.ended else self._timing(freed, run.terms, solve, loads)
+        freed, missed = self._freed(run, run.terms.q, loads, self.stretch)
+        new = None if run.ended else self._timing(freed, run.terms, loads)
         if new is None:
-            return MethodResult(self._measured(run, solve, q, freed, loads, self.stretch), message="; ".join(missed))
+            return MethodResult(self._measured(run, q, freed, loads, self.stretch), message="; ".join(missed))
         # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
         slower = run.of(run.terms.at(new.times))
         passed = between(run.scene.model, freed, new.times / run.terms.dt)
         loads = None if loads is None else loads.of(passed, new.times)
-        q, left = self._freed(slower, solve, passed, loads, 1.0, None if loads is None else loads.beyond())
-        q = self._measured(slower, solve, passed, q, loads, 1.0)
+        q, left = self._freed(slower, passed, loads, 1.0, None if loads is None else loads.beyond())
+        q = self._measured(slower, passed, q, loads, 1.0)
         return MethodResult(q, message="; ".join((*missed, *left)), times=new.times, stretch=new.largest)
 
-    def _measured(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, q: Array, loads: ClipLoads | None,
-        rate: float,
-    ) -> Array:  # fmt: skip
+    def _measured(self, run: Run, reference: Array, q: Array, loads: ClipLoads | None, rate: float) -> Array:
         """Postures whose loads keep to their bounds as `torques` measures them, as far as a few corrections get.
 
         Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
@@ -109,7 +97,6 @@ class Trajectory:
 
         Args:
             run: of the reference.
-            solve: solves one program.
             reference: (n, nq) postures that deviations are from.
             q: (n, nq) free postures.
             loads: of the reference; None where they are not looked at.
@@ -126,7 +113,7 @@ class Trajectory:
             beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
             if not beyond.any() or not times or run.ended:
                 break
-            windows = ClipRun(run, solve, reference, times[0], self.iterations, rate, corrected)
+            windows = ClipRun(run, reference, times[0], self.iterations, rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in run.windows(changed, self.margin):
@@ -143,14 +130,13 @@ class Trajectory:
         return q
 
     def _freed(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, loads: ClipLoads | None, rate: float,
-        beyond: Mask | None = None,
-    ) -> tuple[Array, list[str]]:  # fmt: skip
+        self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
+    ) -> tuple[Array, list[str]]:
         """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
 
         Frames (n,) that are beyond something else are changed too.
         """
-        windows = ClipRun(run, solve, reference, self.time, self.iterations, rate, loads)
+        windows = ClipRun(run, reference, self.time, self.iterations, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)
@@ -201,9 +187,7 @@ class Trajectory:
                 return wider, again
         return window, freed
 
-    def _timing(
-        self, q: Array, terms: FrameTerms, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None
-    ) -> Timing | None:
+    def _timing(self, q: Array, terms: FrameTerms, loads: ClipLoads | None) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""
         stretch = allowance(len(q), self.stretch)
         if stretch <= 1.0 or len(q) < 2:
@@ -212,9 +196,9 @@ class Trajectory:
         steps = np.array([pin.difference(model, q[gap], q[gap + 1]) for gap in gaps])
         slowest, fastest = (np.array(bounds) for bounds in zip(*map(terms.step_bounds, gaps), strict=True))
         most = speed_bounds(steps, slowest, fastest)
-        b = slowed(most, terms.dt, stretch, solve)
+        b = slowed(most, terms.dt, stretch)
         if loads is not None:
             path = loads.of(q)
             for _ in range(3):  # the ground's forces are split as the timing before makes them
-                b = slowed(most, terms.dt, stretch, solve, path.timed(b))
+                b = slowed(most, terms.dt, stretch, path.timed(b))
         return timing(b, terms.dt)

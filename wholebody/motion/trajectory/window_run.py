@@ -21,7 +21,6 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.faults import FEW, Faults, depths_between, dipping, dips, sampled_dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import PASSED, followed, kept_beside
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
@@ -121,21 +120,20 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, time: float | None,
-        iterations: int = 40, rate: float = 1.0, loads: ClipLoads | None = None,
+        self, run: Run, reference: Array, time: float | None, iterations: int = 40, rate: float = 1.0,
+        loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
         Args:
             run: of the clip.
-            solve: solves one program.
             reference: (n, nq) postures that the deviations are from.
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
             iterations: most steps of one run.
             rate: factor of the speed limits, for a clip that will be slowed by as much.
             loads: of the reference postures, if they are to keep to their bounds.
         """
-        self._run, self._solve, self._reference = run, solve, reference
+        self._run, self._reference = run, reference
         self._time, self._iterations, self._rate, self._loads = time, iterations, rate, loads
 
     def kept_back(self, window: Window, q: Array) -> Iterable[tuple[Array, Mask]]:
@@ -261,7 +259,7 @@ class ClipRun:
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
         work = self._run.work
-        program = WindowProgram(own.evaluator, objective, own.limits, self._solve, self._iterations)
+        program = WindowProgram(own.evaluator, objective, own.limits, self._iterations)
         program.add(begun.between)
         x, radius, dipped, near = begun.x, way.radius, set[int](), list[Node]()
 
