@@ -7,6 +7,7 @@ judges the answer. So a method has no judge, repair or report of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
@@ -160,6 +161,6 @@ class Avoider(Protocol):
         """
 
 
-def has_setting(method: Avoider, name: str) -> bool:
+def has_setting(method: object, name: str) -> bool:
     """Whether a method has a setting of a name, such as "dynamics", so that `dataclasses.replace` changes it."""
-    return name in getattr(method, "__dataclass_fields__", {})
+    return is_dataclass(method) and name in {each.name for each in fields(method)}

@@ -37,7 +37,7 @@ USED: dict[str, tuple[str, ...]] = {
         ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.interior_point"),
         ("trajectory",),
     ),
-    "bisection.prediction": ("bisection",),
+    **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),
     "repair": ("bisection", "frames"),
     **dict.fromkeys(("one_side", "faults", "stance"), ("trajectory", "bisection", "frames")),
 }

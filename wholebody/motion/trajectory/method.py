@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -48,6 +49,8 @@ class Trajectory:
         InputError: a value out of range.
     """
 
+    name: ClassVar[str] = "trajectory"
+
     clearance: float = 0.0
     time: float | None = None
     margin: float = 0.5
@@ -65,11 +68,6 @@ class Trajectory:
         checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
-
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "trajectory"
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
