@@ -125,23 +125,9 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-SPAN = 0.5
-"""Seconds over which jerk and speed are compared: a tenth of it would compare single frames, and the whole clip would
-hide a jump of one frame among many calm ones."""
-
-TURN, TIME = 1.0, 0.5
-"""Radians and seconds of a plain movement of one joint. Where the original is calmer than it, the new motion may be as
-fast as this movement, which has the least jerk of all of its size and duration (Flash and Hogan 1985, Journal of
-Neuroscience 5(7): 1688)."""
-
-PLAIN_SPEED = 15.0 / 8.0 * TURN / TIME
-"""Largest speed of that movement, rad/s."""
-
-PLAIN_JERK = math.sqrt(720.0) * TURN / TIME**3
-"""Root mean square jerk of that movement, rad/s^3."""
-
-LARGEST = 1e6  # times; rad, m
-ROUNDING = 1e-6  # times, rad, m: by which a bound may be exceeded
+PLAIN_SPEED, PLAIN_JERK = 15.0 / 8.0 / 0.5, math.sqrt(720.0) / 0.5**3
+"""Largest speed (rad/s) and root mean square jerk (rad/s^3) of a turn by 1 rad in 0.5 s with the least jerk (Flash and
+Hogan 1985, Journal of Neuroscience 5(7): 1688). Where the original is calmer, the new motion may be as fast."""
 
 
 @dataclass(frozen=True)
@@ -175,7 +161,7 @@ class MotionBounds:
         """Check the values."""
         for name, least in (("jerk", 1.0), ("speed", 1.0), ("deviation", 0.0)):
             if getattr(self, name) is not None:
-                checks.number(getattr(self, name), f"MotionBounds: {name}", least, LARGEST)
+                checks.number(getattr(self, name), f"MotionBounds: {name}", least, 1e6)
         checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
         checks.flag(self.keep_ends, "MotionBounds: keep_ends")
 
@@ -233,7 +219,7 @@ def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
         beyond[first : first + 4] = True
     for first in np.flatnonzero(fast).tolist():
         beyond[first : first + 2] = True
-    far = ~(away <= largest + ROUNDING)
+    far = ~(away <= largest + 1e-6)
     beyond |= far
     for name, ratio, marks, most in (("jerk", jerk, rough, bounds.jerk), ("speed", speed, fast, bounds.speed)):
         if marks.any():
@@ -251,11 +237,11 @@ def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
 
 def _beyond(ratio: Array, most: float | None) -> Mask:
     """Which ratios are not within a bound; NaN is not."""
-    return np.zeros(len(ratio), dtype=bool) if most is None else ~(ratio <= most + ROUNDING)
+    return np.zeros(len(ratio), dtype=bool) if most is None else ~(ratio <= most + 1e-6)
 
 
 def _jerk_ratios(before: Clip, after: Clip) -> Array:
-    """(n - 3,) jerk over `SPAN`, in parts of the original's there, of its whole clip, or of a plain movement."""
+    """(n - 3,) jerk over half a second, in parts of the original's there, of its whole clip, or of a plain movement."""
     model, dt = before.figure.model, before.dt
     old, new = (third_differences(model, clip.q, dt) for clip in (before, after))
     found = np.zeros(len(old))
@@ -284,7 +270,7 @@ def _parts(clip: Clip) -> tuple[slice, ...]:
 
 
 def _mean_near(values: Array, dt: float) -> Array:
-    """(k,) the mean of values (k,) within half of `SPAN` on both sides."""
+    """(k,) the mean of values (k,) within 0.25 s on both sides."""
     reach = _reach(dt)
     sums = np.concatenate([[0.0], np.cumsum(values)])
     places = np.arange(len(values))
@@ -294,7 +280,7 @@ def _mean_near(values: Array, dt: float) -> Array:
 
 
 def _largest_near(values: Array, dt: float) -> Array:
-    """(k,) the largest of values (k,) within half of `SPAN` on both sides."""
+    """(k,) the largest of values (k,) within 0.25 s on both sides."""
     reach = _reach(dt)
     near = sliding_window_view(np.pad(values, reach), 2 * reach + 1)
     found: Array = near.max(axis=1)[: len(values)]
@@ -302,5 +288,5 @@ def _largest_near(values: Array, dt: float) -> Array:
 
 
 def _reach(dt: float) -> int:
-    """Half of `SPAN` in frames."""
-    return max(1, round(0.5 * SPAN / dt))
+    """0.25 s in frames: single frames say little, and the whole clip would hide a jump among many calm frames."""
+    return max(1, round(0.25 / dt))
