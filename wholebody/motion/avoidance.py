@@ -29,8 +29,7 @@ from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
 from wholebody.motion.measures import MotionBounds, resolved
-from wholebody.motion.soles import usual_feet
-from wholebody.motion.stance import StanceFeet, has_feet
+from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze

@@ -1,8 +1,8 @@
 """Postures that bring points and frames of a figure nearest to given ones: Levenberg-Marquardt within hard limits.
 
-`Fitter.fit` does so for one frame, `smooth` for all frames of a motion with their accelerations. Each step for a frame is
-a quadratic program: least squares of the linearised errors, subject to the joint limits and to the reach cones to first
-order. Limits hold exactly, cones to second order of the last step; a step that leaves one further than it was is refused.
+`Fitter.fit` does so for one frame, `smooth` for all frames of a motion with their accelerations. A step of a frame is a
+quadratic program: least squares of the linearised errors, subject to joint limits and to reach cones to first order.
+Limits hold exactly, cones to second order of the last step; a step that leaves a cone further than before is refused.
 """
 
 from __future__ import annotations

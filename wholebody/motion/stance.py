@@ -7,7 +7,7 @@ until its last one is up, gets one horizontal shift. Feet that do not overlap ge
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -23,6 +23,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
+from wholebody.motion.clip import Clip
 from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.tasks import Hold
 
@@ -118,6 +119,39 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     return found
 
 
+def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]:
+    """The segments on which a figure with a free root stands, or else the frames that `StanceFeet` among terms name."""
+    if figure.root != "free":
+        return ()
+    found = tuple(name for name in FEET if name in figure.segments)
+    given = [term for term in constraints if isinstance(term, StanceFeet) and term.feet is not None]
+    return found or tuple(name for term in given for name in term.names(figure))
+
+
+def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
+    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed.
+
+    Raises:
+        InputError: no feet are named.
+    """
+    figure = clip.figure
+    found: dict[str, Mask] = {}
+    if figure.root != "free":
+        return found
+    for name in feet:
+        joint = figure.model.frames[figure.frame_id(name)].parentJoint
+        points = tuple(
+            point
+            for point in foot_points(figure)
+            if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
+        )
+        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
+        found[name] = np.any(list(marks.values()), axis=0)
+    if not found:
+        raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
+    return found
+
+
 def held_feet(figure: Figure, stand: Sequence[str]) -> tuple[Hold, ...]:
     """What holds the feet of which some frames stand; a term that is not resolved keeps what is at the start.
 
@@ -138,10 +172,6 @@ def speeds(places: Array, dt: float) -> Array:
     if len(places) < 2:
         return np.zeros(places.shape[:-1])
     return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
-
-
-APART = 1e-3
-"""Metres that feet are apart after their shift: room for their rows to be met."""
 
 
 class _Foot:
@@ -227,12 +257,12 @@ def _push(first: _Foot, second: _Foot, frames: Sequence[dict[str, pin.SE3]], bef
     if not np.linalg.norm(apart) > 0.0:
         return np.zeros(3)
     way = apart / np.linalg.norm(apart)
-    far = 0.0
+    far, apart_by = 0.0, 1e-3  # m: room for the rows of feet that were shifted
     for _ in range(20):
         least = min(_distance(first, second, each, before + far * way) for each in frames)
-        if least >= (APART if far else 0.0):
+        if least >= (apart_by if far else 0.0):
             break
-        far += max(APART - least, 1e-4)
+        far += max(apart_by - least, 1e-4)
     found: Array = far * way
     return found
 

@@ -259,8 +259,6 @@ def test_an_arm_straight_out_to_the_side_keeps_its_angles(
     ending: str, middle: int, human: Figure, tmp_path: Path
 ) -> None:
     """There the first and the third angle of a shoulder turn about one axis; so do those of the file's elbow."""
-    if ending == "bvh":
-        pytest.importorskip("pybvh")
     ways = np.radians(90.0 + 6.0 * (np.arange(9.0) - middle))
     q = np.array(
         [
@@ -462,7 +460,6 @@ def test_csv_of_other_columns_is_refused_with_its_line(human: Figure, tmp_path: 
 
 def test_a_rest_posture_that_turns_some_joints_is_left_out(tmp_path: Path) -> None:
     """As CMU's converted files have it: some joints turn by whole degrees, and the motion begins with a jump."""
-    pytest.importorskip("pybvh")
     header = ["HIERARCHY", "ROOT a", "{", "OFFSET 0 0 0"]
     header += ["CHANNELS 6 Xposition Yposition Zposition Zrotation Xrotation Yrotation"]
     for name in "bcdefg":

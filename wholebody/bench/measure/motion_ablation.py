@@ -34,7 +34,7 @@ CASES: tuple[Case, ...] = (
 )
 USED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(
-        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.interior_point"),
+        (f"trajectory.{name}" for name in ("window_run", "sqp", "program", "nodes", "interior_point")),
         ("trajectory",),
     ),
     **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),

@@ -1,7 +1,4 @@
-"""The text of a BVH file: joints, channels and numbers, every fault with its line.
-
-pybvh says no lines of faults in the motion, and refuses joints with positions or with less than three rotations.
-"""
+"""The text of a BVH file: joints, channels and numbers, every fault with its line."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
-from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
