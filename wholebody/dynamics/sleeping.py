@@ -11,10 +11,8 @@ from wholebody.dynamics.pieces import ContactFinder
 from wholebody.geometry.proximity import Contacts
 
 STILL, AFTER = 5e-3, 0.5  # m/s of every point of a body, and s that an island is so slow before it sleeps
-TOUCHING, MOVED = (
-    1e-3,
-    3e-5,
-)  # m: nearer bodies wake each other; by which what touches a sleeper wakes it, less than a gap
+TOUCHING = 1e-3  # m: nearer bodies wake each other
+MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap at which bodies rest
 
 
 class Sleepers:

@@ -100,10 +100,10 @@ def test_the_report_has_every_method_and_every_case(tmp_path: Path) -> None:
     rows = [
         base,
         dataclasses.replace(base, method="trajectory", angle=0.06, jerk=1.1, seconds=3.0, programs=12),
-        dataclasses.replace(base, method="bisection", outcome="left", after=3, deepest_mm=2.0, seconds=0.2),
+        dataclasses.replace(base, method="frames", outcome="left", after=3, deepest_mm=2.0, seconds=0.2),
         dataclasses.replace(base, method=CHECKED, seconds=0.1, outcome="left"),
     ]
-    one, other = (next(row for row in motion.summary(rows) if row.tool == name) for name in ("trajectory", "bisection"))
+    one, other = (next(row for row in motion.summary(rows) if row.tool == name) for name in ("trajectory", "frames"))
     assert (one["free"], one["deviation rad, median"], one["s a second of motion, median"]) == ("1 of 1", 0.06, 1.5)
     assert (other["free"], other["deepest, most mm"]) == ("0 of 1", 2.0)
     text = motion.motion_report(rows, {"wholebody": "0"})
