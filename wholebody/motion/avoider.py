@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, Protocol
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, faults
-from wholebody.motion.following import Follower, Work, freed_posture
+from wholebody.motion.following import Follower, Work
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.strength import Strength
 from wholebody.motion.windows import Window, windows
@@ -111,10 +111,6 @@ class Run:
     def windows(self, marked: Mask, seconds: float, least: int = 3) -> list[Window]:
         """Windows around marked frames (n,), with so many seconds and at least so many frames on both sides."""
         return windows(marked, self.frames(seconds, least))
-
-    def freed_posture(self, frame: int, q: Array) -> Array:
-        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap."""
-        return freed_posture(self.terms, frame, q, self.clearance, self.work)
 
 
 class MethodResult(NamedTuple):

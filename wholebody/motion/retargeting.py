@@ -18,6 +18,7 @@ from wholebody.motion.posture_fit import Fitter, Goals, smooth
 from wholebody.motion.retarget_targets import Footfalls, Targets, footfalls, has_trunk, targets
 from wholebody.motion.roles import Roles, matched
 from wholebody.motion.skeleton import SkeletonMotion, checked_motion
+from wholebody.motion.stance import paths
 from wholebody.tracking.tracks import check_figure
 
 POINTS = {"hip": 1.0, "knee": 1.0, "ankle": 2.0, "toe": 1.0, "shoulder": 1.0, "elbow": 1.0, "wrist": 1.5, "hand": 0.5,
@@ -106,13 +107,9 @@ def bone_errors(
 
 def errors_of(motion: SkeletonMotion, clip: Clip, roles: Roles) -> dict[str, Array]:
     """`bone_errors` with known roles."""
-    model, data = clip.figure.model, clip.figure.model.createData()
-    frames = {role: clip.figure.frame_id(frame) for role, frame in roles.frames.items()}
-    places = {role: np.empty((len(clip), 3)) for role in frames}
-    for k, q in enumerate(clip.q):
-        pin.framesForwardKinematics(model, data, q)
-        for role, frame in frames.items():
-            places[role][k] = data.oMf[frame].translation
+    places = dict(
+        zip(roles.frames, paths(clip.figure, clip.q, tuple(roles.frames.values())).swapaxes(0, 1), strict=True)
+    )
     found = {}
     for side in ("left", "right"):
         for limb in (("shoulder", "elbow", "wrist", "hand"), ("hip", "knee", "ankle", "toe")):

@@ -21,7 +21,6 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.motion.clip import Clip
 from wholebody.motion.windows import Window, long_runs, runs
@@ -103,11 +102,7 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     """
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
-    state = State(figure.model)
-    places = np.empty((len(q), len(names), 3))
-    for frame, posture in enumerate(q):
-        state.update(posture)
-        places[frame] = [state.frame(figure.frame_id(name)).translation for name in names]
+    places = paths(figure, q, names)
     speed = speeds(places, dt)
     shortest = max(1, round(settings.least / dt))
     found = {}
