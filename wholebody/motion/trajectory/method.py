@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,13 +12,12 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
+from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
 CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
@@ -88,20 +86,10 @@ class Trajectory:
         return MethodResult(q, message="; ".join((*missed, *left)), times=new.times, stretch=new.largest)
 
     def _measured(self, run: Run, reference: Array, q: Array, loads: ClipLoads | None, rate: float) -> Array:
-        """Postures whose loads keep to their bounds as `torques` measures them, as far as a few corrections get.
+        """The best postures (n, nq) whose loads keep to their bounds as `torques` measures them, from free ones q.
 
         Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
-        what is beyond its bounds are computed again.
-
-        Args:
-            run: of the reference.
-            reference: (n, nq) postures that deviations are from.
-            q: (n, nq) free postures.
-            loads: of the reference; None where they are not looked at.
-            rate: factor of the speed limits.
-
-        Returns:
-            (n, nq) the best postures that were found.
+        what is beyond its bounds are computed again. `rate` is the factor of the speed limits.
         """
         if loads is None:
             return q
@@ -147,7 +135,7 @@ class Trajectory:
             freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
             if freed.missed and not run.ended:
-                window, freed = self._kept_back(run, windows, window, freed, q, faults, told)
+                window, freed = windows.kept_back(window, freed, q, faults, told, self.margin)
                 q[window.first : window.end] = freed.q
                 found = [other for other in found if not window.first <= other.first < window.end]
                 missed = {other: said for other, said in missed.items() if not window.first <= other.first < window.end}
@@ -157,33 +145,6 @@ class Trajectory:
                 missed[window] = f"frames {window.first} to {window.end - 1}: {freed.missed}"
             done += len(window)
         return q, list(missed.values())
-
-    def _kept_back(
-        self, run: Run, windows: ClipRun, window: Window, freed: WindowResult, q: Array, faults: Faults,
-        told: Callable[[float], bool],
-    ) -> tuple[Window, WindowResult]:  # fmt: skip
-        """A window that was not freed once more, on one side of what it passes for good.
-
-        A limb that passes through a thin thing and comes back much later, or never, has to stay where it is until then.
-        So the window is made as long as that, whatever windows lie in it.
-
-        Args:
-            run: of the clip.
-            windows: frees them.
-            window: that was not freed.
-            freed: what was found for it.
-            q: (n, nq) postures of the clip, with these.
-            faults: of the reference.
-            told: told the share done.
-        """
-        for kept, changed in windows.kept_back(window, q):
-            changed[window.first : window.end] = True
-            marked = run.windows(changed, self.margin)
-            wider = next(one for one in marked if one.first <= window.first < one.end)
-            again = windows.window(wider, faults, told, kept[wider.first : wider.end])
-            if not again.missed:
-                return wider, again
-        return window, freed
 
     def _timing(self, q: Array, terms: FrameTerms, loads: ClipLoads | None) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""
