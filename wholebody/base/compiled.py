@@ -22,7 +22,7 @@ TOGETHER = (
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.loops",),
+    ("wholebody.dynamics.step_program",),
     ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
