@@ -24,7 +24,7 @@ TOGETHER = (
         "wholebody.methods.qp.subproblem",
     ),
     ("wholebody.dynamics.loops",),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.unobstructed"),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",
