@@ -34,7 +34,7 @@ from wholebody.view.page import live_page, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender, seconds
-from wholebody.view.server import ANIMATION, CAMERA, Command
+from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
@@ -335,7 +335,7 @@ class Viewer:
         """
         legend = checks.flag(legend, "legend")
         place = checked_target(path, "picture: path", "a picture", (".png",))
-        wanted = [command for command in self._commands() if command.op != ANIMATION]
+        wanted = [command for command in self._commands() if command.op != Op.ANIMATION]
         return write(place, self._screenshots.picture(wanted, size, legend=legend))
 
     def movie(
@@ -397,4 +397,6 @@ class Viewer:
         """Commands that draw the whole picture, with the camera on the present figure."""
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
-        return [self._camera_command() if command.op == CAMERA else command for command in self._graph.store.commands()]
+        return [
+            self._camera_command() if command.op == Op.CAMERA else command for command in self._graph.store.commands()
+        ]
