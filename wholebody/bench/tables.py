@@ -42,8 +42,10 @@ def machine() -> dict[str, str]:
 
 
 def sentence(facts: Mapping[str, str]) -> str:
-    """Say the facts in one paragraph of Markdown."""
-    return "Measured with " + "; ".join(f"{name} {value}" for name, value in facts.items()) + "."
+    """The facts in one sentence of Markdown, without the system and the versions of packages: CSV files have these."""
+    kept = "wholebody", "processor", "cores", "load", "OMP_NUM_THREADS"
+    told = [f"{name} {value}" for name, value in facts.items() if name in kept]
+    return f"Measured with {'; '.join(told)}."
 
 
 def _processor() -> str:

@@ -87,6 +87,6 @@ def test_the_command_writes_the_same_tables(tmp_path: Path, root: Path) -> None:
     rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
     assert [row["case"] for row in rows] == ["arm, free", "arm, contact", "arm, alone"]
     page = (tmp_path / "results.md").read_text()
-    assert "### arm, contact: result" in page
+    assert "| arm, contact | wholebody |" in page
     assert "standing human" not in page
     assert "does not take" not in page

@@ -109,7 +109,7 @@ def test_the_report_has_every_method_and_every_case(tmp_path: Path) -> None:
     assert (one["free"], one["deviation rad, median"], one["s a second of motion, median"]) == ("1 of 1", 0.06, 1.5)
     assert (fade["free"], fade["deepest, most mm"]) == ("0 of 1", 2.0)
     text = motion.motion_report(rows, {"wholebody": "0"})
-    assert "| walk, pack | trajectory | 60 | free |" in text
+    assert "| all clips | trajectory | 1 of 1 |" in text
     assert "nan" not in text
     drawn = motion.panels(rows)
     assert {label for panel in drawn for label in panel.lines} == {"bisection", "trajectory"}

@@ -211,7 +211,7 @@ def summary(rows: Sequence[Row]) -> list[Row]:
 
 
 def motion_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
-    """The tables as Markdown."""
+    """The table as Markdown; the CSV file has every case."""
     about = (
         "Clips of a person at 30 Hz, each with each piece of equipment. Every frame is judged by all pairs, and every "
         "motion between frames by sweeps (`wb.check`), whatever made it. Free: no frame and no motion deeper than 0.1 "
@@ -220,12 +220,9 @@ def motion_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
         "Sliding: by how much standing feet slide more than before. Times are the processor's; a method's includes "
         "its own report."
     )  # fmt: skip
-    listed = [
-        Row(row.case, row.tool, {name: row[name] for name in row.figures if name != "said"}) for row in _answered(rows)
-    ]
     missing = [row for row in rows if row not in _answered(rows)]
     notes = [f"{row.case}, {row.tool}: {row['outcome']} ({row['said']})" for row in missing]
-    return report(about, {"Methods": summary(rows), "Every case": listed}, facts, notes)
+    return report(about, {"": summary(rows)}, facts, notes)
 
 
 def panels(rows: Sequence[Row]) -> list[Panel]:

@@ -198,7 +198,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
         "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
         "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
-        "arms without contacts first": (qp, "unobstructed", lambda *given: None),
+        "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
         "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),

@@ -45,7 +45,7 @@ def stability(arguments: argparse.Namespace) -> None:
     facts, cells = machine(), _asked([(case, adapter) for case in chosen for adapter in asked], arguments.jobs)
     found = result(chosen, [adapter.name for adapter in asked], cells)
     _print(found)
-    rows, text = found.rows, report(found, asked, facts)
+    rows, text = found.rows, report(found, facts)
     charts = {"stability": Chart(partial(matrix, found), "Cases by methods: a colour and a sign a cell")}
     publish(
         "stability",

@@ -144,22 +144,22 @@ def publish(
 
 
 def _to_docs(given: Material, charts: Mapping[str, Path], docs: Path) -> None:
-    """Write the report below a heading of the page of results, with its charts and its lock file beside."""
-    text = re.sub(r"(?m)^#", "##", as_markdown(given, "assets/bench"))
-    replace_section(docs / "results.md", "compare", text)
+    """Write the short report into the page of results, with its charts and its lock file beside."""
+    replace_section(docs / "results.md", "compare", as_markdown(given, "assets/bench", "compare_page.md"))
     assets = docs / "assets" / "bench"
     write_lock(assets / f"compare-{LOCK}", locked(given))
     for svg in charts.values():
         shutil.copyfile(svg, assets / svg.name)
 
 
-def as_markdown(given: Material, charts: str) -> str:
-    """The report as Markdown; `charts` is the folder of the charts."""
-    results = given.results
+def as_markdown(given: Material, charts: str, template: str = "compare.md") -> str:
+    """The report as Markdown; `charts` is the folder of the charts, "compare_page.md" the template of the docs."""
+    results, ranked = given.results, standings(given.results, given.rows)
+    kinds = {re.split(r"[/,+ ]", one.method)[0]: one.method for one in reversed(ranked)}
     return render(
-        "compare.md",
+        template, kinds=list(kinds.values())[::-1], cells={(row.set, row.method): row for row in given.rows},
         given=given, charts=charts, advice=advice(results, given.rows), picked=choices(results, given.rows),
-        ranked=standings(results, given.rows), reference=reference(results), named=named, chart=chart_name,
+        ranked=ranked, reference=reference(results), named=named, chart=chart_name,
         groups=groups(results.adapters), counts=[row.cases for row in given.rows],
         left_out=left_out(given.settings, given.chunks, given.rows), kernel=kernel_of(given.chunks),
         good=GOOD, coarse=COARSE, floor=FLOOR, tolerance=DEFAULT[0],
