@@ -155,7 +155,7 @@ def chart(panels: Sequence[Panel], path: Path, columns: int = 3) -> tuple[Path, 
             color = plot_style.method_style(label).color
             (labels[label],) = axis.plot(x, y, color=color, marker=panel.marker, markersize=4, linewidth=1.3)
         for level in panel.levels:
-            axis.axhline(level, color=plot_style.GREY, linewidth=0.9, linestyle="--")
+            axis.axhline(level, color="#666666", linewidth=0.9, linestyle="--")
         if "x" in panel.log:
             plot_style.plain_log(axis)
         if "y" in panel.log:

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from wholebody.figures.figure import Figure as Body
     from wholebody.scene.scene import Scene
 
-LONGEST = 300.0  # s: after which a description is given up
-
 
 def examine(path: str, reaches: int) -> dict[str, Figure]:
     """Load a description, and make some reaches (0 loads only); "refused" alone where it is refused."""
@@ -131,11 +129,12 @@ def measure(folder: Path, reaches: int) -> Iterator[Row]:
 
 
 def _examined(path: Path, reaches: int, cache: str) -> dict[str, Figure]:
+    longest = 300.0  # s: after which a description is given up
     child = Child({VARIABLE: cache, "OMP_NUM_THREADS": "1"})
     try:
-        found: dict[str, Figure] = child.call(examine, str(path), reaches, seconds=LONGEST)
+        found: dict[str, Figure] = child.call(examine, str(path), reaches, seconds=longest)
     except EndedError as error:
-        return {"refused": f"it takes more than {LONGEST:g} s" if error.overtime else str(error)}
+        return {"refused": f"it takes more than {longest:g} s" if error.overtime else str(error)}
     finally:
         child.close()
     return found

@@ -9,8 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.measure import track as setting
-from wholebody.bench.measure.track import Track, judge
+from wholebody.bench.measure.track import SETTING, Track, judge
 from wholebody.bench.rows import Figure, Panel, Row, across, only, quiet, report, shares, times
 from wholebody.bench.statistics import BLOCK, quantile_ratio
 from wholebody.bench.suite.adapters.base import Tool
@@ -195,9 +194,9 @@ def step_report(
         "if that is less"
     )
     about = (
-        f"Steps of {1e3 * setting.DT:g} ms by {others if figures else human}; joints drawn back to the start, "
-        f"clearance {1e3 * setting.CLEARANCE:g} mm, pairs nearer than {1e3 * setting.WITHIN:g} mm looked at, joints up "
-        f"to {setting.JOINT_SPEED:g} rad/s, root up to {setting.ROOT_SPEED:g} m/s and {setting.ROOT_TURN:g} rad/s. "
+        f"Steps of {1e3 * SETTING.dt:g} ms by {others if figures else human}; joints drawn back to the start, "
+        f"clearance {1e3 * SETTING.clearance:g} mm, pairs nearer than {1e3 * SETTING.within:g} mm looked at, joints up "
+        f"to {SETTING.joint_speed:g} rad/s, root up to {SETTING.root_speed:g} m/s and {SETTING.root_turn:g} rad/s. "
         f"Every tool makes every repeat once, in turns of {TURN} steps and in turning order, in one process; a first "
         "round and the first step of each set-up are not counted. Distances, errors and limits are judged afterwards "
         "from the postures, every pair by coal. Brackets hold 95 % intervals of the ratios to placo's steps, by the "

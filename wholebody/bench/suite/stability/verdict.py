@@ -213,9 +213,6 @@ def _known(cells: Iterable[Cell]) -> dict[str, float]:
     return found
 
 
-METHODS = ("qp", "qp/osqp", "newton/slack", "newton/barrier", "ccd", "dls", "placo", "pink", "mink")
-"""One or two of each algorithm, for a chart that can be read; others are asked by name."""
-
 COLORS = {
     "✓": ("#8fd0b5", "solved"),
     "●": ("#f6ec9c", "honest, as good as can be"),

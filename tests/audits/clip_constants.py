@@ -1,6 +1,6 @@
 """Which constants of the methods of `wb.avoid` matter: each halved and doubled, on a few clips that need no recordings.
 
-A constant decides something here where it changes whether a clip is free, its figures, or the programs that it takes.
+A constant matters here where it changes whether a clip is free, its figures, or the programs that it takes.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ USED: dict[str, tuple[str, ...]] = {
     ),
     **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),
     "repair": ("bisection", "frames"),
-    **dict.fromkeys(("one_side", "faults", "stance"), ("trajectory", "bisection", "frames")),
+    **dict.fromkeys(("one_side", "faults"), ("trajectory", "bisection", "frames")),
 }
 """Modules of `wholebody.motion`, and the methods on whose cases their constants are changed."""
 
