@@ -31,16 +31,15 @@ SIDES = (
 )
 """How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
 
-_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
-_OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
-
 
 def other_side(name: str) -> str:
     """The name of the same part on the other side; the name itself if it names no side."""
+    words = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+    words |= {right: left for left, right in words.items()}
     for left, right in SIDES:
         both = re.compile(f"{left}|{right}")
         if both.search(name):
-            return both.sub(lambda found: _OTHER[found.group()], name, count=1)
+            return both.sub(lambda found: words[found.group()], name, count=1)
     return name
 
 

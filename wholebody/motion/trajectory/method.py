@@ -20,9 +20,6 @@ from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, spee
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
-CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
-# rows, as filters change less of it
-
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -93,7 +90,9 @@ class Trajectory:
         """
         if loads is None:
             return q
-        faults, corrected, times = run.faults(reference), loads.corrected(q), list(CORRECTING)
+        # s: smoothness of the answers, the next where one gets no farther; filters change less of what is smoother
+        times = [0.2, 0.1]
+        faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
             beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
