@@ -308,16 +308,6 @@ class Clip:
         a /= self.dt**2
         return a
 
-    def jerk(self) -> Array:
-        """Jerk (n, nv), rad/s³ and m/s³: differences of the accelerations, exact for cubic polynomials of time.
-
-        It is zero for a clip of less than four frames.
-        """
-        if len(self) < 4:
-            return np.zeros((len(self), self.figure.model.nv))
-        found: Array = np.gradient(self.accelerations(), self.dt, axis=0)
-        return found
-
     def _differences(self) -> tuple[Array, Array]:
         """Displacements (n, nv) from each frame to the next one and to the one before; zero where there is none."""
         model = self.figure.model
