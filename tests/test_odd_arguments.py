@@ -601,7 +601,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     done = tracking.drag_along(ask, places, "qp")
     yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
     clip = wb.Clip(arm, [q, q + 0.1], 0.1)  # type: ignore[arg-type]
-    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.accelerations())
+    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.velocities())
     yield "Clip.at", Call(clip.at, {"t": 0.05})
     yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
     yield "Clip.joined", Call(clip.joined, {"other": clip})
