@@ -749,10 +749,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "Records",
         Call(wb.studies.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows())),
     )
-    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "iterations": 10}
+    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5}
     settings |= {"stretch": 1.5, "dynamics": wb.motion.Strength()}
     yield "Trajectory", Call(wb.motion.Trajectory, settings)
-    yield "PerFrame", Call(wb.motion.PerFrame, {"clearance": 0.01, "backward": True})
+    yield "PerFrame", Call(wb.motion.PerFrame, {"clearance": 0.01})
     bisection = {
         "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
         "room": 0.01, "method": "qp", "character": 0.2, "short": 5,
