@@ -608,7 +608,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
-    for method in ("mirrored", "velocities", "accelerations", "jerk"):
+    for method in ("mirrored", "velocities", "accelerations"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
     yield "Strength", Call(wb.motion.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
     yield "Strength.limits", Call(wb.motion.Strength().limits, {"figure": arm})
