@@ -30,6 +30,7 @@ TOGETHER = (
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
+        "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
     ),

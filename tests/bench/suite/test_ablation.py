@@ -31,7 +31,7 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
 
 def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
     found, compiled = ablation.constants("ccd")
-    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert "wholebody.methods.ccd.sweep" in compiled
     assert all(each.module not in compiled for each in found)
 
 
