@@ -18,7 +18,7 @@ from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.linear_algebra.base import Pattern
+from wholebody.methods.newton.linear_algebra import Pattern
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.problem import Problem
@@ -131,7 +131,7 @@ class NewtonTracker(NotCopyable):
             # where the time of a frame was not enough to restore what must hold, the next goes on from here
             cut = BUDGET.spent > 1.0 and not found.hard <= FRAMES.tolerance
             end = q if cut else active_system.posture(found.x)
-            return NewtonStep(end, spent, found.systems, active_system.patterns.structures)
+            return NewtonStep(end, spent, found.systems, active_system.structures)
 
     def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
         """The end of the iteration from the posture q (nq,); goals count alike if `even`."""
@@ -192,7 +192,7 @@ class NewtonTracker(NotCopyable):
     @property
     def laid_out(self) -> tuple[int, float]:
         """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._active_system.patterns.structures, self._active_system.patterns.laying
+        return self._active_system.structures, self._active_system.laying
 
     def _lay_out(self) -> None:
         problem = self.problem

@@ -81,9 +81,14 @@ class Search:
         assert self._best is not None
         return self._best
 
-    def run(self, begin: Array | None = None) -> LocalSolution:
-        """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found."""
+    def run(self, begin: Array | None = None, other: Array | None = None) -> LocalSolution:
+        """Try one way after the other until the goals are met, the first from `begin` (nq,); the best one found.
+
+        Another start (nq,) that is given is descended from too.
+        """
         self._try_ways(begin)
+        if other is not None:
+            self._accept(self._descend(other, full_step=True, early_exit=True), "directly")
         self._come_nearest()
         self._restart_for_measure()
         if self.best.violation.worst <= self.settings.tolerance:
