@@ -13,7 +13,7 @@ from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, begun, judged, nearest_to
+from wholebody.methods.base import begun, judged, nearest_to
 from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
