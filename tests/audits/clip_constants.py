@@ -34,10 +34,10 @@ CASES: tuple[Case, ...] = (
 )
 USED: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(
-        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.banded_qp"),
+        (f"trajectory.{name}" for name in ("window_run", "sqp", "program", "nodes", "interior_point")),
         ("trajectory",),
     ),
-    "bisection.prediction": ("bisection",),
+    **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),
     "repair": ("bisection", "frames"),
     **dict.fromkeys(("one_side", "faults", "stance"), ("trajectory", "bisection", "frames")),
 }

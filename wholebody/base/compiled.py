@@ -19,11 +19,10 @@ from typing import Any, TypeVar
 TOGETHER = (
     (
         "wholebody.methods.qp.active_set",
-        "wholebody.methods.qp.semismooth_newton",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.loops",),
+    ("wholebody.dynamics.step_program",),
     ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
@@ -36,10 +35,8 @@ TOGETHER = (
         "wholebody.motion.trajectory.banded_kernel",
     ),
     (
-        "wholebody.methods.qp.curved_reach",
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.osqp_solver",
         "wholebody.methods.qp.solvers.split_form",
     ),
 )
