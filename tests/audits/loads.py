@@ -108,4 +108,4 @@ def _row(
 
 def report(measured: Sequence[LoadRow], facts: Mapping[str, str]) -> str:
     """The table."""
-    return render("loads.md", TEMPLATES, rows=measured, facts=facts, place=1e3 * PLACE)
+    return render("loads.md", TEMPLATES, rows=measured, facts=facts)

@@ -151,7 +151,6 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert [total.solver for total in totals] == ["osqp", "daqp"]
     page = (docs / "results.md").read_text()
     assert "| osqp | " in page
-    assert "| robot arm |" in page
     assert len(list((tmp_path / "a" / "qp-programs").glob("*.npz"))) == 2
     again = ["--programs", str(tmp_path / "a" / "qp-programs"), "--out", str(tmp_path / "b")]
     assert main([*words, *again]) == 0

@@ -23,14 +23,14 @@ TOGETHER = (
         "wholebody.methods.qp.subproblem",
     ),
     ("wholebody.dynamics.loops",),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.unobstructed"),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
-        "wholebody.methods.newton.linear_algebra.normal_equations",
+        "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
     ),
     (

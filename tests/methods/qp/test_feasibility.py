@@ -7,18 +7,18 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.bench.suite.stability.posed import the_long_way_round
+from wholebody.bench.suite.stability.catalogue import cases
 
 
 def test_a_goal_beyond_a_limit_is_reached_from_the_other_side(honest):
-    problem = the_long_way_round().problem
+    problem = cases(["long-way-round"])[0].question().problem
     solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
     assert solution.status == "solved"
     assert solution.q[0] < 0.0 < problem.start[0]
 
 
 def test_a_frozen_joint_is_not_turned_on(honest):
-    whole = the_long_way_round().problem
+    whole = cases(["long-way-round"])[0].question().problem
     problem = wb.Problem(
         whole.scene, whole.start, goals=whole.goals, constraints=[wb.Freeze(whole.scene.figure.joints[0])]
     )

@@ -8,7 +8,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.records import with_values
 from wholebody.bench.measure.solve import reach
-from wholebody.bench.suite.stability.posed import collinear_start
+from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.rows import Multipliers, Rows
@@ -75,7 +75,7 @@ def test_what_a_step_to_a_bound_is_to_bring_counts_the_way_there():
 
 def test_a_descent_does_not_stop_at_the_first_limit():
     """From a straight arm the last joint comes to its limit. Its way there counts, so no step there is rejected."""
-    solution = wb.QP().solve(collinear_start().problem)
+    solution = wb.QP().solve(cases(["collinear-start"])[0].question().problem)
     assert solution.solved
     assert not any("rejected" in entry.note for entry in solution.trace)
 

@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
-from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
+from wholebody.methods.newton.linear_algebra import LinearSystem, SingularSystemError
 from wholebody.methods.newton.settings import FRAMES, STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.solution import TraceEntry

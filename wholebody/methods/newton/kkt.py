@@ -17,8 +17,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
-from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.linear_algebra import LinearSystem, QuasiDefinite, SingularSystemError
 from wholebody.methods.newton.system import System
 
 DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy

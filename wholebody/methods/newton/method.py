@@ -12,7 +12,7 @@ from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.linear_algebra.choice import NAMES
+from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.terms import state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
@@ -35,7 +35,7 @@ class Newton(Checked):
     Attributes:
         tolerance: metres and radians to which goals and constraints are met.
         iterations: most Newton iterations.
-        algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
+        algebra: "auto", "normal", "kkt" or "schur".
         inequalities: "slack" (squared slacks) or "barrier" (logarithmic).
         restarts: most seeded starts that are tried if the descent from the start does not solve the problem.
         seed: of the restarts.

@@ -18,7 +18,7 @@ from wholebody.methods.contradictions import Contradiction, contradictions, leas
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.refinement import refine
+from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import Solution, TraceEntry

@@ -17,7 +17,7 @@ from wholebody.methods.base import Method, begun, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.linear_algebra.base import Pattern
+from wholebody.methods.newton.linear_algebra import Pattern
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.problem import Problem
@@ -127,7 +127,7 @@ class NewtonTracker(NotCopyable):
             if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
-            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.patterns.structures)
+            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.structures)
 
     def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
         """The end of the iteration from the posture q (nq,); goals count alike if `even`."""
@@ -188,7 +188,7 @@ class NewtonTracker(NotCopyable):
     @property
     def laid_out(self) -> tuple[int, float]:
         """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._active_system.patterns.structures, self._active_system.patterns.laying
+        return self._active_system.structures, self._active_system.laying
 
     def _lay_out(self) -> None:
         problem = self.problem

@@ -89,9 +89,14 @@ class Multistart:
         assert self._best is not None
         return self._best
 
-    def run(self, begin: Array | None = None) -> LocalSolution:
-        """Make one attempt after the other until the goals are met, the first from `begin` (nq,); the best posture."""
+    def run(self, begin: Array | None = None, other: Array | None = None) -> LocalSolution:
+        """Make one attempt after the other until the goals are met, the first from `begin` (nq,); the best posture.
+
+        Another start (nq,) that is given is descended from too.
+        """
         self._search(self._start if begin is None else begin)
+        if other is not None:
+            self._accept(self._descend(other, full_step=True), "directly")
         self._find_closest()
         self._restart_for_measure()
         if self.best.violation.worst <= self.budget.tolerance:

@@ -8,9 +8,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Room
 from wholebody.methods.qp.settings import PROGRAM
 
@@ -237,42 +236,3 @@ class StepParts(NamedTuple):
     active: ActiveSet
     pushing: Indices
     room: Room
-
-
-class Chain(NamedTuple):
-    """A model of joints of one degree of freedom each, with room for one descent.
-
-    Attributes:
-        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
-        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
-        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
-        slides: (n, 3) axis that it slides along; zero for one that turns.
-        lower, upper: (n,) least and greatest values of the joints.
-        joints: (n + 1, 4, 3) become the placements of the joints; the first is the world's.
-        columns: (n, 6) become the columns of the joint Jacobian.
-        free: (n,) room.
-    """
-
-    parents: Indices
-    places: Array
-    turns: Array
-    slides: Array
-    lower: Array
-    upper: Array
-    joints: Array
-    columns: Array
-    free: Mask
-
-
-class Goals(NamedTuple):
-    """Goals of the joints of a chain, as `terms.entries.RESIDUAL` has them.
-
-    Attributes:
-        tables: (e, 36) their floats.
-        entries: (e, 7) their integers.
-        support: (n + 1, n) 1 where a column moves a joint.
-    """
-
-    tables: Array
-    entries: NDArray[np.int64]
-    support: NDArray[np.int8]

@@ -1,12 +1,15 @@
-"""Files that are not what they should be: mutated tasks, tracks, results, robots and meshes, and paths to nothing.
+"""Inputs that are not what they should be: mutated files of every kind, paths to nothing, and odd arguments.
 
-Mutations change bytes, lines, numbers, words and encodings, or put in what parsers have stumbled over.
+Mutations change bytes, lines, numbers, words and encodings, or put in what parsers have stumbled over. An odd argument
+of a public callable has to be taken, or refused by a WholebodyError.
 """
 
 from __future__ import annotations
 
+import ast
 import re
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -14,44 +17,32 @@ import numpy as np
 import pinocchio as pin
 
 import wholebody as wb
-from wholebody.bench.attack.case import CORPUS, Verdict
+from wholebody.bench.attack.case import CORPUS, Verdict, chosen
 from wholebody.figures.packaged_urdf import task_paths, urdf_path
 from wholebody.taskfile import read_task
 from wholebody.taskfile.result import read
 from wholebody.tracking.track_files import read_track
 
-NUMBERS = (
-    b"nan", b"inf", b"-inf", b"NaN", b"Infinity", b"1e400", b"-1e308", b"1e300", b"1e-320", b"0", b"-0.0", b"-1",
-    b"9" * 400,
-    b"9" * 5000, b"0x7fffffff", b"1_000", b"1e5", b"+.5", b"1e", b"--1", b"1,5", b"\xd9\xa3", b"2147483648",
-    b"-9223372036854775809", b"3.5", b"1e-9", b"100.00001",
-)  # fmt: skip
-"""What a number becomes."""
-VALUES = (
-    b"true", b'"x"', b"''", b'""', b"[]", b"{}", b"[[[[1]]]]", b"null", b"None", b"2020-01-01", b'"""', b"[1, 'a', []]",
-    b"{ a = 1 }", b"\\ud800", b'"\\u0000"', b'"../../../../etc/passwd"', b'"/dev/null"', b'"' + b"a" * 5000 + b'"',
-    b'"."',
-)  # fmt: skip
-"""What a value becomes."""
-ODD = (
-    b"\x00", b"\xff\xfe", b"\xef\xbb\xbf", b"\r", b"\x1b[31m", "é".encode(), "é".encode("latin-1"), "\u202e".encode(),
-    b"<", b">", b"&", b'"', b"'", b"[", b"]", b"{", b"}", b",", b"=", b"#", b"\n", b"\\", b"%s", b"&undefined;", b"]]>",
-)  # fmt: skip
-"""What is put in between."""
-BOMB = (
-    b'<?xml version="1.0"?>\n<!DOCTYPE robot [<!ENTITY a "aaaaaaaaaa"><!ENTITY b "&a;&a;&a;&a;&a;&a;&a;&a;&a;&a;">'
-    b'<!ENTITY c "&b;&b;&b;&b;&b;&b;&b;&b;&b;&b;"><!ENTITY d "&c;&c;&c;&c;&c;&c;&c;&c;&c;&c;">]>\n<robot name="&d;">'
-)
-_NUMBER = re.compile(rb"(?<![A-Za-z_])-?\d+\.?\d*(?:[eE][-+]?\d+)?")
-_VALUE = re.compile(rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*')
-_WORD = re.compile(rb"[A-Za-z_]{2,}")
+_VALUE = rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*'
+_WORD = rb"[A-Za-z_]{2,}"
+
+
+@cache
+def _given(kind: str) -> list[Any]:
+    """What a number or a value becomes, what is put in between, and paths that lead to no file."""
+    lines = (CORPUS / "mutations.txt").read_text(encoding="utf-8").splitlines()
+    return [eval(line.partition(" ")[2]) for line in lines if line.startswith(f"{kind} ")]
 
 
 def mutated(text: bytes, rng: np.random.Generator) -> bytes:
     """Return a text with one to three mutations, seldom more."""
+    ways = (
+        *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, _flip, _delete, _delete, _repeat, _cut,
+        _insert, _insert, _lines, _lines, _encoded, _nested, _bomb, _empty,
+    )  # fmt: skip
     count = int(rng.choice([1, 1, 1, 2, 3, 10]))
     for _ in range(count):
-        text = _WAYS[int(rng.integers(len(_WAYS)))](text, rng)
+        text = ways[int(rng.integers(len(ways)))](text, rng)
     return text
 
 
@@ -83,11 +74,12 @@ def _cut(text: bytes, rng: np.random.Generator) -> bytes:
 
 def _insert(text: bytes, rng: np.random.Generator) -> bytes:
     at = int(rng.integers(len(text) + 1))
-    return text[:at] + ODD[int(rng.integers(len(ODD)))] + text[at:]
+    odd: bytes = chosen(rng, _given("odd"))
+    return text[:at] + odd + text[at:]
 
 
-def _replaced(text: bytes, pattern: re.Pattern[bytes], by: Callable[[bytes], bytes], rng: np.random.Generator) -> bytes:
-    found = list(pattern.finditer(text))
+def _replaced(text: bytes, pattern: bytes, by: Callable[[bytes], bytes], rng: np.random.Generator) -> bytes:
+    found = list(re.finditer(pattern, text))
     if not found:
         return text
     one = found[int(rng.integers(len(found)))]
@@ -95,16 +87,17 @@ def _replaced(text: bytes, pattern: re.Pattern[bytes], by: Callable[[bytes], byt
 
 
 def _number(text: bytes, rng: np.random.Generator) -> bytes:
-    return _replaced(text, _NUMBER, lambda _: NUMBERS[int(rng.integers(len(NUMBERS)))], rng)
+    number = rb"(?<![A-Za-z_])-?\d+\.?\d*(?:[eE][-+]?\d+)?"
+    return _replaced(text, number, lambda _: chosen(rng, _given("number")), rng)
 
 
 def _value(text: bytes, rng: np.random.Generator) -> bytes:
-    return _replaced(text, _VALUE, lambda _: VALUES[int(rng.integers(len(VALUES)))], rng)
+    return _replaced(text, _VALUE, lambda _: chosen(rng, _given("value")), rng)
 
 
 def _word(text: bytes, rng: np.random.Generator) -> bytes:
-    words = _WORD.findall(text) or [b"x"]
-    return _replaced(text, _WORD, lambda _: words[int(rng.integers(len(words)))], rng)
+    words = re.findall(_WORD, text) or [b"x"]
+    return _replaced(text, _WORD, lambda _: chosen(rng, words), rng)
 
 
 def _misspelt(text: bytes, rng: np.random.Generator) -> bytes:
@@ -149,23 +142,14 @@ def _nested(text: bytes, rng: np.random.Generator) -> bytes:
 
 
 def _bomb(text: bytes, rng: np.random.Generator) -> bytes:
-    return BOMB + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _insert(text, rng)
+    bomb: bytes = _given("bomb")[0]
+    return bomb + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _insert(text, rng)
 
 
 def _empty(text: bytes, rng: np.random.Generator) -> bytes:
     return (b"", b"\n", b"\x00" * 100, text * 50)[int(rng.integers(4))]
 
 
-_WAYS = (
-    *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, _flip, _delete, _delete, _repeat, _cut,
-    _insert,
-    _insert, _lines, _lines, _encoded, _nested, _bomb, _empty,
-)  # fmt: skip
-
-
-NO_FILES = (
-    "/dev/zero", "/dev/null", "/", "no-such-file", "a" * 5000, "a/" * 3000 + "b", "nul\0l", "", ".", "/dev/full",
-)  # fmt: skip
 ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
 """Names of files that belong together, and where they are stored."""
 
@@ -182,17 +166,17 @@ class Reader(NamedTuple):
     files: Mapping[str, bytes]
 
 
-def case(rng: np.random.Generator, folder: Path) -> Verdict:
+def file(rng: np.random.Generator, folder: Path) -> Verdict:
     """Read a mutated file, or seldom a path that leads to none."""
     reader = _reader(rng)
     contents = dict(reader.files)
     names = list(contents)
-    chosen = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
+    which = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
     path = folder / names[0]
     if rng.random() < 0.01:
-        path = Path(NO_FILES[int(rng.integers(len(NO_FILES)))])
+        path = Path(chosen(rng, _given("no-file")))
     else:
-        contents[chosen] = mutated(contents[chosen], rng)
+        contents[which] = mutated(contents[which], rng)
     for name, text in contents.items():
         (folder / name).write_bytes(text)
     try:
@@ -282,3 +266,69 @@ def _figure(figure: wb.Figure) -> Verdict:
         if not np.isfinite(q).all() or not pin.isNormalized(model, q, 1e-6):
             return Verdict("wrong", f"a robot was taken whose posture {name!r} is not made of numbers")
     return Verdict("right", "a robot was taken")
+
+
+def argument(rng: np.random.Generator, folder: Path) -> Verdict:
+    """A call with one odd argument, seldom two."""
+    calls, odd = calls_that_are_right(), _corpus("odd.txt")
+    name, arguments = calls[int(rng.integers(len(calls)))]
+    given = dict(arguments)
+    for key in rng.permutation(list(arguments))[: 1 if rng.random() < 0.85 else 2]:
+        given[str(key)] = odd[int(rng.integers(len(odd)))]
+    return called(name, given, folder)
+
+
+def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
+    """Call a public callable with arguments, as Python by their names; "*" for one without.
+
+    What the call makes is used: what is refused late is refused too.
+    """
+    (folder / "robot.urdf").write_bytes((CORPUS / "two-links.urdf").read_bytes())
+    robot = folder / "robot.urdf"
+    figure = wb.load(robot)
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.5, 0.5))
+    problem = wb.Problem(scene, goals=[wb.Point("link2", (0.1, 0.0, 0.5))])
+    known = {"np": np, "pin": pin, "wb": wb, "Path": Path, "task_paths": task_paths}
+    known |= {"robot": robot, "figure": figure, "scene": scene, "problem": problem}
+    call = f"{name}({', '.join(f'*({v},)' if key == '*' else f'{key}={v}' for key, v in given.items())})"
+    try:
+        _use(eval(call, known), problem)
+    except wb.WholebodyError as error:
+        return refused(error)
+    return Verdict("right", f"{call[:200]} was taken")
+
+
+def _use(made: Any, problem: wb.Problem) -> None:
+    """Use what a call has made, by itself."""
+    scene, qp = problem.scene, wb.QP(budget=5)
+    if isinstance(made, wb.Goal):
+        wb.solve(wb.Problem(scene, goals=[made]), method=qp)
+    elif isinstance(made, wb.Constraint):
+        wb.solve(wb.Problem(scene, constraints=[made]), method=qp)
+    elif isinstance(made, wb.Measure):
+        wb.solve(wb.Problem(scene, measures=[made]), method=qp)
+    elif isinstance(made, wb.Shape):
+        scene.add(made, name="made", at=(3, 0, 0)).contacts(scene.figure.neutral)
+    elif isinstance(made, wb.Problem):
+        wb.solve(made, method=qp)
+    elif hasattr(made, "solve"):
+        wb.solve(problem, method=made)
+
+
+@cache
+def calls_that_are_right() -> list[tuple[str, dict[str, str]]]:
+    """Public callables with arguments that are right, both as Python."""
+    return [_call(line) for line in _corpus("calls.txt")]
+
+
+def _call(line: str) -> tuple[str, dict[str, str]]:
+    node = ast.parse(line, mode="eval").body
+    assert isinstance(node, ast.Call)
+    given = {str(each.arg): ast.get_source_segment(line, each.value) or "" for each in node.keywords}
+    if node.args:
+        given["*"] = ast.get_source_segment(line, node.args[0]) or ""
+    return ast.get_source_segment(line, node.func) or "", given
+
+
+def _corpus(name: str) -> list[str]:
+    return (CORPUS / name).read_text(encoding="utf-8").splitlines()

@@ -1,4 +1,4 @@
-"""Hands on the body they belong to: on the opposite elbow, on the hips, arms crossed."""
+"""Both hands on one thing, a loop through the arms that stays closed; and hands on the body they belong to."""
 
 from __future__ import annotations
 
@@ -22,7 +22,56 @@ from wholebody.bench.suite.problem_sets.bodies import (
 )
 from wholebody.bench.suite.problem_sets.case import numbers
 
-given = numbers("self_contact")
+of_loop = numbers("closed_loop")
+
+
+def closed_loop(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """In turn a bar and a box, brought to a place and an orientation."""
+    figure = human()
+    apart = float(rng.uniform(*of_loop.apart_m))
+    shape, ahead = _shape(number % 2, apart - 2.0 * of_loop.grip_m, rng)
+    middle = np.array((ahead, 0.0, 0.5 * apart))
+    scene = floor_scene(figure).attach(shape, to="right_palm", name="load", at=middle)
+    other = pin.SE3(np.diag([1.0, -1.0, -1.0]), np.array((0.0, 0.0, apart)))
+    q = bent(figure, figure.posture("standing"), vars(of_loop.bent_degrees))
+
+    def level() -> Array | None:
+        """The thing held level before the belly, elbows anyhow, (nq,)."""
+        near = shaken(figure, q, 0.5 * of_loop.spread, rng)
+        return _holding(scene, near, other, np.array(of_loop.level), np.array(of_loop.start_m), middle)
+
+    def turned() -> Array | None:
+        turn = pin.exp3(rng.uniform(-of_loop.turned_rad, of_loop.turned_rad, 3)) @ np.array(of_loop.level)
+        near = shaken(figure, start, of_loop.spread, rng)
+        return _holding(scene, near, other, turn, rng.uniform(*of_loop.middle_m), middle)
+
+    start = until_found(level)
+    witness = until_found(turned)
+    goals = [wb.Frame("right_palm", figure.placement(witness, "right_palm"))]
+    grip = wb.Hold("left_palm", other, relative_to="right_palm")
+    return standing_problem(scene, start, goals, grip), witness
+
+
+def _shape(kind: int, length: float, rng: np.random.Generator) -> tuple[wb.Shape, float]:
+    """What is held, and how far ahead of the palms its middle is."""
+    if kind == 0:
+        return wb.Capsule(of_loop.thick_m, length - 2.0 * of_loop.thick_m), 0.0
+    height, depth = (float(edge) for edge in rng.uniform(*of_loop.box_m))
+    return wb.Box((depth, height, length)), 0.5 * depth - of_loop.behind_m
+
+
+def _holding(scene: wb.Scene, q: Array, other: pin.SE3, turn: Array, place: Array, middle: Array) -> Array | None:
+    """The posture near q, (nq,), with the thing's middle at a place, held by both hands; None where it is not free."""
+    figure = scene.figure
+    goals = [
+        wb.Frame("right_palm", pin.SE3(turn, place - turn @ middle)),
+        wb.Relative("left_palm", "right_palm", other),
+    ]
+    found = fitted(figure, q, [goal.resolve(alone(figure), q) for goal in goals], figure.dofs("upper_body"))
+    return found if found is not None and is_free(scene, found) else None
+
+
+of_contact = numbers("self_contact")
 
 
 @dataclass(frozen=True)
@@ -48,17 +97,19 @@ class Touch:
         return self.axis + height * self.normal
 
 
-def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+def self_contact(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
     """In turn: a hand on the other elbow, both on the hips, arms crossed; in every other round turned as asked."""
     figure = human()
     start = figure.posture("standing")
     kind, turned = number % 3, number // 3 % 2 == 1
-    begin = bent(figure, start, vars(given.begin_degrees[kind]))
+    begin = bent(figure, start, vars(of_contact.begin_degrees[kind]))
 
     def attempt() -> tuple[Array, list[Touch]] | None:
         touches = _touches(kind, ("left", "right")[number // 6 % 2], rng)
-        witness = _laid(figure, shaken(figure, begin, given.spread, rng), touches)
-        return (witness, touches) if witness is not None and is_free(alone(figure), witness, given.gap_m[0]) else None
+        witness = _laid(figure, shaken(figure, begin, of_contact.spread, rng), touches)
+        if witness is None or not is_free(alone(figure), witness, of_contact.gap_m[0]):
+            return None
+        return witness, touches
 
     witness, touches = until_found(attempt)
     goals = [_goal(figure, witness, touch, turned) for touch in touches]
@@ -67,10 +118,10 @@ def posed(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
 
 def _touches(kind: int, hand: str, rng: np.random.Generator) -> list[Touch]:
     if kind == 0:
-        return [_on_arm(hand, (-0.30, -0.22), given.elbow_rad, rng)]
+        return [_on_arm(hand, (-0.30, -0.22), of_contact.elbow_rad, rng)]
     if kind == 1:
         return [_on_hip(side, rng) for side in ("left", "right")]
-    return [_on_arm(side, (-0.34, -0.16), given.front_rad, rng) for side in ("left", "right")]
+    return [_on_arm(side, (-0.34, -0.16), of_contact.front_rad, rng) for side in ("left", "right")]
 
 
 def _on_arm(hand: str, along: tuple[float, float], around: tuple[float, float], rng: np.random.Generator) -> Touch:
@@ -97,7 +148,7 @@ def _laid(figure: wb.Figure, q: Array, touches: list[Touch]) -> Array | None:
     The distances are measured, and the hands moved along the normals by what is too much or too little.
     """
     scene, dofs = alone(figure), figure.dofs("upper_body")
-    least, most = given.gap_m
+    least, most = of_contact.gap_m
     heights = [0.1] * len(touches)
     for _ in range(6):
         goals = [

@@ -1,6 +1,6 @@
 """Which constants of the methods of `wb.avoid` matter: each halved and doubled, on a few clips that need no recordings.
 
-A constant decides something here where it changes whether a clip is free, its figures, or the programs that it takes.
+A constant matters here where it changes whether a clip is free, its figures, or the programs that it takes.
 """
 
 from __future__ import annotations
