@@ -22,7 +22,7 @@ TOGETHER = (
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.loops",),
+    ("wholebody.dynamics.step_program",),
     ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
@@ -30,6 +30,7 @@ TOGETHER = (
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
+        "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
     ),

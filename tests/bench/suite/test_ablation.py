@@ -11,7 +11,7 @@ from wholebody.bench.rows import Row
 from wholebody.bench.suite import ablation
 from wholebody.bench.suite.ablation import Constant, report
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.cli.bench.counts import ablation as command
+from wholebody.cli.bench.measuring import ablation as command
 from wholebody.methods import contradictions, starts
 from wholebody.methods.qp import settings, sqp
 
@@ -31,7 +31,7 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
 
 def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
     found, compiled = ablation.constants("ccd")
-    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert "wholebody.methods.ccd.sweep" in compiled
     assert all(each.module not in compiled for each in found)
 
 

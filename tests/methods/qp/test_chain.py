@@ -30,9 +30,9 @@ def arm() -> wb.Figure:
 
 
 def found(problem: wb.Problem, tolerance: float = 1e-6, *, measures: bool = False, progress=None):
-    settings = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
+    budget = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
     with problem.borrow() as workspace:
-        return from_seeds(problem, workspace, settings, Control(progress=progress))
+        return from_seeds(problem, workspace, budget, Control(progress=progress))
 
 
 def whole_chain(model: pin.Model, limits: Limits) -> PlainChain:

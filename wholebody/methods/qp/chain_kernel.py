@@ -89,7 +89,9 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         How many seeds were taken.
     """
     tolerance, most, enough = asked[0], int(asked[2]), asked[3]
-    weighed = nearest[1].any()
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
         q = seeds[k]
         steps = _descend(chain, goals, room, q, tolerance, asked[1], most)

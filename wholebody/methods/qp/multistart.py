@@ -96,7 +96,7 @@ class Multistart:
         """
         self._search(self._start if begin is None else begin)
         if other is not None:
-            self._accept(self._descend(other, full_step=True), "directly")
+            self._accept(self._directly(other), "directly")
         self._find_closest()
         self._restart_for_measure()
         if self.best.violation.worst <= self.budget.tolerance:
