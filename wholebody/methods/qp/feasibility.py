@@ -5,9 +5,6 @@ slides along what is in the way with all of its length: the joints that are held
 that asks for a piece of the way and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
 where they go to and fro the box shrinks.
 
-Where both places and directions are asked for, places come first. A wrist that turns early takes the arm to a limit
-from which the place cannot be reached.
-
 Where a joint is held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is
 put there: a goal beyond the limit of a shoulder that turns by 320 degrees is reached from the other side.
 """
@@ -19,14 +16,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
-from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
-from wholebody.methods.qp.rows import Violation
 from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem
@@ -68,42 +63,17 @@ class Feasibility:
 
     def run(self, start: Array) -> LocalSolution:
         """Go from a posture within limits, shape (nq,), to one that fits; else to where nothing leads nearer."""
-        directions = self._directions(start)
-        local = self._attempt(start, directions, False, 0)
-        if local.violation.worst <= self.tolerance or not directions.any() or directions.all():
-            return local
-        other = self._attempt(start, directions, True, local.iterations)
-        return (
-            other if other.violation.total < local.violation.total else with_values(local, iterations=other.iterations)
-        )
-
-    def once(self, start: Array) -> LocalSolution:
-        """The same by one attempt, with places and directions together: for one start of many."""
-        return self._attempt(start, self._directions(start), False, 0)
-
-    def _attempt(self, start: Array, directions: Mask, later: bool, count: int) -> LocalSolution:
-        """One of them: with or without places first; `count` programs were solved before."""
-        weight = np.where(directions & later, FEASIBILITY.directions_later, 1.0)
         working_set = WorkingSet(self.solver)
         here, box, last = self._iterate_at(start), FEASIBILITY.step, np.zeros(self.lineariser.state.model.nv)
         history: list[float] = []
+        count = 0
         wrapped: set[int] = set()
         while here.violation.worst > self.tolerance and count < self.iterations and not self.control.over:
-            error = here.rows.soft_error[: here.rows.goals]
-            if (
-                later
-                and here.violation.elastic <= FEASIBILITY.placed
-                and np.linalg.norm(error[~directions]) <= FEASIBILITY.placed
-            ):
-                later, weight, history = False, np.ones(len(error)), []
-            history.append(_merit(here.violation, float(np.sqrt((weight * error) @ error))))
+            history.append(here.violation.total)
             count += 1
-            program = self._program(here, box, weight)
+            program = self._program(here, box)
             step = working_set.solve(program, here.rows.key).x
             stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
-            if stuck and later:
-                later, weight, history, box = False, np.ones(len(error)), [], FEASIBILITY.step
-                continue
             if stuck:
                 q = self._turned_on(here, program, step, wrapped)
                 there = None if q is None else self._moved(q)
@@ -130,26 +100,9 @@ class Feasibility:
             self._record(here, float(np.abs(step).max(initial=0.0)), "goal")
         return _end(here, here.violation.worst <= self.tolerance, count)
 
-    def _program(self, here: Iterate, box: float, weight: Array) -> QuadraticProgram:
-        rows = here.rows
-        soft_weight = rows.soft_weight.copy()
-        soft_weight[: rows.goals] *= weight
-        none = np.zeros(len(rows.soft_error))
-        return self.subproblem.program(
-            here.at,
-            with_values(rows, soft_weight=soft_weight),
-            box / PROGRAM.box,
-            None,
-            FEASIBILITY.damping,
-            none,
-            False,
-        )
-
-    def _directions(self, q: Array) -> Mask:
-        """Which rows of the goals, (goal rows,) of bool, are angles."""
-        state = self.lineariser.state.update(q)
-        parts = [np.broadcast_to(goal.angular, np.atleast_1d(goal.error(state)).shape) for goal in self.problem.goals]
-        return np.concatenate([np.zeros(0, dtype=bool), *parts])
+    def _program(self, here: Iterate, box: float) -> QuadraticProgram:
+        none = np.zeros(len(here.rows.soft_error))
+        return self.subproblem.program(here.at, here.rows, box / PROGRAM.box, None, FEASIBILITY.damping, none, False)
 
     def _turned_on(self, here: Iterate, program: QuadraticProgram, step: Array, wrapped: set[int]) -> Array | None:
         """The posture (nq,) with the joint at its other limit that presses hardest at one; None where there is none.
@@ -197,10 +150,6 @@ class Feasibility:
         held = max(violation.hold, violation.elastic)
         self.trace.append(TraceEntry(violation.left, held, here.at.measure, step, f"{self.note}: {what}"))
         self.control.tell(self.trace[-1])
-
-
-def _merit(violation: Violation, goal: float) -> float:
-    return with_values(violation, goal=goal).total
 
 
 def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:

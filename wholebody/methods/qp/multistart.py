@@ -217,7 +217,7 @@ class Multistart:
         for q in chain([self._start], others):
             if self.control.over:
                 break
-            local = self._feasibility(self.lineariser, self._at_most(SEARCH.probe_programs), "for measure").once(q)
+            local = self._feasibility(self.lineariser, self._at_most(SEARCH.probe_programs), "for measure").run(q)
             self.spent += local.iterations
             if local.violation.worst <= tolerance:
                 found.append(local)
@@ -233,7 +233,7 @@ class Multistart:
         """
         most = max(min(self._left, SEARCH.probe_programs), 1)
         lineariser = self.lineariser if depth == 0.0 else self.lineariser.relaxed(depth)
-        local = self._feasibility(lineariser, most, "probe").once(start)
+        local = self._feasibility(lineariser, most, "probe").run(start)
         self.spent += local.iterations
         self._left -= local.iterations
         return local

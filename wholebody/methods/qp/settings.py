@@ -156,8 +156,6 @@ class FeasibilityNumbers(NamedTuple):
         least_step: rad, m: of the box; smaller = slower to end where steps go to and fro.
         damping: share of the squared error, as in `sqp`; less = dozens of bounds hold a step, and programs are dear.
         within: m: pairs nearer than this get rows.
-        directions_later: share of their weight that directions have while places come first.
-        placed: m: places nearer than this are reached, and directions count.
         wide: rad: range from which a joint may be taken from one limit to the other.
         slow: share of the violation, or `progress`, that must go in `patience` programs, else nothing leads nearer.
         progress: see `slow`; m, rad.
@@ -168,8 +166,6 @@ class FeasibilityNumbers(NamedTuple):
     least_step: float = 1e-3
     damping: float = 0.05
     within: float = 0.1
-    directions_later: float = 2.5e-3
-    placed: float = 0.01
     wide: float = 5.0
     slow: float = 0.1
     progress: float = 0.1
