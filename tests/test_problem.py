@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.problem import built_in_goals
 
 
 @pytest.fixture
@@ -159,9 +158,7 @@ def test_new_goals_are_checked_as_the_first_ones_and_refused_whole(scene, kind, 
     assert problem.goals is before
 
 
-def test_built_in_goals_leave_nothing_for_retarget_to_find(scene):
-    """They are not evaluated there, so what evaluation would find they refuse themselves."""
-    assert {wb.Point, wb.Frame, wb.Posture} <= built_in_goals()
+def test_built_in_goals_refuse_by_themselves_what_evaluation_would_find(scene):
     for make in (
         lambda: wb.Point("head", (np.nan, 0.0, 0.0)), lambda: wb.Frame("head", (0, 0, np.inf)),
         lambda: wb.CenterOfMass((0, np.nan, 0)), lambda: wb.Axis("head", (1, 0, 0), direction=(np.nan, 0, 0)),
@@ -196,3 +193,25 @@ def test_clearances_of_another_shape_are_refused_by_every_method(method, shape):
         method.solve(problem)
     with pytest.raises(wb.InputError, match="clearances have shape"):
         wb.assess(problem, problem.start)
+
+
+def test_defaults_follow_what_the_feet_carry():
+    """Shoes that are moved between two problems move the support polygon, as in a scene that never saw them before."""
+    soles = [wb.Hold(f"{side}_sole") for side in ("left", "right")]
+
+    def polygon(scene):
+        return next(term for term in wb.Problem(scene, constraints=soles).defaults if isinstance(term, wb.Balance))
+
+    def shod(at):
+        scene = wb.Scene(wb.load("human"))
+        scene.attach(wb.Box((0.5, 0.1, 0.02)), to="left_foot", name="ski", at=at)
+        return scene
+
+    here, there = (0.0, 0.0, -0.08), (0.2, 0.0, -0.08)
+    scene, fresh = shod(here), polygon(shod(there))
+    first = polygon(scene)
+    scene.move("ski", at=there)
+    again = polygon(scene)
+    assert np.abs(first.offsets.sum() - again.offsets.sum()) > 1e-3 or first.normals.shape != again.normals.shape
+    np.testing.assert_array_equal(again.normals, fresh.normals)
+    np.testing.assert_array_equal(again.offsets, fresh.offsets)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
-from functools import cache
 from operator import is_
 from typing import Any, TypeVar
 
@@ -21,16 +20,18 @@ from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
-from wholebody.tasks.answers import in_words
+from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
-from wholebody.tasks.defaults import default_constraints, default_measures
+from wholebody.tasks.defaults import default_constraints, default_measures, stands
 from wholebody.terms.linearisation import Lineariser
 from wholebody.terms.plan import TermPlan, Terms, make_plan
 
 CLEARANCE = Range(0.0, 0.5, "m")  # more is refused as a wrong unit
 
 _TermError = TypeVar("_TermError", bound=TermError)
+
+_Planned = tuple[tuple[Constraint, ...], tuple[Bound, ...], tuple[Measure, ...]]
 
 _KINDS: dict[str, tuple[type, ...]] = {
     "goals": (Goal,), "constraints": (Constraint,), "bounds": (Bound,), "measures": (Measure,)
@@ -112,31 +113,44 @@ class Problem(checks.FixedAttributes):
         self.measures_given = measures is not None
         self.range_of_motion = checks.flag(range_of_motion, "range_of_motion")
         self.balance = balance if balance is None else checks.flag(balance, "balance")
-        usual = default_measures(scene, ranges=self.range_of_motion)
-        measured = usual if measures is None else _checked(measures, (Measure,), "measures")
+        measured = None if measures is None else _checked(measures, (Measure,), "measures")
         self.goals: tuple[Goal, ...] = tuple(goal.resolve(scene, self.start) for goal in terms)
         stated = tuple(term.resolve(scene, self.start) for term in given if isinstance(term, Constraint))
         self._places = tuple(place for place, term in enumerate(given) if isinstance(term, Constraint))
         self.bounds: tuple[Bound, ...] = tuple(
             term.resolve(scene, self.start) for term in given if isinstance(term, Bound)
         )
-        self.measures: tuple[Measure, ...] = tuple(term.resolve(scene, self.start) for term in measured)
-        added, self.left_out = default_constraints(
-            scene, self.start, stated, self.bounds, self.goals, ranges=self.range_of_motion, balance=self.balance
-        )
-        self.defaults: tuple[Constraint, ...] = tuple(term.resolve(scene, self.start) for term in added)
-        self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
         self.clearances = np.zeros(len(scene.built.table.pairs))
+        self._plan: tuple[_Planned, TermPlan] | None = None
+        """The terms as arrays, and the terms that they were made of; every solve begins with it."""
         with self.borrow() as workspace:
             state = workspace.state.update(self.start)
+            self.measures: tuple[Measure, ...] = (
+                self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
+            )
+            self.defaults, self.left_out = self._usual_constraints(state, stated)
+            self.constraints: tuple[Constraint, ...] = (*stated, *self.defaults)
             self._check_frozen(state)
             _check_goals(self.goals, state)
             self._check_terms(state)
             self.clearances = self._clearances(workspace)
-            self._plan = self._planned(state)
-            """The terms as arrays, and the terms that they were made of; every solve begins with it."""
+
+    def _usual_measures(self) -> tuple[Measure, ...]:
+        scene, start, ranges = self.scene, self.start, self.range_of_motion
+        key = "measures", ranges, start.tobytes()
+        return scene.built.known(key, lambda: default_measures(scene, start, ranges=ranges))
+
+    def _usual_constraints(self, state: State, stated: Sequence[Constraint]) -> tuple[tuple[Constraint, ...], str]:
+        scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
+        required = self.balance is True
+        balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
+        moves = scene.built.moves if balance else 0  # shoes carry too
+        return scene.built.known(
+            ("constraints", ranges, balance, required, known, moves, start.tobytes()),
+            lambda: default_constraints(scene, start, known, ranges=ranges, balance=balance, required=required),
+        )
 
     def __repr__(self) -> str:
         asked = [*self.goals, *self.constraints, *self.bounds]
@@ -205,10 +219,9 @@ class Problem(checks.FixedAttributes):
         """
         listed = _checked(goals, (Goal,), "goals")
         resolved = tuple(goal.resolve(self.scene, self.start) for goal in listed)
-        doubtful = {number: goal for number, goal in enumerate(resolved) if type(goal) not in built_in_goals()}
-        if doubtful:
+        if any(map(is_own, resolved)):
             with self.borrow() as workspace:
-                _check_goals(doubtful, workspace.state.update(self.start))
+                _check_goals(resolved, workspace.state.update(self.start))
         self.goals = resolved
 
     def with_start(self, q: Array) -> Problem:
@@ -253,23 +266,22 @@ class Problem(checks.FixedAttributes):
             workspace: from this problem's `borrow` or `workspace`.
             dt: time step in seconds, for bounds that need one.
         """
-        known, plan = False, None
-        if dt is None:
-            terms, plan = self._plan
-            known = all(map(is_, terms, (self.constraints, self.bounds, self.measures)))
-        workspace.state.update(self.start)  # where terms of one's own tell how many rows they have
+        state = workspace.state.update(self.start)  # where terms of one's own tell how many rows they have
         return Lineariser(
             workspace,
             self.scene.figure.limits,
             Terms(self.goals, self.constraints, self.bounds, self.measures),
             self.clearances,
             dt,
-            plan if known else None,
+            self._planned(state) if dt is None else None,
         )
 
-    def _planned(self, state: State) -> tuple[tuple[Any, Any, Any], TermPlan]:
+    def _planned(self, state: State) -> TermPlan:
+        """The plan of the present constraints, bounds and measures, and of some goals; made when they are new."""
         terms = (self.constraints, self.bounds, self.measures)
-        return terms, make_plan(self.scene.figure.limits, Terms(self.goals, *terms), None, state)
+        if self._plan is None or not all(map(is_, self._plan[0], terms)):
+            self._plan = terms, make_plan(self.scene.figure.limits, Terms(self.goals, *terms), None, state)
+        return self._plan[1]
 
     def check_fresh(self) -> None:
         """Refuse a problem that is out of date; things may be moved and clearances changed.
@@ -288,8 +300,9 @@ class Problem(checks.FixedAttributes):
 
     def _check_frozen(self, state: State) -> None:
         """Raise InputError if a bound keeps a joint out of its limits."""
-        figure = self.scene.figure
-        least, most = figure.tangent_bounds(self.start)
+        if not self.bounds:
+            return
+        least, most = self.scene.figure.tangent_bounds(self.start)
         for bound in self.bounds:
             low, high = bound.bounds(state, None)
             wrong = np.flatnonzero((high < least) | (low > most))
@@ -301,11 +314,16 @@ class Problem(checks.FixedAttributes):
                 )
 
     def _check_terms(self, state: State) -> None:
-        """Evaluate every term once at the start, so that a wrong term is named before anything is computed."""
+        """Evaluate terms of one's own at the start, so that a wrong one is named before anything is computed.
+
+        Those of the package find every mistake when they are made and resolved.
+        """
         for number, constraint in enumerate(self.constraints):
-            check_rows(f"constraints[{number}]", constraint, constraint.value, state)
+            if is_own(constraint):
+                check_rows(f"constraints[{number}]", constraint, constraint.value, state)
         for number, measure in enumerate(self.measures):
-            check_measure(f"measures[{number}]", measure, state)
+            if is_own(measure):
+                check_measure(f"measures[{number}]", measure, state)
 
     def _clearances(self, workspace: Workspace) -> Array:
         pairs, owners = workspace.table.pairs, workspace.owners
@@ -322,18 +340,11 @@ class Problem(checks.FixedAttributes):
         return asked
 
 
-def _check_goals(goals: Mapping[int, Goal] | Sequence[Goal], state: State) -> None:
-    """Evaluate goals, by number, at the start."""
-    for number, goal in goals.items() if isinstance(goals, Mapping) else enumerate(goals):
-        check_rows(f"goals[{number}]", goal, goal.error, state)
-
-
-@cache
-def built_in_goals() -> frozenset[type]:
-    """The built-in goals: their constructors find every mistake, so they need no trial evaluation."""
-    from wholebody import tasks
-
-    return frozenset(kind for name in tasks.__all__ if issubclass(kind := getattr(tasks, name), Goal))
+def _check_goals(goals: Sequence[Goal], state: State) -> None:
+    """Evaluate goals of one's own at the start."""
+    for number, goal in enumerate(goals):
+        if is_own(goal):
+            check_rows(f"goals[{number}]", goal, goal.error, state)
 
 
 def _start(scene: Scene, start: Array | str | None) -> Array:

@@ -47,7 +47,7 @@ class Solution:
         programs: number of quadratic programs that each solver closed, such as {"osqp": 1, "active set": 7}. There,
             "active set" is the hot start, "semismooth newton" closed what neither did, and "not exact" are programs
             that none closed. Empty for methods without programs. Iterations of qp whose entry of the trace is called
-            "unobstructed" have none.
+            "seed" have none: each is a descent by damped least squares.
     """
 
     q: Array

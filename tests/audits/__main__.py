@@ -176,7 +176,29 @@ def loads(arguments: argparse.Namespace) -> None:
     publish("loads", loads.report(rows, facts), arguments)
 
 
-COMMANDS = (newton, qp, human, regress, loads)
+@measuring(
+    "clip-constants",
+    "what each constant of the methods of `wb.avoid` is worth",
+    "Halve and double one constant at a time, and free clips that need no recordings.",
+    listed("--only", "modules of wholebody.motion (default: all that are looked at)", "MODULE"),
+)
+def clip_constants(arguments: argparse.Namespace) -> None:
+    """Measure and report; --quick takes two clips."""
+    from tests.audits import clip_constants as ablated
+    from wholebody.bench.rows import report
+    from wholebody.figures import load
+
+    only = chosen(arguments.only, ablated.USED, "--only")
+    cases = ablated.CASES[-2:] if arguments.quick else ablated.CASES
+    facts, rows = machine(), ablated.ablation(load("human"), print, cases, only)
+    shown = [row for row in rows if ablated.matters(row)]
+    unnoticed = sorted({row.case for row in rows} - {row.case for row in shown})
+    about = "Constants of `wb.avoid`, halved and doubled on clips: changes, summed over the cases."
+    text = report(about, {"": shown}, facts, [f"changes nothing: {name}" for name in unnoticed])
+    publish("clip-constants", text, arguments, facts=facts, tables={"clip-constants": rows})
+
+
+COMMANDS = (newton, qp, human, regress, loads, clip_constants)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -32,21 +32,19 @@ from wholebody.bench.report import render
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.linear_algebra.base import LinearSystem, Pattern
-from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.linear_algebra import LinearSystem, Pattern, linear_algebra
 from wholebody.methods.newton.settings import STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.tracking import NewtonTracker
 
 SIZES = (10, 30, 100, 300, 1000)
 SMALLEST_FITTED = 30  # bodies: smaller systems cost what any call costs
-ALGEBRAS = ("normal", "llt", "kkt", "schur", "dense")
+ALGEBRAS = ("normal", "kkt", "schur")
 PAPER_BODIES = 30  # 210 variables and about 1455 non-zeros, as in the paper
 CIRCLE = 0.05  # rad: from move to move of a drag
 FINE = 1e-8  # m, rad: tolerance at which two methods are compared
 TABLE_TOP = 0.74  # m
 TOUCHING = 1e-4  # m: nearer than this counts as contact
-LARGEST_DENSE = 100  # bodies: more take seconds
 LARGEST_STAR = 300  # bodies for which a star's full normal equations are still formed
 
 
@@ -89,13 +87,11 @@ def linear_rows(sizes: tuple[int, ...], repeats: int) -> Iterator[LinearRow]:
                 rng.normal(size=pattern.height),
             )
             for name in ALGEBRAS:
-                if name == "dense" and count > LARGEST_DENSE:
-                    continue
-                if shape == "star" and count > LARGEST_STAR and name in ("normal", "llt"):
+                if shape == "star" and count > LARGEST_STAR and name == "normal":
                     continue
                 if name == "schur" and shape != "star":
                     continue
-                few = 2 if count >= LARGEST_STAR and name in ("normal", "llt") and shape == "star" else repeats
+                few = 2 if count >= LARGEST_STAR and name == "normal" and shape == "star" else repeats
                 analysed = median_us(partial(linear_algebra, pattern, name), 3)
                 solver = linear_algebra(pattern, name)
                 try:
@@ -140,7 +136,8 @@ class SolveRow:
 def assembly_row(case: str, made: Assembly, repeats: int) -> SolveRow:
     """A reach from where an assembly stands."""
     system = made.system()
-    return _reach_row(case, ActiveSystem(system, linear_algebra(system.pattern)), made.variables(), repeats)
+    active_system = ActiveSystem(system.batches, system.weight, "auto")
+    return _reach_row(case, active_system, active_system.begin(made.variables(), ()), repeats)
 
 
 def _reach_row(case: str, active_system: ActiveSystem, x: Array, repeats: int) -> SolveRow:
@@ -338,7 +335,7 @@ def report(
         (place, [by_place.get((*place, name)) for name in ALGEBRAS])
         for place in dict.fromkeys((row.shape, row.bodies) for row in linear)
     ]
-    exponents = [(shape, [exponent(linear, shape, name) for name in ALGEBRAS[:4]]) for shape in SHAPES]
+    exponents = [(shape, [exponent(linear, shape, name) for name in ALGEBRAS]) for shape in SHAPES]
     return render(
         "newton.md",
         TEMPLATES, solves=solves, agreements=agreements, drags=drags, facts=facts, algebras=ALGEBRAS, sizes=sizes,

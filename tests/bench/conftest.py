@@ -12,7 +12,7 @@ from wholebody.bench.measure.track import Track, track
 def coarse_pictures() -> Iterator[None]:
     """Draw charts of fewer pixels, which takes less time; their SVG are the same."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setitem(plot_style.SETTINGS, "savefig.dpi", 40)
+        patch.setitem(plot_style.STYLE["settings"], "savefig.dpi", 40)
         yield
 
 

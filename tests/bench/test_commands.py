@@ -11,7 +11,7 @@ from tests.csv_rows import csv_rows
 from wholebody.bench import plot_style
 from wholebody.bench.measure.track import VARIANTS
 from wholebody.bench.rows import Panel, chart, shares
-from wholebody.bench.suite.adapters.registry import STEPPING
+from wholebody.bench.suite.adapters.registry import stepping
 from wholebody.cli.bench import run as group
 
 MARKERS = "\n".join(f"<!-- bench:{name} -->\n<!-- /bench:{name} -->" for name in ("step", "reaches", "solve"))
@@ -112,9 +112,10 @@ def test_charts_are_the_same_for_the_same_numbers(tmp_path: Path) -> None:
 
 
 def test_every_tool_has_a_colour_of_its_own() -> None:
-    assert {name.replace("wholebody", "qp") for name in STEPPING} <= set(plot_style.STYLES)
+    assert {name.replace("wholebody", "qp") for name in stepping()} <= set(plot_style.STYLE["methods"])
     assert plot_style.method_style("qp") == plot_style.method_style("wholebody")  # the same method in another chart
-    assert len({style.color for style in plot_style.STYLES.values()}) == len(plot_style.STYLES)
+    colors = [color for color, _ in plot_style.STYLE["methods"].values()]
+    assert len(set(colors)) == len(colors)
 
 
 @pytest.mark.parametrize("words", [("step", "--repeats", "0"), ("solve", "--jobs", "0"), ("solve", "--count", "-1")])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from wholebody.bench.measure.track import DT, Track, judge
+from wholebody.bench.measure.track import SETTING, Track, judge
 
 
 def test_standing_still_is_judged_as_standing_still(short_free: Track) -> None:
@@ -28,7 +28,7 @@ def test_what_is_wrong_is_seen(short_free: Track) -> None:
     verdict = judge(short_free, postures)
     assert verdict.foot_drift == pytest.approx(0.05)
     assert verdict.limit_violation == pytest.approx(0.1)
-    assert verdict.fastest_root == pytest.approx(0.05 / DT / 1.0)
+    assert verdict.fastest_root == pytest.approx(0.05 / SETTING.dt / 1.0)
     postures[3, 0] = np.nan
     with pytest.raises(ValueError, match="finite"):
         judge(short_free, postures)

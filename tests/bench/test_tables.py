@@ -12,6 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from wholebody.base.errors import FileFormatError
+from wholebody.bench.rows import Row as Measured
 from wholebody.bench.statistics import Interval
 from wholebody.bench.tables import filled, machine, of, read_rows, replace_section, sentence, write_rows
 
@@ -65,6 +66,12 @@ def test_line_breaks_in_a_cell_come_back(tmp_path: Path, said: str) -> None:
 def test_a_file_whose_lines_end_as_on_windows_is_read(tmp_path: Path) -> None:
     (tmp_path / "rows.csv").write_bytes(b"# cores: 2\r\nname,count,value,good\r\na,1,0.5,True\r\n")
     assert read_rows(tmp_path / "rows.csv", Row) == ({"cores": "2"}, [Row("a", 1, 0.5, True)])
+
+
+def test_figures_come_back_as_numbers_and_texts(tmp_path: Path) -> None:
+    rows = [Measured("a", "qp", {"ms": 0.1, "pairs": 3, "status": "solved"}), Measured("b", "ccd", {"pairs": 5})]
+    write_rows(tmp_path / "rows.csv", {}, rows)
+    assert read_rows(tmp_path / "rows.csv", Measured)[1] == rows
 
 
 def test_nan_comes_back(tmp_path: Path) -> None:

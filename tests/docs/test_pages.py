@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import re
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -20,18 +22,11 @@ from wholebody.cli.main import main
         "README.md",
         "docs/quickstart.md",
         "docs/guide.md",
+        "docs/figures.md",
         "docs/interaction.md",
         "docs/motion.md",
-        "docs/world.md",
         "docs/studies.md",
-        "docs/frames.md",
-        "docs/how-to/bolt.md",
-        "docs/how-to/driver.md",
-        "docs/how-to/lift.md",
-        "docs/how-to/reach-map.md",
-        "docs/how-to/drag-and-record.md",
-        "docs/how-to/compare.md",
-        "docs/how-to/own-term.md",
+        "docs/comparison.md",
     ],
 )
 def test_code_on_the_page_runs(page: str, root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -46,21 +41,17 @@ def test_a_real_robot_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytes
     if not os.environ.get("WHOLEBODY_ROBOTS"):
         pytest.skip("no robot descriptions here; WHOLEBODY_ROBOTS names their folder")
     monkeypatch.chdir(tmp_path)
-    names = _run(root / "docs/how-to/robot.md")
+    names = _run(root / "docs/figures.md", "robots")
     assert names["solution"].solved
     hand = names["panda"].placement(names["solution"].q, "panda_hand_tcp")
     np.testing.assert_allclose(hand.translation, (0.54, 0.05, 0.45), atol=1e-4)
 
 
-def test_configurations_of_pink_and_mujoco_are_starts(
-    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for package in ("pink", "mujoco"):
-        pytest.importorskip(package)
+def test_a_configuration_of_mujoco_is_a_start(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)
-    names = _run(root / "docs/how-to/warm-start.md")
-    assert capsys.readouterr().out.split() == ["solved", "solved"]
-    np.testing.assert_allclose(names["start"], names["configuration"].q)
+    names = _run(root / "docs/figures.md", "mujoco", _run(root / "docs/figures.md"))
+    assert names["arm"].joint_values(names["start"]) == {"turn": 0.6}
 
 
 def test_the_study_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -77,10 +68,16 @@ def test_the_study_on_the_page(root: Path, tmp_path: Path, monkeypatch: pytest.M
     assert "solved" in Path("out/shelf-study/cases.csv").read_text()
 
 
-def _run(page: Path) -> dict[str, Any]:
-    """The names that the blocks of a page define, run one after the other."""
-    blocks = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    names: dict[str, Any] = {}
-    for block in blocks:
+def _run(page: Path, needs: str = "", known: Mapping[str, Any] = MappingProxyType({})) -> dict[str, Any]:
+    """The names that the blocks of a page define, run one after the other.
+
+    Args:
+        page: Markdown.
+        needs: what the blocks need that not everybody has, as ``<!-- needs: NAME -->`` before them says.
+        known: names that are defined before.
+    """
+    blocks = re.findall(r"(?:<!-- needs: (\w+) -->\n)?```python\n(.*?)```", page.read_text(), re.DOTALL)
+    names = dict(known)
+    for block in [text for need, text in blocks if need == needs]:
         exec(compile(block, str(page), "exec"), names)
     return names

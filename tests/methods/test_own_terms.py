@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 import wholebody as wb
 from wholebody.figures.state import Wrench
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.tangent_rows import constraint_rows, goal_rows
+from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
 
 Array = np.ndarray[Any, np.dtype[np.float64]]
 

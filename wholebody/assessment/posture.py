@@ -8,6 +8,7 @@ when they are asked for.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields
 from math import inf
 from typing import Any
@@ -21,7 +22,9 @@ from wholebody.base.checks import a, number, posture
 from wholebody.base.errors import InputError, TermError
 from wholebody.figures.state import State
 from wholebody.problem import Problem
-from wholebody.tasks.answers import limit, one, values
+from wholebody.tasks.answers import is_own, limit, one
+from wholebody.tasks.base import Constraint, Goal
+from wholebody.tasks.checks import values_and_rows
 
 STILL = 1e-2  # rad, m: optimality below which a posture counts as the nearest to goals that it does not meet
 NAMED = 4  # most blockers that a message names
@@ -165,7 +168,7 @@ def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[flo
     """The largest distance [m] and the largest angle [rad] of goals from their targets, and the larger of each goal."""
     distances, angles, each = [0.0], [0.0], []
     for goal in problem.goals:
-        error = values(goal, "error", goal.error(state))
+        error = _values(goal, goal.error, state)
         angular = np.broadcast_to(goal.angular, error.shape)
         distances.append(float(np.linalg.norm(error[~angular])))
         angles.append(float(np.linalg.norm(error[angular])))
@@ -183,10 +186,15 @@ def largest_violation(problem: Problem, state: State) -> float:
     """The largest violation of a constraint, metres or radians."""
     worst = 0.0
     for constraint in problem.constraints:
-        value = values(constraint, "value", constraint.value(state))
+        value = _values(constraint, constraint.value, state)
         least, most = (limit(constraint, side, getattr(constraint, side)) for side in ("lower", "upper"))
         worst = max(worst, float(np.maximum(least - value, value - most).max(initial=0.0)))
     return worst
+
+
+def _values(term: Goal | Constraint, evaluate: Callable[[State], Array], state: State) -> Array:
+    """Values (m,) of a goal or constraint; one of one's own must have as many rows as values here too."""
+    return values_and_rows(term, evaluate, state)[0] if is_own(term) else evaluate(state)
 
 
 def _weighed(problem: Problem, state: State) -> float:

@@ -19,26 +19,24 @@ from typing import Any, TypeVar
 TOGETHER = (
     (
         "wholebody.methods.qp.active_set",
-        "wholebody.methods.qp.semismooth_newton",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.loops",),
-    ("wholebody.terms.linearisation", "wholebody.methods.qp.unobstructed"),
+    ("wholebody.dynamics.step_program",),
+    ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
         "wholebody.geometry.proximity",
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
-        "wholebody.methods.newton.linear_algebra.normal_equations",
+        "wholebody.methods.ccd.sweep",
+        "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
     ),
     (
-        "wholebody.methods.qp.curved_reach",
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.osqp_solver",
         "wholebody.methods.qp.solvers.split_form",
     ),
 )

@@ -8,7 +8,10 @@ from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from wholebody.base.files import parsed_toml
 from wholebody.bench.statistics import Interval
+
+MOST = 6  # methods in a chart
 
 
 class Style(NamedTuple):
@@ -18,29 +21,13 @@ class Style(NamedTuple):
     marker: str
 
 
-STYLES = {
-    "qp": Style("#0072b2", "o"),
-    "qp/active_set": Style("#004166", "."),
-    "qp/osqp": Style("#4b6a9b", "o"),
-    "qp/daqp": Style("#56b4e9", "."),
-    "qp/quadprog": Style("#7f9fc4", "."),
-    "qp/proxqp": Style("#9fb8d0", "."),
-    "qp/piqp": Style("#b3c6e0", "."),
-    "newton/slack": Style("#e69f00", "s"),
-    "newton/barrier": Style("#a06a00", "D"),
-    "newton/kkt": Style("#f3cf7a", "s"),
-    "ccd": Style("#000000", "v"),
-    "dls": Style("#8c8c8c", "X"),
-    "placo": Style("#d55e00", "P"),
-    "placo/pruned": Style("#e8a06a", "."),
-    "mink": Style("#009e73", "h"),
-    "pink": Style("#cc79a7", "*"),
-}
-"""Of methods: Okabe and Ito's colours, which people with any colour vision tell apart; qp with other settings has
-further blues."""
+def _read() -> dict[str, Any]:
+    file = Path(__file__).with_name("plot_style.toml")
+    return parsed_toml(file.read_text("utf-8"), file.name)
 
-OTHERS = ("#882255", "#117733", "#999933", "#661100", "#aa4499", "#44aa99", "#332288", "#88ccee", "#cc6677", "#ddcc77")
-GREY = "#666666"
+
+STYLE = _read()
+"""Matplotlib's settings, the colours and markers of methods, and further colours."""
 
 
 def method_style(name: str) -> Style:
@@ -50,24 +37,8 @@ def method_style(name: str) -> Style:
     """
     method = "newton/slack" if name == "newton" else name.replace("wholebody", "qp")
     number = sha256(method.encode()).digest()[0]
-    shades = ("#35507a", "#5f86b3", "#8aa0c0") if method.startswith("qp/") else OTHERS
-    return STYLES.get(method, Style(shades[number % len(shades)], "p"))
-
-
-SETTINGS = {
-    "svg.hashsalt": "wholebody",  # names inside the file do not depend on chance
-    "svg.fonttype": "none",
-    "savefig.dpi": 150,
-    "font.family": "DejaVu Sans",
-    "font.size": 10.0,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.axisbelow": True,
-    "axes.grid": True,
-    "grid.color": "#dddddd",
-    "grid.linewidth": 0.6,
-    "figure.facecolor": "white",
-}
+    shades = STYLE["others"]["qp" if method.startswith("qp/") else "all"]
+    return Style(*STYLE["methods"].get(method, (shades[number % len(shades)], "p")))
 
 
 def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any]:
@@ -77,7 +48,7 @@ def figure(rows: int, columns: int, size: tuple[float, float]) -> tuple[Any, Any
     matplotlib.use("agg")
     from matplotlib import pyplot
 
-    matplotlib.rcParams.update(SETTINGS)
+    matplotlib.rcParams.update(STYLE["settings"])
     chart, axes = pyplot.subplots(rows, columns, figsize=size, squeeze=False, layout="constrained")
     return chart, axes
 

@@ -71,14 +71,36 @@ def times(values: Any, unit: str = "ms", name: str = "") -> dict[str, Figure]:
     }
 
 
-def table(rows: Sequence[Row], first: tuple[str, str] = ("case", "tool")) -> str:
-    """Rows as a table of Markdown; a column for every figure that one of them has."""
+def table(rows: Sequence[Row]) -> str:
+    """Rows as a table of Markdown: case, tool if any has one, and a column for every figure that one of them has."""
     names = list(dict.fromkeys(name for row in rows for name in row.figures))
-    lines = [f"| {' | '.join([*first, *names])} |", f"| --- | --- |{' ---: |' * len(names)}"]
+    heads = 1 + any(row.tool for row in rows)
+    lines = [f"| {' | '.join([''] * heads + names)} |", f"|{'---|' * heads}{'---:|' * len(names)}"]
     for row in rows:
         cells = [shown(row.figures[name]) if name in row.figures else "" for name in names]
-        lines.append(f"| {row.case} | {row.tool} | {' | '.join(cells)} |")
+        lines.append(f"| {' | '.join([*(row.case, row.tool)[:heads], *cells])} |")
     return "\n".join(lines)
+
+
+def only(rows: Sequence[Row], *names: str) -> list[Row]:
+    """The rows with these figures alone, for a report; their CSV file has all of them."""
+    return [Row(row.case, row.tool, {name: row[name] for name in names if name in row.figures}) for row in rows]
+
+
+def across(rows: Sequence[Row], *names: str, columns: str = "case") -> list[Row]:
+    """Figures of all rows as a table of two ways: a row for each tool, and a column for each case and figure.
+
+    Args:
+        rows: that have the figures; others are left out.
+        names: of the figures.
+        columns: "case", or "tool" for a row of each case and a column of each tool.
+    """
+    found: dict[str, dict[str, Figure]] = {}
+    for row in rows:
+        down, column = (row.tool, row.case) if columns == "case" else (row.case, row.tool)
+        titles = {name: column if len(names) == 1 else f"{column}, {name}" for name in names if name in row.figures}
+        found.setdefault(down, {}).update({title: row[name] for name, title in titles.items()})
+    return [Row(down, "", figures) for down, figures in found.items() if figures]
 
 
 def shown(figure: Figure) -> str:
@@ -133,7 +155,7 @@ def chart(panels: Sequence[Panel], path: Path, columns: int = 3) -> tuple[Path, 
             color = plot_style.method_style(label).color
             (labels[label],) = axis.plot(x, y, color=color, marker=panel.marker, markersize=4, linewidth=1.3)
         for level in panel.levels:
-            axis.axhline(level, color=plot_style.GREY, linewidth=0.9, linestyle="--")
+            axis.axhline(level, color="#666666", linewidth=0.9, linestyle="--")
         if "x" in panel.log:
             plot_style.plain_log(axis)
         if "y" in panel.log:

@@ -12,18 +12,12 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, TypeVar, get_origin, get_type_hints
 
 from wholebody.base.errors import FileFormatError
 from wholebody.base.files import make_folder, read_text, write
 from wholebody.bench.statistics import Interval
 from wholebody.version import __version__
-
-PACKAGES = (
-    "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
-    "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
-)  # fmt: skip
-THREADS = "OMP_NUM_THREADS"
 
 
 def machine() -> dict[str, str]:
@@ -36,16 +30,22 @@ def machine() -> dict[str, str]:
         "load": f"{os.getloadavg()[0]:.1f} in the minute before",
         "system": f"{platform.system()} {platform.release()}, {platform.libc_ver()[1] or 'unknown libc'}",
         "python": platform.python_version(),
-        THREADS: os.environ.get(THREADS, "not set"),
+        "OMP_NUM_THREADS": os.environ.get("OMP_NUM_THREADS", "not set"),
     }
     facts["numba"] = _version("numba") or "not installed"  # our own linearisation is faster with it
-    installed = {name: _version(name) for name in PACKAGES}
+    packages = (
+        "pin", "coal", "numpy", "scipy", "osqp", "daqp", "quadprog", "proxsuite", "piqp", "qpsolvers",
+        "placo", "pin-pink", "mink", "mujoco", "rapier3d", "matplotlib",
+    )  # fmt: skip
+    installed = {name: _version(name) for name in packages}
     return facts | {name: version for name, version in installed.items() if version}
 
 
 def sentence(facts: Mapping[str, str]) -> str:
-    """Say the facts in one paragraph of Markdown."""
-    return "Measured with " + "; ".join(f"{name} {value}" for name, value in facts.items()) + "."
+    """The facts in one sentence of Markdown, without the system and the versions of packages: CSV files have these."""
+    kept = "wholebody", "processor", "cores", "load", "OMP_NUM_THREADS"
+    told = [f"{name} {value}" for name, value in facts.items() if name in kept]
+    return f"Measured with {'; '.join(told)}."
 
 
 def _processor() -> str:
@@ -76,7 +76,8 @@ def write_text(path: Path, text: str) -> None:
 def write_rows(path: Path, facts: Mapping[str, str], rows: Sequence[Any]) -> None:
     """Write dataclass instances of one kind, one a line, under their field names; the facts stand above as comments.
 
-    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key.
+    An interval has three columns, of which the ends are called NAME_low and NAME_high; a mapping has a column a key,
+    and is read back with numbers where cells are numbers, without those that are empty.
     """
     text = io.StringIO()
     for name, value in facts.items():
@@ -114,13 +115,17 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
         line, _, rest = rest.partition("\n")
         name, _, value = line[2:].removesuffix("\r").partition(": ")
         facts[name] = value
-    types = get_type_hints(kind)
-    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
-    names = [name for each in parts.values() for name in each]
     try:
         given = list(csv.reader(io.StringIO(rest, newline="")))  # cells may have line breaks
     except csv.Error as error:
         raise FileFormatError(f"{path}: is no CSV ({error}); measure again") from None
+    types = get_type_hints(kind)
+    parts = {field.name: _parts(field.name, types[field.name]) for field in dataclasses.fields(kind)}  # type: ignore[arg-type]
+    for name in parts:
+        if get_origin(types[name]) is Mapping:  # which has all further columns
+            others = {part for other, each in parts.items() if other != name for part in each}
+            parts[name] = tuple(column for column in (given[0] if given else ()) if column not in others)
+    names = [name for each in parts.values() for name in each]
     if not given or given[0] != names:
         found = ", ".join(given[0])[:200] if given else "none"
         raise FileFormatError(f"{path}: the columns are {found}, not {', '.join(names)}; measure again")
@@ -128,7 +133,12 @@ def read_rows(path: Path, kind: type[_R]) -> tuple[dict[str, str], list[_R]]:
     for number, cells in enumerate(given[1:], start=1):
         try:
             texts = dict(zip(names, cells, strict=True))
-            values = {name: _value(types[name], [texts[each] for each in parts[name]]) for name in parts}
+            values = {
+                name: {part: figure(texts[part]) for part in parts[name] if texts[part]}
+                if get_origin(types[name]) is Mapping
+                else _value(types[name], [texts[each] for each in parts[name]])
+                for name in parts
+            }
             rows.append(kind(**values))
         except ValueError as error:
             raise FileFormatError(f"{path}: row {number} cannot be read ({error}); measure again") from None
@@ -202,6 +212,16 @@ def _line(cells: Iterable[str]) -> str:
 def _parts(name: str, kind: Any) -> tuple[str, ...]:
     """The columns of a field."""
     return (name, f"{name}_low", f"{name}_high") if kind is Interval else (name,)
+
+
+def figure(text: str) -> int | float | str:
+    """What a cell of a figure holds: a whole number, a number, or a text."""
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            pass
+    return text
 
 
 def _value(kind: Any, texts: Sequence[str]) -> Any:

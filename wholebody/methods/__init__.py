@@ -10,9 +10,9 @@ from wholebody.base.imports import exported
 if TYPE_CHECKING:
     from wholebody.methods.ccd.method import CCD
     from wholebody.methods.damped_least_squares import DampedLeastSquares
-    from wholebody.methods.newton.assembly_constraint import AssemblyConstraint
     from wholebody.methods.newton.assembly_solution import AssemblySolution
     from wholebody.methods.newton.method import Newton
+    from wholebody.methods.newton.own_rows import AssemblyConstraint
     from wholebody.methods.placo.method import Placo
     from wholebody.methods.qp.method import QP
 
@@ -46,7 +46,7 @@ __getattr__, _ = exported(
     {
         "wholebody.methods.ccd.method": "CCD",
         "wholebody.methods.damped_least_squares": "DampedLeastSquares",
-        "wholebody.methods.newton.assembly_constraint": "AssemblyConstraint",
+        "wholebody.methods.newton.own_rows": "AssemblyConstraint",
         "wholebody.methods.newton.assembly_solution": "AssemblySolution",
         "wholebody.methods.newton.method": "Newton",
         "wholebody.methods.placo.method": "Placo",

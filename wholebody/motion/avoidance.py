@@ -29,8 +29,7 @@ from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
 from wholebody.motion.measures import MotionBounds, resolved
-from wholebody.motion.soles import usual_feet
-from wholebody.motion.stance import StanceFeet, has_feet
+from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
@@ -41,7 +40,6 @@ METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
         "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
         "frames": ("wholebody.motion.per_frame", "PerFrame"),
         "bisection": ("wholebody.motion.bisection.method", "Bisection"),
-        "fade": ("wholebody.motion.fade", "Fade"),
     }
 )
 """Methods by name: module and class of the settings."""
@@ -97,7 +95,7 @@ def avoid(
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "fade", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
+        method: "trajectory", "frames", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless

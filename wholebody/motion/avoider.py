@@ -7,13 +7,14 @@ judges the answer. So a method has no judge, repair or report of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import fields, is_dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, faults
-from wholebody.motion.following import Follower, Work, freed_posture
+from wholebody.motion.following import Follower, Work
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.strength import Strength
 from wholebody.motion.windows import Window, windows
@@ -111,10 +112,6 @@ class Run:
         """Windows around marked frames (n,), with so many seconds and at least so many frames on both sides."""
         return windows(marked, self.frames(seconds, least))
 
-    def freed_posture(self, frame: int, q: Array) -> Array:
-        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap."""
-        return freed_posture(self.terms, frame, q, self.clearance, self.work)
-
 
 class MethodResult(NamedTuple):
     """What a method makes of a clip.
@@ -160,6 +157,6 @@ class Avoider(Protocol):
         """
 
 
-def has_setting(method: Avoider, name: str) -> bool:
+def has_setting(method: object, name: str) -> bool:
     """Whether a method has a setting of a name, such as "dynamics", so that `dataclasses.replace` changes it."""
-    return name in getattr(method, "__dataclass_fields__", {})
+    return is_dataclass(method) and name in {each.name for each in fields(method)}

@@ -90,25 +90,17 @@ class Follower:
                 break
         return q
 
-
-def freed_posture(terms: FrameTerms, frame: int, q: Array, clearance: float, work: Work) -> Array:
-    """A posture (nq,) without overlap, near a posture of a frame.
-
-    Args:
-        terms: what is held.
-        frame: whose constraints hold.
-        q: (nq,) near which; it may overlap.
-        clearance: least distance of every pair, metres.
-        work: counts the programs, and the posture.
-    """
-    held = terms.held(frame)
-    goals = [term for term in held if isinstance(term, Goal)]
-    others = [term for term in held if not isinstance(term, Goal)]
-    bounds = [term for term in terms.given if isinstance(term, Bound)]
-    problem = Problem(terms.scene, terms.scene.figure.clamp(q), goals=goals, constraints=[*others, *bounds])
-    work.leave_out(frame, problem.left_out)
-    problem.clearances = np.full_like(problem.clearances, clearance)
-    solution = QP(restarts=0).solve(problem)
-    work.posture_solves += 1
-    work.programs += sum(solution.programs.values())
-    return solution.q
+    def freed(self, number: int, q: Array) -> Array:
+        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap, by a solve of its own."""
+        terms, work = self._terms, self._work
+        held = terms.held(number)
+        goals = [term for term in held if isinstance(term, Goal)]
+        others = [term for term in held if not isinstance(term, Goal)]
+        bounds = [term for term in terms.given if isinstance(term, Bound)]
+        problem = Problem(terms.scene, terms.scene.figure.clamp(q), goals=goals, constraints=[*others, *bounds])
+        work.leave_out(number, problem.left_out)
+        problem.clearances = np.full_like(problem.clearances, self._clearance)
+        solution = QP(restarts=0).solve(problem)
+        work.posture_solves += 1
+        work.programs += sum(solution.programs.values())
+        return solution.q

@@ -8,6 +8,7 @@ tracker, and what is left then, such as dips between frames, by the shared repai
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -31,6 +32,9 @@ class PerFrame:
         InputError: a value out of range.
     """
 
+    name: ClassVar[str] = "frames"
+    dynamics: ClassVar[None] = None
+
     clearance: float = 0.0
     backward: bool = True
 
@@ -38,15 +42,6 @@ class PerFrame:
         """Check the settings."""
         checks.settle(self, "clearance", checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m"))
         checks.settle(self, "backward", checks.flag(self.backward, "PerFrame: backward"))
-
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "frames"
-
-    @property
-    def dynamics(self) -> None:
-        """It looks at no torques."""
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -106,6 +106,7 @@ class SceneGeometry:
         self._moved_at = np.zeros(geometry.ngeoms, dtype=np.int64)
         self._put_at: dict[str, int] = {}
         self._pools: dict[Any, Pool[Any]] = {}
+        self._known: dict[Any, Any] = {}
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
         """Place the pieces of an object whose placement in its joint's frame is `base`.
@@ -156,10 +157,24 @@ class SceneGeometry:
                 continue
             moved[name] = (moved[name][0] if name in moved else before, after)
 
-    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
+    def pool(self, kind: object, make: Callable[[], T]) -> Pool[T]:
         """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
         pool: Pool[T] | None = self._pools.get(kind)
         return self._pools.setdefault(kind, Pool(make)) if pool is None else pool
+
+    def known(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What follows from the model and a key alone: made by `make` the first time, and read-only.
+
+        The newest 16 are kept.
+        """
+        found: T | None = self._known.get(key)
+        if found is None:
+            found = make()
+            with self.lock:
+                self._known[key] = found
+                while len(self._known) > 16:
+                    del self._known[next(iter(self._known))]
+        return found
 
     def copied(self) -> SceneGeometry:
         """A copy with placements of its own."""

@@ -263,7 +263,7 @@ METHODS = {
         (
             _TOLERANCE,
             _ITERATIONS,
-            Key("algebra", kinds.Text(), '"auto" (if left out), "normal", "llt", "kkt", "schur", "dense" or "svd"'),
+            Key("algebra", kinds.Text(), '"auto" (if left out), "normal", "kkt" or "schur"'),
             Key(
                 "inequalities",
                 kinds.Choice(("slack", "barrier")),

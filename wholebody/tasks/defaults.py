@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 
 import numpy as np
 
@@ -32,75 +32,69 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 
-def default_measures(scene: Surroundings, *, ranges: bool) -> list[Measure]:
-    """`Effort`, and for a person `Rhythm` beside it.
+def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tuple[Measure, ...]:
+    """`Effort`, and for a person `Rhythm` beside it, resolved.
 
     Args:
         scene: with the figure.
+        start: (nq,) the start.
         ranges: whether a person moves as people do; without it `Effort` is alone.
     """
     person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
-    return [Effort(), Rhythm()] if person else [Effort()]
+    effort = Effort().resolve(scene, start)
+    return (effort, Rhythm().resolve(scene, start)) if person else (effort,)
 
 
 def default_constraints(
-    scene: Surroundings,
-    start: Array,
-    stated: Sequence[Constraint],
-    bounds: Sequence[Bound],
-    goals: Sequence[Goal],
-    *,
-    ranges: bool,
-    balance: bool | None,
-) -> tuple[list[Constraint], str]:
+    scene: Surroundings, start: Array, known: Set[type], *, ranges: bool, balance: bool, required: bool
+) -> tuple[tuple[Constraint, ...], str]:
     """What is added to the constraints that were stated; a stated term takes the place of the default of its class.
 
     A person who stands at the start on a line, such as the tips of two toes, keeps no balance that is measured by an
-    area. The default is left out there; `balance=True` asks for it, and its error is raised.
+    area. The default is left out there, unless it is required.
 
     Args:
         scene: with the figure; only one with ranges of motion, a person, has defaults.
         start: (nq,) the start.
-        stated: resolved constraints.
-        bounds: resolved bounds.
-        goals: resolved goals.
+        known: classes of the constraints that were stated.
         ranges: whether ranges of motion and reach cones are kept.
-        balance: whether to keep balance; None if the person stands.
+        balance: whether balance is kept.
+        required: whether it must be kept.
 
     Returns:
-        The constraints, and which default is left out and why, in words; "" where none is.
+        The resolved constraints, and which default is left out and why, in words; "" where none is.
 
     Raises:
-        InputError: balance is asked for, and the feet do not stand on an area.
+        InputError: balance is required, and the feet do not stand on an area.
     """
     figure = scene.figure
-    known = {type(term) for term in stated}
     found: list[Constraint] = []
     if ranges and figure.ranges and RangeOfMotion not in known:
-        found.append(RangeOfMotion())
+        found.append(RangeOfMotion().resolve(scene, start))
     if ranges and figure.ranges and figure.cones and ReachCones not in known:
-        found.append(ReachCones())
-    asked = stands(scene, start, stated, bounds, goals) if balance is None else balance
-    if not asked or known & {Balance, Stand}:
-        return found, ""
+        found.append(ReachCones().resolve(scene, start))
+    if not balance or known & {Balance, Stand}:
+        return tuple(found), ""
     try:
         corners = convex_polygon(standing_points(scene, start, FEET)[:, :2])
         inputs.check_mass(scene, "Balance")
     except InputError as error:
-        if balance:
+        if required:
             raise
-        return found, f"the default Balance is left out: {str(error).removeprefix('Balance: ').partition(';')[0]}"
-    return [*found, Balance(margin=STEADY * least_width(corners))], ""
+        return tuple(
+            found
+        ), f"the default Balance is left out: {str(error).removeprefix('Balance: ').partition(';')[0]}"
+    return (*found, Balance(margin=STEADY * least_width(corners)).resolve(scene, start)), ""
 
 
 def stands(
-    scene: Surroundings, start: Array, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
+    scene: Surroundings, state: State, stated: Sequence[Constraint], bounds: Sequence[Bound], goals: Sequence[Goal]
 ) -> bool:
     """Whether a person stands: both feet are held where they are at the start, and nothing else carries it.
 
     Args:
         scene: with the figure.
-        start: (nq,) the start.
+        state: at the start.
         stated: resolved constraints.
         bounds: resolved bounds.
         goals: resolved goals.
@@ -113,13 +107,8 @@ def stands(
     if any(isinstance(term, (Sit, Lean)) for term in (*stated, *goals)):
         return False
     feet = {int(scene.model.frames[figure.frame_id(foot)].parentJoint) for foot in FEET}
-    held, state = set(), State(scene.model).update(start)
-    for term in stated:
-        if not isinstance(term, Hold) or term.residual.base.frame:
-            continue
-        joint = term.residual.place.joint
-        # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
-        if joint not in feet or np.abs(term.value(state)).max() > 1e-3:
-            return False
-        held.add(joint)
-    return held == feet
+    holds = [term for term in stated if isinstance(term, Hold) and not term.residual.base.frame]
+    if {term.residual.place.joint for term in holds} != feet:
+        return False
+    # m, rad: a foot held this near to its place at the start stands where the support polygon is computed.
+    return all(np.abs(term.value(state)).max() <= 1e-3 for term in holds)

@@ -14,8 +14,6 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
-_BALL = Marker("ball", LOOK.blocker, LOOK.blocker_radius)
-
 
 def mark_blockers(
     keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
@@ -35,7 +33,10 @@ def mark_blockers(
         if place is None:
             continue
         root = f"{LOOK.blocker_node}/{number}"
-        keyframe.markers[f"{root}/ball"] = (_BALL, drawing.point_placement(place))
+        keyframe.markers[f"{root}/ball"] = (
+            Marker("ball", LOOK.blocker, LOOK.blocker_radius),
+            drawing.point_placement(place),
+        )
         label = Marker("label", LOOK.blocker_label, LOOK.label_size, f"in the way: {blocker}")
         above = drawing.point_placement(place + [0.0, 0.0, 2.0 * LOOK.blocker_radius])
         keyframe.markers[f"{root}/text"] = (label, above)

@@ -15,8 +15,6 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedContacts
 
-_NORMAL = Marker("arrow", LOOK.normal, 0.8)
-_WITNESS = Marker("ball", LOOK.witness, LOOK.witness_radius)
 _DEPTH = Marker("arrow", LOOK.depth, 1.3)
 
 
@@ -37,15 +35,16 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
     as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled with their depth.
     """
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
+    witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
     for row in range(min(len(contacts.distance), 60)):
         root = f"{LOOK.contact_node}/{row}"
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
         for name, point in (("a", start), ("b", end)):
-            keyframe.markers[f"{root}/{name}"] = (_WITNESS, drawing.point_placement(point))
+            keyframe.markers[f"{root}/{name}"] = (witness, drawing.point_placement(point))
         if distance >= -PENETRATION:
             place = drawing.arrow_placement(start, normal, LOOK.normal_length)
-            keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
+            keyframe.markers[f"{root}/normal"] = (touch, place)
             continue
         first, second = (bodies.all[int(index)] for index in contacts.pair[row])
         out, origin = -normal, start

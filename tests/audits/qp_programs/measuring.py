@@ -190,16 +190,9 @@ def summaries(rows: Sequence[QPRow], solvers: Sequence[str]) -> list[QPSummary]:
 
 
 def qp_report(rows: Sequence[QPRow], totals: Sequence[QPSummary], facts: Mapping[str, str]) -> str:
-    """Tables: all programs by every solver, and the times set by set."""
-    times = {
-        (family, total.solver): np.quantile(
-            [row.wall_us for row in rows if (row.set, row.solver) == (family, total.solver)], (0.5, 0.95)
-        )
-        for family in dict.fromkeys(row.set for row in rows)
-        for total in totals
-    }
+    """All programs by every solver."""
     first = [row for row in rows if row.solver == totals[0].solver]
     medians = {
         name: float(np.median([getattr(row, name) for row in first])) for name in ("variables", "soft", "elastic")
     }
-    return render("qp.md", TEMPLATES, totals=totals, times=times, programs=first, medians=medians, facts=facts)
+    return render("qp.md", TEMPLATES, totals=totals, programs=first, medians=medians, facts=facts)

@@ -11,8 +11,8 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.bench.attack import frames, own_terms, worlds
-from wholebody.bench.attack.bodies import Body
+from wholebody.bench.attack import frames, terms
+from wholebody.bench.attack.scenes import Body
 from wholebody.bench.suite.stability.bodies import planar_arm
 from wholebody.tracking.loop import FrameLoop
 
@@ -28,32 +28,32 @@ def test_an_answer_where_a_term_is_not_defined_is_wrong(arm: wb.Scene) -> None:
     solution = replace(
         wb.solve(problem), status="stalled", message="a term is not finite at the posture of iteration 3"
     )
-    asked = own_terms.Asked("tip", np.array([-0.3, 0.0, 0.0]), 0.1, "error", np.nan)
+    asked = terms.Asked("tip", np.array([-0.3, 0.0, 0.0]), 0.1, "error", np.nan)
     half = np.array([0.0, np.pi / 2])  # the tip is at x = 0.5
 
     def said(q: Any, **changed: Any) -> str:
-        return own_terms.verdict(problem, asked, np.asarray(q), replace(solution, **changed)).outcome
+        return terms.own_verdict(problem, asked, np.asarray(q), replace(solution, **changed)).outcome
 
     assert said(np.zeros(2)) == "right"
     assert said(half) == "wrong"
     assert said(np.zeros(2), message="nothing better is near") == "wrong"
     assert said(np.zeros(2), status="solved") == "wrong"
-    assert own_terms.verdict(problem, asked, np.zeros(2)).outcome == "right"
-    assert own_terms.verdict(problem, asked, half).outcome == "wrong"
-    assert own_terms.verdict(problem, asked, np.full(2, np.nan)).outcome == "wrong"
+    assert terms.own_verdict(problem, asked, np.zeros(2)).outcome == "right"
+    assert terms.own_verdict(problem, asked, half).outcome == "wrong"
+    assert terms.own_verdict(problem, asked, np.full(2, np.nan)).outcome == "wrong"
 
 
 def test_things_that_overlap_are_told_and_others_are_not(arm: wb.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     for name, x in (("a", 3.0), ("b", 3.15), ("c", 3.5)):
         arm.add(wb.Sphere(0.1), name=name, at=(x, 0.0, 0.0))
-    assert worlds.overlapping(arm, np.zeros(2)).words == "1 pairs of 3 things overlap"
+    assert frames.overlapping(arm, np.zeros(2)).words == "1 pairs of 3 things overlap"
     none = SimpleNamespace(pair=np.zeros((0, 2), dtype=int))
     monkeypatch.setattr(wb.Scene, "overlapping", lambda *_: none)
     monkeypatch.setattr(wb.Scene, "penetration", lambda *_: [])
-    assert "a and b overlap by 0.05 m" in worlds.overlapping(arm, np.zeros(2)).words
+    assert "a and b overlap by 0.05 m" in frames.overlapping(arm, np.zeros(2)).words
     told = [SimpleNamespace(a="a", b="b"), SimpleNamespace(a="b", b="c")]
     monkeypatch.setattr(wb.Scene, "penetration", lambda *_: told)
-    assert "b and c are 0.15 m apart" in worlds.overlapping(arm, np.zeros(2)).words
+    assert "b and c are 0.15 m apart" in frames.overlapping(arm, np.zeros(2)).words
 
 
 @pytest.mark.parametrize(
@@ -71,8 +71,8 @@ def test_a_body_that_sleeps_in_the_air_or_in_its_support_is_wrong(
     arm.add(wb.Box((1.0, 1.0, 0.1)), name="support", at=(3.0, 0.0, 0.0))
     arm.add(wb.Sphere(0.1), name="sleeper", at=(3.0, 0.0, 0.15))
     frame = SimpleNamespace(engine=SimpleNamespace(sleeping=1), deepest=deepest)
-    monkeypatch.setattr(worlds, "World", lambda _: SimpleNamespace(dt=0.02, step=lambda: frame))
-    found = worlds.slept(arm, [(3.0, 0.0, shift, 0.0, 0.0, 0.0, 1.0)], over=False)
+    monkeypatch.setattr(frames, "World", lambda _: SimpleNamespace(dt=0.02, step=lambda: frame))
+    found = frames.slept(arm, [(3.0, 0.0, shift, 0.0, 0.0, 0.0, 1.0)], over=False)
     assert (found.outcome, found.words) == ("wrong" if shift else "right", words)
 
 

@@ -19,7 +19,7 @@ from wholebody.base.errors import UnknownNameError
 from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, Case, Verdict, kind_of
-from wholebody.bench.attack.files import mutated
+from wholebody.bench.attack.inputs import mutated
 from wholebody.bench.attack.report import Row, keep, report
 from wholebody.bench.attack.running import attack
 
@@ -52,13 +52,11 @@ def words(case: Case, folder: Path) -> tuple[Any, ...]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_case_depends_on_its_seed_and_number_alone(kind: str, tmp_path: Path) -> None:
-    folders = [tmp_path / str(k) for k in range(4)]
-    for folder in folders:
-        folder.mkdir()
-    first = [words(Case(3, number, kind), folders[number]) for number in (0, 1)]
-    again = [words(Case(3, number, kind), folders[2 + number]) for number in (1, 0)][::-1]
-    assert first == again
-    assert first[0] != first[1]
+    found = []
+    for place, number in enumerate((0, 1, 0)):
+        (tmp_path / str(place)).mkdir()
+        found.append(words(Case(3, number, kind), tmp_path / str(place)))
+    assert found[0] == found[2] != found[1]
 
 
 def test_every_kind_has_its_turn_and_files_are_twice_the_solves(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from tests.bench.following import followed
 from tests.csv_rows import csv_rows
 from wholebody.base.errors import InputError
 from wholebody.bench.measure.step import taking
-from wholebody.bench.measure.track import CLEARANCE, Track, figure_tracks, judge
+from wholebody.bench.measure.track import SETTING, Track, figure_tracks, judge
 from wholebody.bench.suite.adapters.registry import installed_tools, make_tool
 from wholebody.cli import main
 
@@ -36,7 +36,7 @@ def test_the_reaches_are_those_of_the_human_for_another_figure(arm: list[Track])
         tip = track.scene.state(track.start).frame(track.scene.figure.frame_id(track.tip)).translation
         assert np.linalg.norm(track.targets[0] - tip) < 1e-3
         assert track.feet == ()
-        assert 0.0 < track.clearance <= CLEARANCE
+        assert 0.0 < track.clearance <= SETTING.clearance
         assert not len(track.scene.contacts(track.start, within=track.clearance).distance)
     contact = arm[1]
     place = contact.scene.objects["block"].placement.translation
@@ -87,6 +87,6 @@ def test_the_command_writes_the_same_tables(tmp_path: Path, root: Path) -> None:
     rows = csv_rows(tmp_path / "out" / "step-figures-time.csv")
     assert [row["case"] for row in rows] == ["arm, free", "arm, contact", "arm, alone"]
     page = (tmp_path / "results.md").read_text()
-    assert "### arm, contact: result" in page
+    assert "| arm, contact | wholebody |" in page
     assert "standing human" not in page
     assert "does not take" not in page

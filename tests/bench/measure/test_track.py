@@ -8,7 +8,8 @@ import pinocchio as pin
 import pytest
 
 from wholebody.base.errors import InputError, UnknownNameError
-from wholebody.bench.measure.track import BLOCK, DT, VARIANTS, Track, smooth_way, track
+from wholebody.bench.measure.track import SETTING, VARIANTS, Track, smooth_way, track
+from wholebody.bench.suite.problem_sets.case import numbers
 
 
 def test_there_are_twenty_objects_and_at_least_700_pairs(short_free: Track) -> None:
@@ -39,7 +40,7 @@ def test_the_way_begins_at_the_fingertip_and_has_no_jumps(name: str) -> None:
     pin.framesForwardKinematics(model, data, made.start)
     tip = data.oMf[made.scene.figure.frame_id(made.tip)].translation
     way = np.vstack([tip, made.targets])
-    assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / DT < 3.0  # m/s
+    assert np.linalg.norm(np.diff(way, axis=0), axis=1).max() / SETTING.dt < 3.0  # m/s
     assert np.linalg.norm(way[1] - tip) < 1e-4
 
 
@@ -59,7 +60,8 @@ def test_no_object_is_in_the_way_of_the_free_fingertip(short_free: Track) -> Non
 
 
 def test_the_contact_way_leads_into_the_block(short_contact: Track) -> None:
-    inside = np.abs(short_contact.targets - BLOCK[1]) < 0.5 * np.array(BLOCK[0])
+    given = numbers("step")
+    inside = np.abs(short_contact.targets - given.block_at_m) < 0.5 * np.array(given.block_m)
     assert inside.all(axis=1).sum() >= 10
     assert not inside[-1].all()
 

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import asdict, replace
 
-import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.measure import motion_ablation as ablated
 from wholebody.bench.rows import Row
 from wholebody.bench.suite import ablation
 from wholebody.bench.suite.ablation import Constant, report
-from wholebody.bench.suite.ablation import Row as Change
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.cli.bench.counts import ablation as command
 from wholebody.methods import contradictions, starts
-from wholebody.methods.qp import working_set
-from wholebody.motion import repair
+from wholebody.methods.qp import settings, sqp
 
 
 @pytest.fixture(scope="module")
@@ -36,7 +31,7 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
 
 def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
     found, compiled = ablation.constants("ccd")
-    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert "wholebody.methods.ccd.sweep" in compiled
     assert all(each.module not in compiled for each in found)
 
 
@@ -66,15 +61,14 @@ def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.Monk
     assert all(getattr(owner, name) == constant.value for owner, name in places)
 
 
-def test_what_a_module_made_of_a_constant_is_made_anew() -> None:
-    """Loops get the limits of a working set in an array."""
-    before = working_set.LIMITS.copy()
-    constant = Constant("wholebody.methods.qp.working_set", "BOUND_TOLERANCE", working_set.BOUND_TOLERANCE)
-    with ablation.changed(constant, 2.0 * constant.value):
-        now = working_set.LIMITS
-        assert np.flatnonzero(now != before).size == 1
-        assert 2.0 * constant.value in now
-    assert (before == working_set.LIMITS).all()
+def test_a_field_of_a_record_is_changed_in_every_module_that_reads_it() -> None:
+    constant = Constant("wholebody.methods.qp.settings", "DESCENT.first_radius", settings.DESCENT.first_radius)
+    assert constant in ablation.constants("qp")[0]
+    before = sqp.DESCENT
+    with ablation.changed(constant, 7.0):
+        assert sqp.DESCENT.first_radius == settings.DESCENT.first_radius == 7.0
+        assert sqp.DESCENT.largest_radius == before.largest_radius
+    assert sqp.DESCENT is settings.DESCENT is before
 
 
 def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -86,11 +80,13 @@ def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatc
     told: list[str] = []
     whole, rows = ablation.ablation("qp", given, {"nothing": (Nothing, "value", 2)}, told.append)
     assert Nothing.value == 1
-    assert rows == [replace(rows[0], what="nothing", change="off", differ=0, solved=0, iterations=0, left=0.0)]
-    assert 0.1 < rows[0].time < 10.0
+    (row,) = rows
+    assert (row.case, row.tool) == ("nothing", "off")
+    assert [row[name] for name in ("answers that differ", "solved", "iterations", "left m, rad")] == [0, 0, 0, 0.0]
+    assert 0.1 < row["time"] < 10.0
     assert len(told) == 1
-    text = report("qp", len(given), whole, [*rows, Change("x.Y", "halved", 0, 0, 0, 0.0, 1.0)], ["a.kernel"])
-    assert "`x.Y`" in text
+    text = report("qp", len(given), whole, [row, Row("x.Y", "halved", row.figures)], ["a.kernel"], {})
+    assert "changed no answer: x.Y" in text
     assert "a.kernel" in text
 
 
@@ -112,45 +108,6 @@ def test_a_quick_run_has_one_problem_of_every_set_where_no_count_is_given(
         arguments.run(arguments)
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("--method", "qp", "--only", "per_frame"), "--only chooses modules of --method motion, not of qp"),
-        (("--only", "no-such-module"), "--only"),
-        (("--method", "motion", "--count", "6"), "leave --count out"),
-    ],
-)
-def test_options_that_a_method_does_not_have_are_refused(
-    words: tuple[str, ...], said: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(ablation, "problems", None)
-    monkeypatch.setattr(ablated, "ablation", None)
-    parser = argparse.ArgumentParser()
-    command.add_to(parser.add_subparsers())
-    arguments = parser.parse_args(["ablation", *words])
-    with pytest.raises(wb.InputError, match=said):
-        arguments.run(arguments)
-
-
 def test_every_mechanism_that_is_switched_off_is_there() -> None:
     for owner, attribute, _ in ablation.mechanisms("qp").values():
         assert getattr(owner, attribute, None) is not None
-
-
-def test_constants_of_clips_are_halved_and_doubled_on_the_cases_of_their_methods(monkeypatch) -> None:
-    monkeypatch.setattr(ablated, "USED", {"repair": ("frames",), "bisection.prediction": ("bisection",)})
-    told, settings = list[str](), repair.SETTINGS
-    figure = wb.load("human")
-    rows = ablated.ablation(figure, told.append, [("squat", "nothing", "frames", 4)], tuple(ablated.USED))
-    assert {row.case for row in rows} <= {f"repair.SETTINGS.{name}" for name in asdict(settings)}
-    assert {row.tool for row in rows} == {"halved", "doubled"}
-    assert len(told) == len(rows)
-    assert repair.SETTINGS is settings
-    nothing = dict.fromkeys(("free", "deepest mm", "deviation rad", "jerk", "feet slide mm", "programs"), 0)
-    assert not ablated.matters(Row("x.Y", "halved", nothing))
-    assert ablated.matters(Row("x.Y", "halved", nothing | {"programs": 1}))
-
-
-def test_the_modules_whose_constants_are_changed_have_some() -> None:
-    for module in ablated.USED:
-        assert ablated.numbers_of(module), module

@@ -11,9 +11,7 @@ import pytest
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
 from wholebody.methods.newton.assembly import Assembly
-from wholebody.methods.newton.batches import Key
-from wholebody.methods.newton.linear_algebra.normal_equations import Gram
-from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.linear_algebra import Gram, QuasiDefinite
 from wholebody.tracking.drag import Drag
 
 Y = (0.0, 1.0, 0.0)
@@ -40,7 +38,7 @@ def _chain(count: int, limits: tuple[float, float] | None = None) -> Assembly:
     return made
 
 
-@pytest.mark.parametrize("algebra", ["auto", "llt", "kkt", "dense", "svd"])
+@pytest.mark.parametrize("algebra", ["auto", "kkt"])
 def test_a_four_bar_closes_where_geometry_says(algebra: str) -> None:
     # four revolute joints in a plane are three equations too many in space: redundant, and tolerated
     made = _four_bar()
@@ -362,7 +360,7 @@ def test_a_residual_is_that_of_the_numbers_now() -> None:
     system, x = made.point_goal("b7", end).system(), made.variables()
     assert np.abs(system.residual(x)).max() < 1e-12
     moved = made.drop_goals().point_goal("b7", end + np.array((0.0, 0.0, 0.4))).system()
-    system.renew([(batch, Key("", False, False, 1.0)) for batch in moved.batches])
+    system.renew(moved.batches)
     assert np.abs(system.residual(x)).max() == pytest.approx(0.4)
     with pytest.raises(ValueError, match="read-only"):
         system.residual(x)[:] = 0.0

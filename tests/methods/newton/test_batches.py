@@ -11,9 +11,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.newton import quaternions as quat
-from wholebody.methods.newton.angles import Angle
-from wholebody.methods.newton.batches import Batch, Coincide, MassCenter, RootMotion, Slide, Turn, Unit
-from wholebody.methods.newton.directions import Cone, Toward
+from wholebody.methods.newton.batches import Angle, Batch, Coincide, Slide, Turn, Unit
+from wholebody.methods.newton.task_batches import Cone, MassCenter, RootMotion, Toward
 
 K, N, H = 5, 6, 1e-6
 
@@ -83,7 +82,7 @@ def _root(g: np.random.Generator) -> RootMotion:
     return motion
 
 
-WITHOUT_CURVATURE = ("toward", "cone", "mass center")
+WITHOUT_CURVATURE = ("toward", "cone", "mass center", "root")
 
 
 @pytest.mark.parametrize("name", MAKERS)

@@ -51,8 +51,8 @@ def test_postures_go_in_and_out(name: str) -> None:
 
 def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None:
     bodies = FigureBodies(human)
-    batches = [unit_lengths(bodies.names), *bodies.equations.batches(bodies.count)]
-    system = System(bodies.count, batches, bodies.weight)
+    batches = [unit_lengths(bodies.names), *bodies.equations.batches()]
+    system = System(batches, bodies.weight)
     for name in human.postures:
         assert np.abs(system.residual(bodies.variables(human.posture(name)))).max() < 1e-12
 

@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.objective import Objective
+from wholebody.methods.newton.measures import Objective
 from wholebody.methods.newton.terms import constraint_equations, goal_equations
 
 
@@ -31,7 +31,7 @@ def _residual(problem: wb.Problem, q: np.ndarray) -> np.ndarray:
     bodies = FigureBodies(problem.scene.figure)
     everything = np.concatenate([bodies.variables(q), (0, 0, 0, 0, 0, 0, 1.0)]).reshape(-1, 7)
     sets = goal_equations(problem, bodies, problem.goals), constraint_equations(problem, bodies)
-    batches = [batch for one in sets for batch, _ in one.batches(bodies.count)]
+    batches = [batch for one in sets for batch in one.batches()]
     return np.concatenate([batch.residual(everything).ravel() for batch in batches])
 
 

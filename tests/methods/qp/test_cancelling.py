@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.suite.stability.posed import cancelling
+from wholebody.bench.suite.stability.catalogue import cases
 from wholebody.methods.qp.cancelling import posture_apart
 
 JOINT = (
@@ -20,7 +20,7 @@ PRONG = '<collision><origin xyz="0.2 {0} 0"/><geometry><box size="0.2 0.06 0.4"/
 
 def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
     """Its prongs reach 12 cm over the plate, and overlap it by 1.5 cm each from both sides."""
-    problem = cancelling().problem
+    problem = cases(["cancelling-normals"])[0].question().problem
     with problem.borrow() as workspace:
         q = posture_apart(problem, workspace, problem.start)
     assert q is not None
@@ -29,7 +29,7 @@ def test_a_fork_is_pulled_off_a_plate_the_short_way() -> None:
 
 def test_no_place_of_the_fork_is_nearer_to_its_goal() -> None:
     """All boxes stand along the axes: intervals tell, on a grid of 4 mm, where the fork is off the plate."""
-    solution = wb.solve(cancelling().problem)
+    solution = wb.solve(cases(["cancelling-normals"])[0].question().problem)
     assert solution.status == "unreachable"
     assert solution.assessment.goal_error == pytest.approx(0.12, abs=1e-4)
     middles = np.array([(-0.15, 0.0, 0.06), (-0.15, 0.0, -0.06), (-0.33, 0.0, 0.0)])  # two prongs and the handle
@@ -41,7 +41,7 @@ def test_no_place_of_the_fork_is_nearer_to_its_goal() -> None:
 
 
 def test_one_prong_alone_does_not_cancel() -> None:
-    problem = cancelling().problem
+    problem = cases(["cancelling-normals"])[0].question().problem
     with problem.borrow() as workspace:
         assert posture_apart(problem, workspace, problem.start + [0.0, 0.0, 0.06]) is None
 

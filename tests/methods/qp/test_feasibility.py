@@ -7,18 +7,18 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.bench.suite.stability.posed import the_long_way_round
+from wholebody.bench.suite.stability.catalogue import cases
 
 
 def test_a_goal_beyond_a_limit_is_reached_from_the_other_side(honest):
-    problem = the_long_way_round().problem
+    problem = cases(["long-way-round"])[0].question().problem
     solution = honest(problem, wb.QP(budget=0, restarts=0).solve(problem))
     assert solution.status == "solved"
     assert solution.q[0] < 0.0 < problem.start[0]
 
 
 def test_a_frozen_joint_is_not_turned_on(honest):
-    whole = the_long_way_round().problem
+    whole = cases(["long-way-round"])[0].question().problem
     problem = wb.Problem(
         whole.scene, whole.start, goals=whole.goals, constraints=[wb.Freeze(whole.scene.figure.joints[0])]
     )
@@ -40,7 +40,8 @@ def test_what_fits_is_kept_where_measures_lead_away(honest):
 
 
 def test_whole_steps_stay_in_their_box(planar_arm):
-    from wholebody.methods.qp.feasibility import STEP, Feasibility
+    from wholebody.methods.qp.feasibility import Feasibility
+    from wholebody.methods.qp.settings import FEASIBILITY
     from wholebody.methods.qp.solvers.registry import make_solver
     from wholebody.methods.qp.subproblem import Subproblem
 
@@ -53,4 +54,4 @@ def test_whole_steps_stay_in_their_box(planar_arm):
     )
     local = run.run(problem.start)
     assert local.violation.worst <= 1e-6
-    assert max(entry.step for entry in run.trace) <= STEP + 1e-12
+    assert max(entry.step for entry in run.trace) <= FEASIBILITY.step + 1e-12

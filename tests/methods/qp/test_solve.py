@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.bench.suite.stability.posed import cancelling
+from wholebody.bench.suite.stability.catalogue import cases
 
 LENGTHS = (0.5, 0.4)
 
@@ -298,7 +298,7 @@ def test_one_degree_of_freedom_is_enough(planar_arm):
 
 def test_a_start_whose_contacts_cancel_ends_outside(honest):
     """A fork over a plate too thick for it: both prongs push, in opposite directions, and no gradient is left."""
-    problem = cancelling().problem
+    problem = cases(["cancelling-normals"])[0].question().problem
     assert wb.assess(problem, problem.start).penetration > 0.01
     solution = honest(problem, wb.solve(problem))
     assert solution.status == "unreachable"

@@ -22,9 +22,6 @@ from wholebody.geometry.pieces import box_corners
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 
-OWN = (wb.Balance, wb.ReachCones, wb.RangeOfMotion)
-"""Constraints whose values are those of the package's own terms."""
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -105,7 +102,7 @@ class Pairs:
 def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q: Array) -> Judged:
     """Measure a posture (nq,) against goals, constraints and bounds as they were given.
 
-    Of the problem only the scene, the start, the clearance and the terms of `OWN` are read.
+    Of the problem only the scene, the start, the clearance and its balance, reach cones and ranges of motion are read.
     """
     scene, start = problem.scene, problem.start
     q = np.asarray(q, dtype=float)
@@ -123,7 +120,7 @@ def judge(problem: Problem, goals: Sequence[Any], constraints: Sequence[Any], q:
     body = _Body(scene.model, start, q)
     held = [value for term in constraints for value in body.constraint(term)]
     for term in problem.constraints:
-        if isinstance(term, OWN):
+        if isinstance(term, (wb.Balance, wb.ReachCones, wb.RangeOfMotion)):
             value = np.atleast_1d(term.value(scene.state(q)))
             held += list(np.maximum(term.lower - value, value - term.upper))
     return Judged(

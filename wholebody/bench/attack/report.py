@@ -12,6 +12,7 @@ import numpy as np
 
 from wholebody.bench import rows as tables
 from wholebody.bench.attack.case import KINDS, Case, Verdict
+from wholebody.bench.report import render
 from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import write_text
 
@@ -28,16 +29,6 @@ ATTACKED = {
     "file": "mutated tasks, tracks, results, robots and meshes",
     "argument": "calls with odd arguments",
 }
-SLOW = 5.0  # s: of CPU time for a solve
-SCRIPT = '''"""Repeats a case of the attack, and writes the files that it reads beside this script."""
-
-from pathlib import Path
-
-from wholebody.bench.attack.case import Case
-from wholebody.bench.attack.running import run
-
-print(run(Case({seed}, {number}, {kind!r}), Path(__file__).parent))
-'''
 
 
 @dataclass(frozen=True)
@@ -62,8 +53,8 @@ class Row:
 
     @property
     def slow(self) -> bool:
-        """Whether it is a solve that took longer than `SLOW`."""
-        return self.kind == "solve" and self.seconds > SLOW
+        """Whether it is a solve that took longer than 5 s."""
+        return self.kind == "solve" and self.seconds > 5.0
 
 
 def row(case: Case, verdict: Verdict) -> Row:
@@ -87,14 +78,14 @@ def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
             figures = {"count": len(spent), **tables.times(spent), "longest ms": float(spent.max())}
             times.append(tables.Row("solves that end", status, figures))
     seeds = ", ".join(map(str, sorted({one.seed for one in rows})))
-    notes = [f"Solves that took more than {SLOW:g} s: {sum(one.slow for one in rows)}.", f"Seed {seeds}."]
+    notes = [f"Solves that took more than 5 s: {sum(one.slow for one in rows)}.", f"Seed {seeds}."]
     return tables.report("What was attacked:", {"Cases": counts, "Times of solves": times}, facts, notes)
 
 
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
     """Write a failure: the script that repeats it, and what was found."""
     place = folder / case.name
-    write_text(place / "repeat.py", SCRIPT.format(seed=case.seed, number=case.number, kind=case.kind))
+    write_text(place / "repeat.py", render("repeat.py", case=case) + "\n")
     write_text(place / "found.txt", verdict.words + "\n")
 
 

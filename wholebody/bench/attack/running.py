@@ -17,19 +17,19 @@ from pathlib import Path
 from wholebody.base.errors import UnknownNameError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, allow_processor, run_jobs
-from wholebody.bench.attack import arguments, contacts, files, frames, own_terms, solves, ways, worlds
+from wholebody.bench.attack import frames, inputs, solves, terms, ways
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 
 CASES = {
-    "argument": arguments.case,
-    "file": files.case,
+    "argument": inputs.argument,
+    "file": inputs.file,
     "solve": solves.case,
     "stream": ways.stream,
     "sweep": ways.sweep,
-    "contact": contacts.case,
-    "own-term": own_terms.case,
-    "pairs": worlds.pairs,
-    "sleeper": worlds.sleeper,
+    "contact": terms.contact,
+    "own-term": terms.own_term,
+    "pairs": frames.pairs,
+    "sleeper": frames.sleeper,
     "weights": frames.weights,
     "put": frames.put,
 }

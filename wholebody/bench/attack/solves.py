@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from time import process_time
 from typing import Any, Literal, get_args
@@ -16,27 +17,15 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, chosen
 from wholebody.bench.attack.judging import Judged, Pairs, judge
-from wholebody.bench.attack.things import Thing, clear, inside, xyzquat
+from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.methods import installed_methods
 from wholebody.methods.solve import method_named
 from wholebody.problem import Problem
 from wholebody.solution import Solution, Status
 
-METHODS: tuple[Any, ...] = (
-    *(wb.QP(),) * 12,
-    wb.QP(tolerance=1e-8),
-    wb.QP(measures=False),
-    wb.QP(solver="daqp"),
-    *(method_named(name) for name in installed_methods() if name != "qp"),
-)
-MEASURES: tuple[Any, ...] = (
-    None, None, None, [], [wb.Effort(), wb.Discomfort(weight=0.1)], [wb.Displacement()],
-    [wb.PotentialEnergy(weight=0.01)], [wb.Discomfort()],
-)  # fmt: skip
 FARTHEST = 99.0  # m: goals farther than 100 m are refused
 
 
@@ -63,7 +52,7 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
     things = _around(figure, start, witness, clearance, rng)
     terms = _random_terms(figure, start, witness, rng)
     known = witness is not None and terms.feasible and bool(terms.goals) and _clear(figure, witness, things, clearance)
-    method, measures = chosen(rng, METHODS), chosen(rng, MEASURES)
+    method, measures = chosen(rng, _methods()), chosen(rng, _measures())
     problem = wb.Problem(
         scene_of(figure, things), start, goals=terms.goals, constraints=terms.constraints, measures=measures,
         clearance=clearance,
@@ -73,6 +62,18 @@ def case(rng: np.random.Generator, folder: Path) -> Verdict:
     seconds = process_time() - began
     found = judge(problem, terms.goals, terms.constraints, solution.q)
     return verdict(problem, found, solution, tolerance=float(method.tolerance), witness=known, seconds=seconds)
+
+
+@cache
+def _methods() -> tuple[Any, ...]:
+    """Mostly qp as it comes, and every other method now and then."""
+    others = (method_named(name) for name in installed_methods() if name != "qp")
+    return *(wb.QP(),) * 12, wb.QP(tolerance=1e-8), wb.QP(measures=False), wb.QP(solver="daqp"), *others
+
+
+def _measures() -> tuple[Any, ...]:
+    effort, little = [wb.Effort(), wb.Discomfort(weight=0.1)], [wb.PotentialEnergy(weight=0.01)]
+    return None, None, None, [], effort, [wb.Displacement()], little, [wb.Discomfort()]
 
 
 def scene_of(figure: Body, things: Sequence[Thing]) -> wb.Scene:

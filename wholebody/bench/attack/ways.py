@@ -16,11 +16,10 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
-from wholebody.bench.attack.bodies import Body, body
 from wholebody.bench.attack.case import Verdict, chosen
 from wholebody.bench.attack.judging import Pairs, judge
+from wholebody.bench.attack.scenes import Body, Thing, body, clear, inside, xyzquat
 from wholebody.bench.attack.solves import scene_of
-from wholebody.bench.attack.things import Thing, clear, inside, xyzquat
 from wholebody.bench.suite.problem_sets.things import Occupied
 from wholebody.geometry.continuous.sweep import TOLERANCE, FirstContact
 from wholebody.problem import Problem

@@ -11,11 +11,11 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.drops import GRAVITY
+from wholebody.bench.measure.throws import DT
 from wholebody.bench.rows import Row
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import SKIN
+from wholebody.dynamics.step_program import SKIN
 
-DT = 1.0 / 60.0
 FAR = 5.0  # m: from the hand that a scene needs
 LOW = -2.0  # m: height of the floor
 

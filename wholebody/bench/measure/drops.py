@@ -18,7 +18,6 @@ from wholebody.bench.suite.problem_sets.things import coal_distance
 
 DENSITY = 700.0  # kg/m3
 GRAVITY = 9.81  # m/s2
-RESTITUTION, FRICTION = 0.3, 0.3  # wood on wood, table 1 of Schmidl and Lin
 
 
 @dataclass(frozen=True)
@@ -32,6 +31,7 @@ class Drop:
         velocity: (3,) of all at the start, m/s.
         frame: seconds.
         seconds: how long it lasts.
+        friction, restitution: wood on wood, table 1 of Schmidl and Lin.
     """
 
     name: str
@@ -40,6 +40,8 @@ class Drop:
     velocity: tuple[float, float, float]
     frame: float
     seconds: float
+    friction: float = 0.3
+    restitution: float = 0.3
 
     @property
     def masses(self) -> Array:
@@ -151,7 +153,7 @@ class Mujoco:
             )
         text = (
             f'<mujoco><option timestep="{1.0 / 480.0}" gravity="0 0 {-GRAVITY}" cone="elliptic"/>'
-            f'<default><geom friction="{FRICTION} 0 0" condim="3"/></default><worldbody>'
+            f'<default><geom friction="{drop.friction} 0 0" condim="3"/></default><worldbody>'
             f'<geom type="plane" size="50 50 1"/>{"".join(bodies)}</worldbody></mujoco>'
         )
         self._mujoco: Any = mujoco
@@ -181,7 +183,7 @@ class Rapier:
         """Put everything into a world."""
         import rapier3d
 
-        surface = {"friction": FRICTION, "restitution": RESTITUTION, "density": DENSITY}
+        surface = {"friction": drop.friction, "restitution": drop.restitution, "density": DENSITY}
         self._world = rapier3d.PhysicsWorld(gravity=(0.0, 0.0, -GRAVITY))
         self._world.integration_parameters.dt = drop.frame
         self._world.add_collider(rapier3d.Collider.cuboid(50.0, 50.0, 1.0, translation=(0.0, 0.0, -1.0), **surface))

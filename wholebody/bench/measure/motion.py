@@ -6,7 +6,6 @@ Each case runs in a process of its own; what was measured is kept in a file, whe
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,74 +25,28 @@ if TYPE_CHECKING:
     from wholebody.motion.clip import Clip
 
 CHECKED = "check"  # in place of a method: the clip as it is
-MIDDLE = 7  # frames, around a collision, with which everything is compiled or read back first
 
 
-@dataclass(frozen=True)
-class MotionRow:
-    """One clip with one piece of equipment by one method; `check` leaves the clip as it is.
-
-    Attributes:
-        clip, equipment, method: what was asked.
-        frames, duration: of the clip, seconds.
-        outcome: "free"; "left" where something overlaps still, or a limit or what is held is missed; or why there is no
-            clip.
-        seconds: CPU time of the method, or of the check.
-        before, after: frames in collision.
-        dips: motions between two free frames that overlap, of the answer.
-        deepest_mm, between_mm: deepest in any frame, and at any time, of the answer.
-        limit: largest excess over a joint limit in the answer, radians or metres.
-        angle, distance_mm: deviation from the clip before: joints' root mean square, radians; their centres', mm.
-        jerk: of the answer, in parts of that before.
-        sliding_mm: by how much standing feet slide more than before.
-        solves, programs: posture solves, and quadratic programs.
-        said: the method's own sentence.
-    """
-
-    clip: str
-    equipment: str
-    method: str
-    frames: int = 0
-    duration: float = 0.0
-    outcome: str = ""
-    seconds: float = 0.0
-    before: int = 0
-    after: int = 0
-    dips: int = 0
-    deepest_mm: float = 0.0
-    between_mm: float = 0.0
-    limit: float = 0.0
-    angle: float = 0.0
-    distance_mm: float = 0.0
-    jerk: float = 1.0
-    sliding_mm: float = 0.0
-    solves: int = 0
-    programs: int = 0
-    said: str = ""
-
-    @property
-    def key(self) -> tuple[str, str, str]:
-        """What was asked."""
-        return self.clip, self.equipment, self.method
-
-    @property
-    def slowness(self) -> float:
-        """Seconds for each second of motion."""
-        return self.seconds / self.duration if self.duration > 0.0 else 0.0
-
-    @property
-    def measured(self) -> bool:
-        """Whether there is a clip to measure."""
-        return self.outcome in ("free", "left")
+Case = tuple[str, str, str]
+"""Clip, equipment and method; `CHECKED` leaves the clip as it is."""
 
 
-def measured(row: MotionRow, path: str, most: float) -> MotionRow:
+def measured(worn: str, method: str, path: str, most: float) -> dict[str, Figure]:
     """Measure one case; a job of a process of its own.
 
     Args:
-        row: the case.
+        worn: equipment.
+        method: of avoidance, or `CHECKED`.
         path: of the clip.
         most: seconds of the processor that it has.
+
+    Returns:
+        "outcome": "free"; "left" where something overlaps still, or a limit or what is held is missed; else why there
+        is no clip. "s a second": the processor's seconds of the method, or of the check, for each second of motion.
+        Frames in collision before and "after", "dips" between two free frames, "deepest mm" in any frame and "between
+        mm" at any time, the largest excess over a joint limit, the deviation from the clip before (root mean square of
+        the joints, and of their centres), the "jerk" in parts of that before, by how much standing feet slide more, and
+        the counts of posture solves and of programs.
     """
     from wholebody.figures import load
     from wholebody.motion.avoidance import avoid
@@ -103,60 +56,66 @@ def measured(row: MotionRow, path: str, most: float) -> MotionRow:
     from wholebody.motion.worn_equipment import dressed
 
     allow_processor(most)
-    figure = load("human")
-    scene, clip = dressed(figure, row.equipment), read_clip(path, figure)
-    check(clip[:MIDDLE], scene)  # compiles or reads back what is needed
+    figure, middle = load("human"), 7  # frames around a collision, with which all is compiled or read back first
+    scene, clip = dressed(figure, worn), read_clip(path, figure)
+    check(clip[:middle], scene)
     spent, _, found = measured_ms(lambda: check(clip, scene))
-    row = replace(row, seconds=1e-3 * spent, before=found.colliding)
-    if row.method == CHECKED:
-        return _judged(row, clip, clip, found)
-    first = max(0, int(np.argmax(found.depth > found.tolerance)) - MIDDLE // 2)
-    freeing: Any = partial(avoid, scene=scene, method=row.method, constraints=[StanceFeet()])
-    freeing(clip[first : first + MIDDLE])
+    if method == CHECKED:
+        return {"said": "", **_judged(clip, clip, found, 0, 0), **_spent(spent, clip)}
+    first = max(0, int(np.argmax(found.depth > found.tolerance)) - middle // 2)
+    freeing: Any = partial(avoid, scene=scene, method=method, constraints=[StanceFeet()])
+    freeing(clip[first : first + middle])
     try:
         spent, _, freed = measured_ms(lambda: freeing(clip))
     except WholebodyError as error:
-        return replace(row, outcome="refused", said=str(error))
+        return {"outcome": "refused", "said": str(error)}
     told = freed.report
-    row = replace(
-        row, seconds=1e-3 * spent, solves=told.posture_solves, programs=told.programs, said=told.message
-    )  # fmt: skip
     if len(freed.clip) != len(clip):
-        return replace(row, outcome="retimed")
-    return _judged(row, clip, freed.clip, check(freed.clip, scene), told.missed)
+        return {"outcome": "retimed", "said": told.message}
+    figures = _judged(clip, freed.clip, check(freed.clip, scene), told.posture_solves, told.programs, told.missed)
+    return {"said": told.message, **figures, "collide before": found.colliding, **_spent(spent, clip)}
 
 
-def _judged(row: MotionRow, before: Clip, after: Clip, found: ClipCheck, missed: float = 0.0) -> MotionRow:
-    """With the figures of the answer; `missed`: by how much what is held is missed, at most 1 mm or mrad."""
+def _spent(milliseconds: float, clip: Clip) -> dict[str, Figure]:
+    return {"s a second": 1e-3 * milliseconds / clip.duration if clip.duration > 0.0 else 0.0}
+
+
+def _judged(
+    before: Clip, after: Clip, found: ClipCheck, solves: int, programs: int, missed: float = 0.0
+) -> dict[str, Figure]:
+    """The figures of an answer; `missed`: by how much what is held is missed, at most 1 mm or mrad."""
     from wholebody.motion import measures
 
     apart = measures.deviation(before, after)
     excess = max((abs(each.value - each.limit) for each in found.limits), default=0.0)
-    held = row.method == CHECKED or (excess <= 1e-6 and missed <= 1e-3)
-    return replace(
-        row,
-        outcome="free" if found.free and held else "left",
-        after=found.colliding,
-        dips=found.dips,
-        deepest_mm=1e3 * found.deepest,
-        between_mm=1e3 * found.deepest_between,
-        limit=excess,
-        angle=apart.angle,
-        distance_mm=1e3 * apart.distance,
-        jerk=measures.jerk_ratio(before, after),
-        sliding_mm=1e3 * measures.foot_sliding(before, after),
-    )
+    held = after is before or (excess <= 1e-6 and missed <= 1e-3)
+    return {
+        "frames": len(after),
+        "outcome": "free" if found.free and held else "left",
+        "collide before": found.colliding,
+        "after": found.colliding,
+        "dips": found.dips,
+        "deepest mm": 1e3 * found.deepest,
+        "between mm": 1e3 * found.deepest_between,
+        "beyond limits": excess,
+        "deviation rad": apart.angle,
+        "mm": 1e3 * apart.distance,
+        "jerk": measures.jerk_ratio(before, after),
+        "feet slide mm": 1e3 * measures.foot_sliding(before, after),
+        "posture solves": solves,
+        "programs": programs,
+    }
 
 
 def run(
     clips: Mapping[str, Path | None],
-    cases: Sequence[tuple[str, str, str]],
+    cases: Sequence[Case],
     folder: Path,
     facts: Mapping[str, str],
     jobs: int = 1,
     tell: Callable[[str], object] = lambda said: None,
     slowest: Callable[[float], float] = lambda duration: 120.0 + 60.0 * duration,
-) -> list[MotionRow]:
+) -> list[Row]:
     """Measure all cases, and keep what was measured in `motion.csv`, where a run that was ended goes on.
 
     Args:
@@ -174,29 +133,36 @@ def run(
     """
     kept = folder / "motion.csv"
     make_folder(folder / "clips")
-    rows = {row.key: row for row in (read_rows(kept, MotionRow)[1] if kept.is_file() else [])}
-    missing = [MotionRow(*case) for case in cases if case not in rows]
-    made = {name: _made(name, clips[name], folder) for name in dict.fromkeys(row.clip for row in missing)}
+    rows = {(row.case, row.tool): row for row in (read_rows(kept, Row)[1] if kept.is_file() else [])}
+    missing = [case for case in cases if _key(case) not in rows]
+    made = {name: _made(name, clips[name], folder) for name in dict.fromkeys(clip for clip, _, _ in missing)}
     waiting = []
-    for row in missing:
-        frames, duration, fault = made[row.clip]
-        row = replace(row, frames=frames, duration=duration)
+    for case in missing:
+        name, worn, method = case
+        duration, fault = made[name]
         if fault:
-            rows[row.key] = replace(row, outcome="no clip", said=fault)
+            rows[_key(case)] = Row(*_key(case), {"outcome": "no clip", "said": fault})
         else:
-            most, path = slowest(duration), str(clip_file(row.clip, folder))
-            waiting.append(Job(row, measured, (row, path, most), BY_THE_CLOCK * most))
+            most = slowest(duration)
+            waiting.append(Job(case, measured, (worn, method, str(clip_file(name, folder)), most), BY_THE_CLOCK * most))
     for outcome in run_batch(iter(waiting), jobs):
-        row = outcome.answer
-        if row is None:
+        figures = outcome.answer
+        if figures is None:
             ended = "overtime" if outcome.error and outcome.error.overtime else "ended"
-            row = replace(outcome.job.name, outcome=ended, said=str(outcome.error))
-        rows[row.key] = row
+            figures = {"outcome": ended, "said": str(outcome.error)}
+        key = _key(outcome.job.name)
+        rows[key] = Row(*key, figures)
         write_rows(kept, facts, list(rows.values()))
-        tell(f"{', '.join(row.key)}: {row.outcome}")
+        tell(f"{', '.join(key)}: {figures['outcome']}")
     if rows:
         write_rows(kept, facts, list(rows.values()))
-    return [rows[case] for case in cases]
+    return [rows[_key(case)] for case in cases]
+
+
+def _key(case: Case) -> tuple[str, str]:
+    """Case and tool of the row of a case."""
+    clip, worn, method = case
+    return f"{clip}, {worn}", method
 
 
 def clip_file(name: str, folder: Path) -> Path:
@@ -204,8 +170,8 @@ def clip_file(name: str, folder: Path) -> Path:
     return folder / "clips" / f"{name.replace(' ', '_')}.npz"
 
 
-def _made(name: str, recording: Path | None, folder: Path) -> tuple[int, float, str]:
-    """Frames and duration of a clip, made unless an earlier run did; and the sentence with which it is refused."""
+def _made(name: str, recording: Path | None, folder: Path) -> tuple[float, str]:
+    """Duration of a clip, made unless an earlier run did; and the sentence with which it is refused."""
     from wholebody.figures import load
     from wholebody.motion.reading import read_clip
 
@@ -215,32 +181,37 @@ def _made(name: str, recording: Path | None, folder: Path) -> tuple[int, float, 
             (recorded(recording, figure) if recording else synthetic(name, figure)).write(path)
         clip = read_clip(path, figure)
     except WholebodyError as error:
-        return 0, 0.0, str(error)
-    return len(clip), clip.duration, ""
+        return 0.0, str(error)
+    return clip.duration, ""
 
 
-def summary(rows: Sequence[MotionRow]) -> list[Row]:
+def _answered(rows: Sequence[Row]) -> list[Row]:
+    """Those that have a clip to measure."""
+    return [row for row in rows if row["outcome"] in ("free", "left")]
+
+
+def summary(rows: Sequence[Row]) -> list[Row]:
     """A row a method, over all its cases."""
     found = []
-    for method in dict.fromkeys(row.method for row in rows):
-        cases = [row for row in rows if row.method == method]
-        mine = [row for row in cases if row.measured]
-        figures: dict[str, Figure] = {"free": f"{sum(row.outcome == 'free' for row in mine)} of {len(cases)}"}
-        for name, unit in (("deepest", "mm"), ("between", "mm")):
-            figures[f"{name}, most {unit}"] = max((getattr(row, f"{name}_mm") for row in mine), default=float("nan"))
-        for attribute, name in (
-            ("angle", "deviation rad"), ("distance_mm", "deviation mm"), ("jerk", "jerk"),
-            ("sliding_mm", "feet slide mm"), ("slowness", "s a second of motion"),
+    for method in dict.fromkeys(row.tool for row in rows):
+        cases = [row for row in rows if row.tool == method]
+        mine = _answered(cases)
+        figures: dict[str, Figure] = {"free": f"{sum(row['outcome'] == 'free' for row in mine)} of {len(cases)}"}
+        for name in ("deepest", "between"):
+            figures[f"{name}, most mm"] = max((row[f"{name} mm"] for row in mine), default=float("nan"))
+        for name, called in (
+            ("deviation rad", "deviation rad"), ("mm", "deviation mm"), ("jerk", "jerk"),
+            ("feet slide mm", "feet slide mm"), ("s a second", "s a second of motion"),
         ):  # fmt: skip
-            values = [getattr(row, attribute) for row in mine] or [float("nan")]
-            figures[f"{name}, median"] = float(np.median(values))
-            figures[f"{name}, p95"] = float(np.quantile(values, 0.95))
+            values = [row[name] for row in mine] or [float("nan")]
+            figures[f"{called}, median"] = float(np.median(values))
+            figures[f"{called}, p95"] = float(np.quantile(values, 0.95))
         found.append(Row("all clips", method, figures))
     return found
 
 
-def motion_report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
-    """The tables as Markdown."""
+def motion_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:
+    """The table as Markdown; the CSV file has every case."""
     about = (
         "Clips of a person at 30 Hz, each with each piece of equipment. Every frame is judged by all pairs, and every "
         "motion between frames by sweeps (`wb.check`), whatever made it. Free: no frame and no motion deeper than 0.1 "
@@ -249,35 +220,22 @@ def motion_report(rows: Sequence[MotionRow], facts: Mapping[str, str]) -> str:
         "Sliding: by how much standing feet slide more than before. Times are the processor's; a method's includes "
         "its own report."
     )  # fmt: skip
-    listed = [
-        Row(
-            f"{row.clip}, {row.equipment}",
-            row.method,
-            {
-                "frames": row.frames, "outcome": row.outcome, "collide before": row.before, "after": row.after,
-                "dips": row.dips, "deepest mm": row.deepest_mm, "between mm": row.between_mm,
-                "deviation rad": row.angle, "mm": row.distance_mm, "jerk": row.jerk, "feet slide mm": row.sliding_mm,
-                "posture solves": row.solves, "programs": row.programs, "s a second": row.slowness,
-            },
-        )
-        for row in rows
-        if row.measured
-    ]  # fmt: skip
-    missing = [f"{', '.join(row.key)}: {row.outcome} ({row.said})" for row in rows if not row.measured]
-    return report(about, {"Methods": summary(rows), "Every case": listed}, facts, missing)
+    missing = [row for row in rows if row not in _answered(rows)]
+    notes = [f"{row.case}, {row.tool}: {row['outcome']} ({row['said']})" for row in missing]
+    return report(about, {"": summary(rows)}, facts, notes)
 
 
-def panels(rows: Sequence[MotionRow]) -> list[Panel]:
+def panels(rows: Sequence[Row]) -> list[Panel]:
     """Shares of the cases that a method frees within a deviation, a jerk, and a time."""
-    methods = [name for name in dict.fromkeys(row.method for row in rows) if name != CHECKED]
-    counts = {name: sum(row.method == name for row in rows) for name in methods}
-    free = {name: [row for row in rows if row.method == name and row.outcome == "free"] for name in methods}
+    methods = [name for name in dict.fromkeys(row.tool for row in rows) if name != CHECKED]
+    counts = {name: sum(row.tool == name for row in rows) for name in methods}
+    free = {name: [row for row in rows if row.tool == name and row["outcome"] == "free"] for name in methods}
     drawn = []
-    for attribute, title in (
-        ("distance_mm", "deviation of the joints' centres [mm]"), ("jerk", "jerk, of that before"),
-        ("slowness", "CPU seconds a second of motion"),
+    for figure, title in (
+        ("mm", "deviation of the joints' centres [mm]"), ("jerk", "jerk, of that before"),
+        ("s a second", "CPU seconds a second of motion"),
     ):  # fmt: skip
-        values = {name: [max(getattr(row, attribute), 1e-3) for row in mine] for name, mine in free.items() if mine}
+        values = {name: [max(row[figure], 1e-3) for row in mine] for name, mine in free.items() if mine}
         if values:
             drawn.append(shares("free", title, values, counts))
     return drawn

@@ -18,14 +18,12 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, WholebodyError
 from wholebody.base.files import Scratch
 from wholebody.base.runner import Child, EndedError
-from wholebody.bench.rows import Figure, Row, measured_ms, report
+from wholebody.bench.rows import Figure, Row, measured_ms, only, report
 from wholebody.geometry.mesh_cache import VARIABLE
 
 if TYPE_CHECKING:
     from wholebody.figures.figure import Figure as Body
     from wholebody.scene.scene import Scene
-
-LONGEST = 300.0  # s: after which a description is given up
 
 
 def examine(path: str, reaches: int) -> dict[str, Figure]:
@@ -131,11 +129,12 @@ def measure(folder: Path, reaches: int) -> Iterator[Row]:
 
 
 def _examined(path: Path, reaches: int, cache: str) -> dict[str, Figure]:
+    longest = 300.0  # s: after which a description is given up
     child = Child({VARIABLE: cache, "OMP_NUM_THREADS": "1"})
     try:
-        found: dict[str, Figure] = child.call(examine, str(path), reaches, seconds=LONGEST)
+        found: dict[str, Figure] = child.call(examine, str(path), reaches, seconds=longest)
     except EndedError as error:
-        return {"refused": f"it takes more than {LONGEST:g} s" if error.overtime else str(error)}
+        return {"refused": f"it takes more than {longest:g} s" if error.overtime else str(error)}
     finally:
         child.close()
     return found
@@ -146,14 +145,14 @@ def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
     loaded = [row for row in rows if row.tool != "refused"]
     whole = sum(row.figures.get("solved") == reaches for row in loaded)
     about = (
-        "# Robots\n\nThis page says which robot descriptions load, how long that takes, and whether the robots reach. "
-        "The descriptions come from other people and are loaded without changes. `wholebody bench robots FOLDER "
-        f"--update-docs` writes this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all "
-        f"of their {reaches} reaches. A reach moves the tip of a chain to where a random posture free of contact has "
-        "it; it begins at the default posture, and the robot may not touch itself. The chains take turns, the longest "
-        "first. First is the CPU time of loading with an empty cache, again that of loading once more; free is the "
-        "least distance of any pair in the default posture; left out are pairs of pieces that could not be parted; "
-        "notes are changes to the geometry that loading reported; the rest is the CPU time of a reach."
+        "# Robots\n\nWhich robot descriptions load, how long that takes, and whether the robots reach. The files come "
+        "from other people and are loaded without changes; `wholebody bench robots FOLDER --update-docs` writes "
+        f"this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all of their {reaches} "
+        "reaches. A reach moves the tip of a chain to where a random posture free of contact has it; it begins at the "
+        "default posture, and the robot may not touch itself. The chains take turns, the longest first. First is the "
+        "CPU time of loading with an empty cache, again that of loading once more; free is the least distance of any "
+        "pair in the default posture; the rest is the CPU time of a reach."
     )  # fmt: skip
     refused = [f"refused: {row['refused']}" for row in rows if row.tool == "refused"]
-    return report(about, {"": loaded}, facts, refused) + "\n"
+    shown = only(loaded, "first s", "again s", "freedoms", "pairs", "free mm", "solved", "median ms", "p95 ms")
+    return report(about, {"": shown}, facts, refused) + "\n"

@@ -32,8 +32,6 @@ SIZES: dict[str, tuple[int, ...]] = {
     "pieces of each segment": (1, 2, 4, 8, 16, 32),
     "things around": (10, 30, 100, 300, 1000, 2000, 5000),
 }
-QUICK = {name: sizes[:3] for name, sizes in SIZES.items()}
-METHODS = ("qp", "newton", "ccd", "placo")
 SIMPLIFIED = "qp, simplified"
 
 

@@ -173,6 +173,9 @@ def reach_summary(rows: Sequence[Row]) -> list[Row]:
     return found
 
 
+SHOWN = "solved", "pairs", "a solve ms", "judgement ms", "inside", "worst deepest mm", "worst effort above %"
+"""Figures of a level of modelling that the report shows."""
+
 LEVELS: dict[str, Parts] = {
     "all": Parts(joints=False, pairs=False, growth=0.0),
     "active joints": Parts(joints=True, pairs=False, growth=0.0),

@@ -143,6 +143,19 @@ def all_throws(count: int, quick: bool = False) -> Iterator[Row]:
                     yield throws(thing, speed, person, swift, count)
 
 
+def throw_summary(rows: Sequence[Row]) -> list[Row]:
+    """A row for each limit and speed, over all things and persons: counts, the deepest end, the largest median time."""
+    found = []
+    for limits, speed in dict.fromkeys((row["limits"], row["m/s"]) for row in rows):
+        mine = [row for row in rows if (row["limits"], row["m/s"]) == (limits, speed)]
+        figures: dict[str, Figure] = {"frames": sum(row["frames"] for row in mine)}
+        figures["deepest mm"] = max(row["deepest mm"] for row in mine)
+        figures |= {name: sum(row[name] for row in mine) for name in ("deep", "named", "silent")}
+        figures["CPU median ms, most"] = max(row["CPU median ms"] for row in mine)
+        found.append(Row(f"{limits} limits", f"{speed:g} m/s", figures))
+    return found
+
+
 PEN = 1.5  # m: half the side
 AWAY = np.array([20.0, 0.0, 0.0])  # from the hand that a scene needs
 

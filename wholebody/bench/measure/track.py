@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -22,23 +22,39 @@ import wholebody as wb
 from wholebody.assessment.motion import limit_violation, pairs_along, velocities
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.bench.suite.problem_sets.case import numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 from wholebody.figures.self_pairs import random_postures
 
 VARIANTS = ("free", "contact", "alone")
-DT = 0.01  # s
-CLEARANCE = 0.010  # m
-WITHIN = 0.070  # m: pairs nearer than this count for every tool that has such a setting
-JOINT_SPEED = 4.0  # rad/s
-ROOT_SPEED, ROOT_TURN = 1.0, 2.0  # m/s, rad/s
-SEED = 7  # of the objects
-BOXES, SPHERES, HULLS, HULL_POINTS = 7, 6, 7, 100
-BLOCK = ((0.20, 0.24, 0.20), (0.44, -0.44, 1.05))  # edges and place of the box that the contact reach is asked into
-INSIDE = ((0.38, -0.48, 1.02), (0.42, -0.38, 1.08))  # m: the targets go from one of these to the other, inside the box
-INTO, ALONG = 0.35, 0.25  # shares of the time for the ways into the box and within it
-FREE = ((0.32, -0.20, 0.92), (0.38, 0.18, 1.12), (0.30, -0.22, 1.42))  # m: by way of these places
-ROOM_START, ROOM_WAY = 0.025, 0.075  # m: what objects leave free around the standing body and around the free way
-SPACE = ((0.05, -0.90, 0.25), (0.85, 0.65, 1.85))  # m: where objects are put
+
+
+class Setting(NamedTuple):
+    """What every tool is told of a reach.
+
+    Attributes:
+        dt: of a step [s].
+        clearance: that every pair keeps [m].
+        within: pairs nearer than this [m] count for every tool that has such a setting.
+        joint_speed, root_speed, root_turn: most that a joint [rad/s] and the root [m/s], [rad/s] may move.
+        posture_cost: of a radian, where a metre of the goal costs 1; tools square it.
+    """
+
+    dt: float = 0.01
+    clearance: float = 0.010
+    within: float = 0.070
+    joint_speed: float = 4.0
+    root_speed: float = 1.0
+    root_turn: float = 2.0
+    posture_cost: float = 1e-3
+
+
+SETTING = Setting()
+
+
+def _given() -> Any:
+    """The numbers of the reaches."""
+    return numbers("step")
 
 
 @dataclass(frozen=True)
@@ -61,7 +77,7 @@ class Track:
     targets: Array
     tip: str = "right_index_tip"
     feet: tuple[str, ...] = ("left_foot", "right_foot")
-    clearance: float = CLEARANCE
+    clearance: float = SETTING.clearance
 
     @property
     def floating(self) -> bool:
@@ -92,20 +108,23 @@ def track(name: str, steps: int = 200) -> Track:
     figure = wb.load("human")
     start = figure.posture("standing")
     tip, thorax = (figure.placement(start, name).translation for name in ("right_index_tip", "thorax"))
-    free = smooth_way(np.vstack([tip, FREE]), 400)
+    given = _given()
+    by_way = np.vstack([tip, given.free_m])
+    free = smooth_way(by_way, 400)
     scene = wb.Scene(figure)
     if name != "alone":
-        add_objects(scene, start, free, np.random.default_rng(SEED))
+        add_objects(scene, start, free, np.random.default_rng(given.seed))
     if name != "contact":
-        return Track(name, scene, start, smooth_way(np.vstack([tip, FREE]), steps))
+        return Track(name, scene, start, smooth_way(by_way, steps))
     chest = thorax + (0.16, 0.0, 0.0)  # m: before the origin of the thorax' frame, level with it
-    first, second = round(INTO * steps), round((INTO + ALONG) * steps)
+    inside = np.array(given.inside_m)
+    first, second = round(given.into * steps), round((given.into + given.along) * steps)
     ways = [
         smooth_way(np.array([start_place, end_place]), count)
         for start_place, end_place, count in (
-            (tip, INSIDE[0], first),
-            (INSIDE[0], INSIDE[1], second - first),
-            (INSIDE[1], chest, steps - second),
+            (tip, inside[0], first),
+            (inside[0], inside[1], second - first),
+            (inside[1], chest, steps - second),
         )
     ]
     return Track(name, scene, start, np.vstack(ways))
@@ -127,13 +146,14 @@ def smooth_way(places: Array, steps: int) -> Array:
 
 def add_objects(scene: wb.Scene, start: Array, way: Array, rng: np.random.Generator) -> None:
     """Put boxes, spheres and hulls around a body, clear of how it stands and of a way (k, 3) for its fingertip."""
-    scene.add(wb.Box(BLOCK[0]), name="block", at=BLOCK[1])
-    put_objects(scene, Occupied(scene.figure, (start,)), way, rng)
+    given = _given()
+    scene.add(wb.Box(tuple(given.block_m)), name="block", at=given.block_at_m)
+    put_objects(scene, Occupied(scene.figure, (start,)), way, rng, given.space_m)
 
 
 def put_objects(
-    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]] = SPACE,
-    size: float = 1.0, boxes: int = BOXES - 1,
+    scene: wb.Scene, taken: Occupied, way: Array, rng: np.random.Generator, space: Sequence[Sequence[float]],
+    size: float = 1.0, boxes: int = 6,
 ) -> None:  # fmt: skip
     """Put boxes, spheres and hulls into a space, clear of what is taken up and of a way for a tip.
 
@@ -149,13 +169,14 @@ def put_objects(
     Raises:
         InputError: no place was found for one of them.
     """
-    kinds = ["box"] * boxes + ["sphere"] * SPHERES + ["hull"] * HULLS
-    taken.keep_free(way[::8], size * (ROOM_WAY - ROOM_START))
+    given = _given()
+    kinds = ["box"] * boxes + ["sphere"] * given.spheres + ["hull"] * given.hulls
+    taken.keep_free(way[::8], size * (given.room_way_m - given.room_start_m))
 
     def make(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
         return kinds[number], _shape(kinds[number], rng, size)
 
-    add_things(scene, len(kinds), taken, size * ROOM_START, rng, space, make)
+    add_things(scene, len(kinds), taken, size * given.room_start_m, rng, space, make)
 
 
 def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
@@ -164,7 +185,7 @@ def _shape(kind: str, rng: np.random.Generator, size: float) -> wb.Shape:
         return wb.Box((float(edges[0]), float(edges[1]), float(edges[2])))
     if kind == "sphere":
         return wb.Sphere(size * float(rng.uniform(0.04, 0.12)))
-    points = rng.normal(size=(HULL_POINTS, 3))
+    points = rng.normal(size=(100, 3))
     points *= size * rng.uniform(0.05, 0.12, 3) / np.linalg.norm(points, axis=1, keepdims=True)
     return wb.Hull(points)
 
@@ -174,7 +195,7 @@ class Verdict(NamedTuple):
 
     Attributes:
         least_distance: (steps,) least signed distance of all pairs after each step [m].
-        near: (steps,) pairs nearer than `WITHIN`.
+        near: (steps,) pairs nearer than `Setting.within`.
         touching: (steps,) pairs at the clearance or nearer, to 1 mm.
         error: (steps,) distance of the fingertip from its target [m].
         foot_drift: greatest distance of a foot from where it began [m].
@@ -212,7 +233,7 @@ def judge(track: Track, postures: Array) -> Verdict:
     least, near, touching, error, drift, turn = [], [], [], [], [0.0], [0.0]
     for pairs, target in zip(pairs_along(scene, postures), track.targets, strict=True):
         least.append(pairs.least)
-        near.append(int((pairs.distance < WITHIN).sum()))
+        near.append(int((pairs.distance < SETTING.within).sum()))
         # A pair nearer than the clearance and 1 mm is in contact.
         touching.append(int((pairs.distance < track.clearance + 1e-3).sum()))
         error.append(float(np.linalg.norm(pairs.state.frame(tip).translation - target)))
@@ -221,22 +242,17 @@ def judge(track: Track, postures: Array) -> Verdict:
             drift.append(float(np.linalg.norm(moved.translation)))
             turn.append(float(np.linalg.norm(pin.log3(moved.rotation))))
     whole = np.vstack([track.start, postures])
-    speed = np.abs(velocities(scene.model, whole, DT)).max(axis=0)
+    speed = np.abs(velocities(scene.model, whole, SETTING.dt)).max(axis=0)
     root, joints = np.split(speed, [6 if track.floating else 0])
     angles = np.vstack([track.start, whole])[:, figure.limits.idx_q]
     return Verdict(
         np.array(least), np.array(near), np.array(touching), np.array(error), max(drift), max(turn),
-        limit_violation(figure, postures), float(joints.max(initial=0.0)) / JOINT_SPEED,
-        max(float(root[:3].max(initial=0.0)) / ROOT_SPEED, float(root[3:].max(initial=0.0)) / ROOT_TURN),
-        float(np.abs(np.diff(angles, 2, axis=0)).mean()) / DT**2,
+        limit_violation(figure, postures), float(joints.max(initial=0.0)) / SETTING.joint_speed,
+        max(
+            float(root[:3].max(initial=0.0)) / SETTING.root_speed, float(root[3:].max(initial=0.0)) / SETTING.root_turn
+        ),
+        float(np.abs(np.diff(angles, 2, axis=0)).mean()) / SETTING.dt**2,
     )  # fmt: skip
-
-
-SHARES = (1.0, 0.75, 0.5, 0.25, 0.125, 0.0625)
-"""How far towards random postures the way goes, and how large the block is: the largest that leaves room."""
-CANDIDATES = 40  # ways that are tried for each of these
-OWN_ROOM = 2e-4  # m: what a way leaves between pieces of the figure
-ROOM_SPACE = 0.2  # m: by which the space of the objects exceeds that of the pieces along the way, for a person's size
 
 
 def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
@@ -260,7 +276,7 @@ def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
     chain = max(chains, key=lambda chain: len(chain.joints))
     dofs = sorted({dof for name in chain.joints for dof in figure.dofs([name]).tolist()})
     ways, distance = _ways(figure, spec, dofs, steps)
-    clearance = min(CLEARANCE, 0.5 * distance)
+    clearance = min(SETTING.clearance, 0.5 * distance)
     held = (str(figure.segments[0]),) if figure.root == "free" else ()
     places = tuple(np.array([figure.placement(q, chain.tip).translation for q in way]) for way in ways)
     tracks = []
@@ -277,8 +293,9 @@ def figure_tracks(spec: str, steps: int = 200) -> list[Track]:
 def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tuple[tuple[Array, Array], float]:
     """Postures (steps, nq) through two random ones, and those to the first and back; the figure's least distance."""
     scene, start, still = wb.Scene(figure), figure.neutral, np.zeros(figure.model.nv)
-    random = random_postures(figure.model, 2 * CANDIDATES, SEED).reshape(CANDIDATES, 2, -1)
-    for share in SHARES:
+    given = _given()
+    random = random_postures(figure.model, 2 * given.candidates, given.seed).reshape(given.candidates, 2, -1)
+    for share in given.shares:
         for pair in random:
             moves = np.zeros((2, figure.model.nv))
             for move, q in zip(moves, pair, strict=True):
@@ -291,16 +308,16 @@ def _ways(figure: wb.Figure, spec: str, dofs: Sequence[int], steps: int) -> tupl
             )
             tested = max(1, steps // 50)  # postures along a way that are tested for being free
             least = _least(scene, np.vstack([start, there[::tested], there[-1:], back[::tested]]))
-            if least > OWN_ROOM:
+            if least > given.own_room_m:
                 return (there, back), least
     raise InputError(f"{spec}: no way was found along which it stays free of itself; give another figure")
 
 
 def _least(scene: wb.Scene, q: Array) -> float:
     """Least distance of any pair at postures (n, nq) up to the first that is not free, at most twice the clearance."""
-    least = 2.0 * CLEARANCE
+    least = 2.0 * SETTING.clearance
     for posture in q:
-        if least > OWN_ROOM and len(scene.geometry.collisionPairs):
+        if least > _given().own_room_m and len(scene.geometry.collisionPairs):
             least = float(scene.contacts(posture, within=least).distance.min(initial=least))
     return least
 
@@ -316,18 +333,19 @@ def _furnish(scene: wb.Scene, ways: tuple[Array, Array], places: Sequence[Array]
     size = float((high - low).max()) / 2.0
     if block:
         _add_block(scene, places[1], size)
-    space = (low - size * ROOM_SPACE).tolist(), (high + size * ROOM_SPACE).tolist()
-    put_objects(scene, taken, tips, np.random.default_rng(SEED), space, size, BOXES - block)
+    given = _given()
+    space = (low - size * given.room_space_m).tolist(), (high + size * given.room_space_m).tolist()
+    put_objects(scene, taken, tips, np.random.default_rng(given.seed), space, size, given.boxes - block)
 
 
 def _add_block(scene: wb.Scene, places: Array, size: float) -> None:
     """Put a box about the place of the tip that is farthest from the first, as large as leaves the start free."""
-    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(BLOCK[0])
+    standing, edges = Occupied(scene.figure, (scene.figure.neutral,)), size * np.array(_given().block_m)
     at = places[np.argmax(np.linalg.norm(places - places[0], axis=1))]
-    for share in SHARES:
+    for share in _given().shares:
         x, y, z = (share * edges).tolist()
         box = wb.Box((x, y, z))
-        if standing.clear_of(box, (*at.tolist(),), size * ROOM_START):
+        if standing.clear_of(box, (*at.tolist(),), size * _given().room_start_m):
             scene.add(box, name="block", at=tuple(at.tolist()))
             return
     raise InputError(f"{scene.figure.name}: a block at the end of its way would touch it where it starts")

@@ -24,7 +24,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import as_dict, with_values
-from wholebody.bench.report import render
+from wholebody.bench.rows import Row
+from wholebody.bench.rows import report as tables_of
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.suite.stability.case import Posed
 from wholebody.bench.suite.stability.catalogue import cases
@@ -33,11 +34,7 @@ from wholebody.problem import Problem
 
 Value = float | int | tuple[float, ...]
 
-SHARED = ("wholebody.methods.starts", "wholebody.geometry.continuous.passing_through")
-"""Modules that methods share and that have constants of their own."""
-
 FACTORS = {"halved": 0.5, "doubled": 2.0}
-SEED = 5
 
 
 @dataclass(frozen=True)
@@ -78,25 +75,6 @@ class Outcome:
         return sum(not np.array_equal(a, b) for a, b in zip(self.answers, other.answers, strict=True))
 
 
-@dataclass(frozen=True)
-class Row:
-    """What a change did.
-
-    Attributes:
-        differ: answers that differ in any digit.
-        solved, iterations, left: changes of these, as in `Outcome`.
-        time: processor's time over that of the unchanged method, which is measured anew after every mechanism.
-    """
-
-    what: str
-    change: str
-    differ: int
-    solved: int
-    iterations: int
-    left: float
-    time: float
-
-
 def constants(method: str) -> tuple[list[Constant], list[str]]:
     """Constants of a method, a package of `wholebody.methods`, but those of tracking.
 
@@ -105,7 +83,8 @@ def constants(method: str) -> tuple[list[Constant], list[str]]:
     package = import_module(f"wholebody.methods.{method}")
     names = [found.name for found in pkgutil.walk_packages(package.__path__, f"{package.__name__}.")]
     names = [name for name in names if not name.endswith(".tracking")]  # no step is asked for here
-    return constants_in((*names, *SHARED))
+    shared = "wholebody.methods.starts", "wholebody.geometry.continuous.passing_through"
+    return constants_in((*names, *shared))
 
 
 def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
@@ -130,7 +109,9 @@ def constants_in(modules: Iterable[str]) -> tuple[list[Constant], list[str]]:
 
 def problems(count: int, method: str) -> list[Problem]:
     """The first problems of every still set, and the hard cases that are solved once: those that the method takes."""
-    made = [SETS[name].make(number, SEED).problem for name in SETS if not SETS[name].moving for number in range(count)]
+    made = [
+        SETS[name].make(number, seed=5).problem for name in SETS if not SETS[name].moving for number in range(count)
+    ]
     posed = [given.problem for given in (case.question() for case in cases()) if isinstance(given, Posed)]
     solver = method_named(method)
     return [problem for problem in made + posed if solver.accepts(problem) is None]
@@ -170,11 +151,15 @@ def ablation(
 
     def note(what: str, change: str) -> None:
         now = outcome(method, given)
-        done = (now.solved - whole.solved, now.iterations - whole.iterations, now.left - whole.left)
-        rows.append(Row(what, change, now.differ(whole), *done, now.seconds / whole.seconds))
-        tell(
-            f"{what}, {change}: {rows[-1].differ} differ, {rows[-1].solved:+d} solved, {rows[-1].time:.2f} of the time"
-        )
+        figures = {
+            "answers that differ": now.differ(whole),
+            "solved": now.solved - whole.solved,
+            "iterations": now.iterations - whole.iterations,
+            "left m, rad": now.left - whole.left,
+            "time": now.seconds / whole.seconds,
+        }
+        rows.append(Row(what, change, figures))
+        tell(f"{what}, {change}: {figures}")
 
     for name, (owner, attribute, instead) in mechanisms.items():
         with replaced([(owner, attribute)], instead):
@@ -197,33 +182,29 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp import multistart, sqp
     from wholebody.methods.qp.feasibility import Feasibility
-    from wholebody.methods.qp.funnel import Funnel
-    from wholebody.methods.qp.multipliers import Multipliers
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent = multistart.Search, sqp.SQP
+    search, descent = multistart.Multistart, sqp.SQP
     return {
-        "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
-        "watchdog": (descent, "_promises", lambda self, here, there: False),
+        "watchdog": (descent, "_is_worth_watching", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
-        "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
+        "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
-        "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
         "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
-        "arms without contacts first": (qp, "unobstructed", lambda *given: None),
+        "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
         "feasibility first": (search, "_feasibility_first", lambda self, start: self.best),
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
-        "leaving contacts that cancel": (search, "_leave_cancelling", lambda self: None),
-        "relaxed probes": (search, "_relaxed_probes", lambda self, starts: iter(())),
+        "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
+        "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
-        "closest posture to goals that are not met": (search, "_come_nearest", lambda self: None),
-        "closest posture among things": (search, "_near_best", lambda self: None),
+        "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),
+        "closest posture among things": (search, "_closest_from_best", lambda self: None),
     }
 
 
@@ -302,15 +283,18 @@ def replaced(places: Sequence[tuple[Any, str]], value: Any) -> Iterator[None]:
             setattr(owner, name, old)
 
 
-def report(method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str]) -> str:
+def report(
+    method: str, given: int, whole: Outcome, rows: Sequence[Row], compiled: Sequence[str], facts: Mapping[str, str]
+) -> str:
     """The counts as Markdown: mechanisms, constants that matter by what they change, and those that change nothing."""
-    changed = [row for row in rows if row.change != "off"]
-    matter = {row.what for row in changed if row.differ}
-    unnoticed = dict.fromkeys(row.what for row in changed if row.what not in matter)
-    tables = {
-        "switched off": [row for row in rows if row.change == "off"],
-        "constant": [row for row in changed if row.differ],
-    }
-    return render(
-        "ablation.md", method=method, given=given, whole=whole, tables=tables, unnoticed=unnoticed, compiled=compiled
+    changes = [row for row in rows if row.tool != "off"]
+    matter = [row for row in changes if row["answers that differ"]]
+    unnoticed = dict.fromkeys(row.case for row in changes if row.case not in {each.case for each in matter})
+    about = (
+        f"{method} on {given} problems: {whole.solved} solved, {whole.iterations} iterations, {whole.left:.4g} m and "
+        f"rad left, {whole.seconds:.3g} s of the processor. Columns are changes of these, and the ratio of the times."
     )
+    notes = [f"Half and twice of these changed no answer: {', '.join(unnoticed) or 'none'}."]
+    notes += [f"Compiled in, and not changed: the constants of {', '.join(compiled)}."] if compiled else []
+    switched = [row for row in rows if row.tool == "off"]
+    return tables_of(about, {"Mechanisms": switched, "Constants": matter}, facts, notes)

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from wholebody.base import checks
 from wholebody.base.files import make_folder
-from wholebody.bench.rows import Panel, Row, chart, report
+from wholebody.bench.rows import Panel, Row, chart, only, report
 from wholebody.bench.tables import machine, write_rows
 from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
 from wholebody.cli.command import count, option
@@ -54,20 +54,17 @@ def step(arguments: argparse.Namespace) -> None:
     tracks = {course.name: course for course in courses or (track(name, steps) for name in VARIANTS)}
     runs: dict[str, step.Runs] = {}
     notes = [line for name in tools for line in tool_differences(name)]
-    tables: dict[str, list[Row]] = {}
+    spent, judged = list[Row](), list[Row]()
     for name, course in tracks.items():
         taken, refused = step.taking(course, tools) if figures else (list(tools), {})
         print(f"{name}: {course.pairs} pairs that can touch, tools {', '.join(taken)}")
         notes += [f"{tool} does not take {name}: {sentence}" for tool, sentence in refused.items()]
         runs[name] = step.measure(course, taken, repeats, print) if taken else {}
-        tables[f"{name}: time"] = step.time_rows(course, runs[name])
-        tables[f"{name}: result"] = step.result_rows(course, runs[name])
+        spent += step.time_rows(course, runs[name])
+        judged += step.result_rows(course, runs[name])
     name = "step-figures" if figures else "step"
-    text = step.step_report(tables, facts, bool(figures), notes)
-    rows = {
-        f"{name}-{kind}": [row for title, some in tables.items() if title.endswith(kind) for row in some]
-        for kind in ("time", "result")
-    }
+    text = step.step_report(spent, judged, facts, bool(figures), notes)
+    rows = {f"{name}-time": spent, f"{name}-result": judged}
     charts = _charts(name, step.panels(runs, tracks), "Share of steps within a time, and least distance of any pair")
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
@@ -153,7 +150,8 @@ def _detail(arguments: argparse.Namespace) -> None:
         "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
         "is `wb.simplify`."
     )
-    text = report(about, {"": solve.detail_summary(rows)}, facts, list(refused))
+    shown = [row for row in solve.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
+    text = report(about, {"": only(shown, *solve.SHOWN)}, facts, list(refused))
     publish("detail", text, arguments, facts=facts, tables={"detail": rows})
 
 
@@ -169,8 +167,9 @@ def scaling(arguments: argparse.Namespace) -> None:
     """Measure, fit, draw."""
     from wholebody.bench.measure import scaling
 
-    methods = chosen(arguments.methods, scaling.METHODS, "--methods")
-    repeats, sizes = (2, scaling.QUICK) if arguments.quick else (arguments.repeats, scaling.SIZES)
+    methods = chosen(arguments.methods, ("qp", "newton", "ccd", "placo"), "--methods")
+    repeats = 2 if arguments.quick else arguments.repeats
+    sizes = {name: grown[: 3 if arguments.quick else None] for name, grown in scaling.SIZES.items()}
     facts, said = machine(), list[str]()
 
     def say(line: str) -> None:
@@ -187,8 +186,7 @@ def scaling(arguments: argparse.Namespace) -> None:
         "is the processor's time. An exponent e means time ~ size^e; it is the slope of a line through the logarithms "
         "over the sizes from a tenth of the largest on (at least three)."
     )
-    tables = {"Exponents": scaling.exponents(rows), "Times": rows}
-    text = report(about, tables, facts, [line for line in said if "left out" in line])
+    text = report(about, {"": scaling.exponents(rows)}, facts, [line for line in said if "left out" in line])
     charts = _charts("scaling", scaling.panels(rows), "Time of a solve and of a step, as one size grows")
     publish("scaling", text, arguments, facts=facts, tables={"scaling": rows}, charts=charts)
 
@@ -257,6 +255,8 @@ WORLD = {
 )
 def world(arguments: argparse.Namespace) -> int:
     """Measure; --quick takes three drops for half a second, one throw of each kind, three seconds of the long run."""
+    from wholebody.bench.measure.throws import throw_summary
+
     found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
     given = _world(arguments)
     make_folder(arguments.out)
@@ -273,7 +273,12 @@ def world(arguments: argparse.Namespace) -> int:
         "frame; depths are measured by coal at the end of every frame, energies are in parts of that at the start. "
         "Times are the processor's."
     )
-    publish("world", report(about, {WORLD[part]: rows for part, rows in found.items()}, facts), arguments)
+    shown = dict(found)
+    if "throws" in found:
+        shown["throws"] = throw_summary(found["throws"])
+    if "drops" in found:
+        shown["drops"] = only(found["drops"], "median ms", "p99 ms", "deepest mm", "largest gain of energy")
+    publish("world", report(about, {WORLD[part]: rows for part, rows in shown.items()}, facts), arguments)
     held = all(row["held"] == "yes" for row in found.get("closed", ()))
     return 0 if held and not any(row["silent"] for row in found.get("throws", ())) else 1
 

@@ -74,7 +74,7 @@ def judge(arguments: argparse.Namespace) -> None:
     from wholebody.base.files import checked_target
     from wholebody.bench.suite.published.answers import read_answers
     from wholebody.bench.suite.published.judging import COLUMNS, as_json, cells, judge, left_out
-    from wholebody.bench.suite.published.reading import dumped
+    from wholebody.bench.suite.published.rebuilt import dumped
 
     out = arguments.out or arguments.answers.with_suffix(".verdict.json")
     checked_target(out, "--out", "a verdict", (".json",))

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import copy
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike
 
+from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
 from wholebody.base.checks import choice, flag, known, number, shown, whole
 from wholebody.base.errors import InputError
@@ -19,68 +19,20 @@ from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.inputs import ITERATIONS, TOLERANCE
 from wholebody.methods.newton.assembly_goals import AssemblyGoal, to_target
 from wholebody.methods.newton.assembly_joints import AssemblyJoints
-from wholebody.methods.newton.assembly_solution import AssemblySolution, solved
+from wholebody.methods.newton.assembly_solution import AssemblySolution, AssemblyStep, explained
 from wholebody.methods.newton.assembly_system import AssemblySystem
-from wholebody.methods.newton.batches import Batch, Key
+from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.equations import EquationSet, unit_lengths
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
-from wholebody.methods.newton.kkt import kkt_algebra
-from wholebody.methods.newton.linear_algebra.choice import NAMES
-from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
+from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.settings import CONTACTS, FRAMES
-from wholebody.methods.newton.system import Patterns, System
-from wholebody.scene.moving_obstacles import Collision, FrameMotion
+from wholebody.methods.newton.system import System, unit
+from wholebody.scene.moving_obstacles import FrameMotion
 from wholebody.tasks.inputs import point
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-FINEST = 1e-12  # m, rad: least tolerance; below it only rounding remains
-
-
-@dataclass
-class _Prepared:
-    """What solves share while bodies, things and joints stay.
-
-    Attributes:
-        algebra: name of the factorisation that was asked for.
-        revision: of the assembly.
-        active: all equations; what was analysed serves while their pattern stays.
-    """
-
-    algebra: str
-    revision: int
-    active: AssemblySystem
-    _nearest: tuple[System, QuasiDefinite] | None = None
-
-    def nearest(self) -> QuasiDefinite:
-        """The analysed factorisation for the nearest place."""
-        if self._nearest is None or self._nearest[0] is not self.active.system:
-            self._nearest = self.active.system, kkt_algebra(self.active.system)
-        return self._nearest[1]
-
-
-class AssemblyStep(NamedTuple):
-    """Answer of one frame of a drag.
-
-    Attributes:
-        goal_error: largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
-        joint_error: largest distance [m] or angle [rad] by which a joint, a constraint or a contact is open.
-        iterations: Newton iterations.
-        systems: linear systems solved.
-        taken: whether the bodies moved there.
-        collisions: what things that move passed through, or are inside of; empty if nothing.
-        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
-    """
-
-    goal_error: float
-    joint_error: float
-    iterations: int
-    systems: int
-    taken: bool
-    collisions: tuple[Collision, ...] = ()
-    path: tuple[tuple[float, Array], ...] = ()
 
 
 class Assembly(AssemblyJoints):
@@ -110,7 +62,7 @@ class Assembly(AssemblyJoints):
         """
         super().__init__(clearance)
         self._goals: list[AssemblyGoal] = []
-        self._prepared: _Prepared | None = None
+        self._prepared: AssemblySystem | None = None
         self._alone = OneAtATime("assembly")
         self._analysed = 0
 
@@ -218,11 +170,11 @@ class Assembly(AssemblyJoints):
     @property
     def structures(self) -> int:
         """Number of patterns that were laid out and analysed."""
-        return self._analysed + (self._prepared.active.patterns.structures if self._prepared is not None else 0)
+        return self._analysed + (0 if self._prepared is None else self._prepared.structures)
 
     def system(self) -> System:
         """The equations as they stand, without contacts."""
-        return System(len(self._places), [*self._held(), *self._goal_batches()], self._weight())
+        return System([*self._held(), *self._goal_batches()], np.concatenate(self._sizes))
 
     def solve(
         self,
@@ -241,7 +193,7 @@ class Assembly(AssemblyJoints):
         Args:
             tolerance: metres and radians, from 1e-12.
             iterations: most Newton iterations.
-            algebra: "auto", "normal", "llt", "kkt", "schur", "dense" or "svd".
+            algebra: "auto", "normal", "kkt" or "schur".
             inequalities: "slack" or "barrier".
             nearest: find the placements nearest to those before (eq. 1), which many least steps miss by a
                 little; without inequalities, shapes and figures only.
@@ -250,24 +202,42 @@ class Assembly(AssemblyJoints):
             InputError: there are no bodies, a setting is out of range, or another thread solves this assembly.
             UnknownNameError: no such linear algebra.
         """
-        tolerance = number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        tolerance = _tolerance(tolerance)
         iterations = int(ITERATIONS(iterations, "iterations"))
         known(algebra, NAMES, "linear algebra")
         choice(inequalities, KINDS, "inequalities")
         nearest = flag(nearest, "nearest")
         with self._alone:
-            prepared = self._ready(algebra)
-            active = prepared.active
+            active = self._ready(algebra)
             start = active.begin(self.variables(), self._goal_batches())
             if nearest and (active.contacts is not None or active.system.inequality.any()):
                 raise InputError("nearest is for assemblies without limits, one-sided planes and shapes; leave it out")
-            x, solution = solved(
-                self.bodies, active, start,
-                tolerance=tolerance, iterations=iterations, kind=inequalities,
-                nearest=prepared.nearest() if nearest else None, scene=self._solid_scene(), to_scene=self._to_scene,
+            found = satisfy(
+                active, start, tolerance=tolerance, iterations=iterations, kind=inequalities, thorough=True,
             )  # fmt: skip
+            x, nearness = found.x, tuple[float, ...]()
+            if nearest and found.met:  # redundant equations leave an error of the KKT system of 1e-10
+                settled = active.nearest(x, start, max(tolerance, 1e-9), iterations)
+                x, nearness = (unit(settled.x) if settled.met else x), settled.errors
             self._places = list(x.reshape(-1, 7))
-            return solution
+            status, message = explained(active.system, x, found, tolerance)
+            joint_error, goal_error = active.system.largest_errors(active.system.residual(x))
+            path = active.path if np.array_equal(active.path[-1], x) else (*active.path, x)
+            least = self._least_distance()
+            return AssemblySolution(
+                placements={name: self._placed(index) for index, name in enumerate(self.bodies)},
+                status=status,
+                goal_error=goal_error,
+                joint_error=joint_error,
+                residuals=found.residuals,
+                systems=found.systems,
+                algebra=active.algebra.name,
+                nearness=nearness,
+                penetration=max(0.0, -least),
+                least_distance=least,
+                path=np.array([self._to_scene(state) for state in path]),
+                message=message,
+            )
 
     def prepare(self) -> Self:
         """Lay the equations out now rather than in the first solve; things are seen to move from here."""
@@ -287,9 +257,9 @@ class Assembly(AssemblyJoints):
         Raises:
             InputError: there are no bodies, the tolerance is out of range, or another thread solves this assembly.
         """
-        tolerance = number(tolerance, "tolerance", FINEST, TOLERANCE.high)
+        tolerance = _tolerance(tolerance)
         with self._alone:
-            active = self._ready(None).active
+            active = self._ready(None)
             start = active.begin(self.variables(), self._goal_batches())
             motion = None if active.contacts is None else active.workspace.next_frame(self.q)
             if motion is None:
@@ -301,10 +271,12 @@ class Assembly(AssemblyJoints):
         before, _ = active.system.largest_errors(active.system.residual(start))
         found = satisfy(
             active, start, tolerance=FRAMES.hard_tolerance, goal_tolerance=tolerance, iterations=FRAMES.iterations,
-            early_exit=True, leave_saddles=True,
+            early_exit=True, thorough=True,
         )  # fmt: skip
         holds = found.hard <= max(10.0 * FRAMES.hard_tolerance, before)
-        taken = holds and (active.contacts is None or self._is_free(active, start, found.x))
+        taken = holds and (
+            active.contacts is None or is_free(active.workspace, self._to_scene(start), self._to_scene(found.x), SHORT)
+        )
         if taken:
             self._places = list(found.x.reshape(-1, 7))
         return AssemblyStep(found.goal, found.hard, found.iterations, found.systems, taken)
@@ -332,44 +304,41 @@ class Assembly(AssemblyJoints):
             steps[-1].goal_error, steps[-1].joint_error, iterations, systems, taken, collisions, tuple(path)
         )  # fmt: skip
 
-    def _is_free(self, active: AssemblySystem, before: Array, after: Array) -> bool:
-        """Whether the motion of a frame passes through nothing."""
-        return is_free(active.workspace, self._to_scene(before), self._to_scene(after), SHORT)
-
-    def _ready(self, algebra: str | None) -> _Prepared:
+    def _ready(self, algebra: str | None) -> AssemblySystem:
         """The equations as they stand; None for the factorisation of the last solve."""
         found = self._prepared
-        name = algebra or (found.algebra if found is not None else "auto")
-        if found is None or (found.algebra, found.revision) != (name, self.revision):
-            held, count, weight = self._held(), len(self._places), self._weight()
-            active = AssemblySystem(
-                held, list(self._figures.values()), self._solid_scene(), self._to_scene, self.clearance,
-                Patterns(count, weight, name),
-            )  # fmt: skip
+        name = algebra or (found.algebra_name if found is not None else "auto")
+        if found is None or (found.algebra_name, found.revision) != (name, self.revision):
+            figures, weight = list(self._figures.values()), np.concatenate(self._sizes or [np.zeros(0)])
             self._analysed = self.structures
-            found = self._prepared = _Prepared(name, self.revision, active)
+            found = AssemblySystem(self._held(), weight, name, figures, self._to_scene, self.revision)
+            if self.has_shapes:
+                found.among(self.scene, self.clearance)
+            self._prepared = found
         return found
 
-    def _solid_scene(self) -> Any:
-        """The scene; None if nothing has a shape."""
-        return self.scene if self.has_shapes else None
+    def _least_distance(self) -> float:
+        """Of the tested pairs, metres; inf without shapes."""
+        if not self.has_shapes:
+            return np.inf
+        with all_pairs(self.scene.built).borrow() as pairs:
+            pairs.move(self.q)
+            return pairs.least
 
-    def _goal_batches(self) -> list[tuple[Batch, Key]]:
+    def _goal_batches(self) -> list[Batch]:
         equations = EquationSet()
         for goal in self._goals:
             goal.enter(equations)
-        return equations.batches(len(self._places))
+        return equations.batches()
 
-    def _held(self) -> list[tuple[Batch, Key]]:
+    def _held(self) -> list[Batch]:
         """What must hold, in batches."""
         if not self._places:
             raise InputError("the assembly has no bodies; add some with body(...)")
-        count = len(self._places)
-        held = [unit_lengths(list(self._names)), *self._holding.batches(count)]
-        for figure in self._figures.values():
-            held += figure.batches(count)
-        return held
+        held = [unit_lengths(list(self._names)), *self._holding.batches()]
+        return held + [batch for figure in self._figures.values() for batch in figure.batches]
 
-    def _weight(self) -> Array:
-        """(7 n,) of each variable in the least motion."""
-        return np.concatenate(self._sizes)
+
+def _tolerance(value: float) -> float:
+    """A tolerance, metres and radians; below 1e-12 only rounding remains."""
+    return number(value, "tolerance", 1e-12, TOLERANCE.high)

@@ -16,7 +16,6 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import UNIT_TOLERANCE
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import LENGTH, Shape
-from wholebody.methods.newton.assembly_figure import AssemblyFigure
 from wholebody.methods.newton.assembly_geometry import (
     LooseBodies,
     Owner,
@@ -29,6 +28,7 @@ from wholebody.methods.newton.assembly_geometry import (
     scene_of,
     solids,
 )  # fmt: skip
+from wholebody.methods.newton.assembly_system import AssemblyFigure
 from wholebody.methods.newton.system import unit
 from wholebody.problem import CLEARANCE, Problem
 from wholebody.scene.geometry_model import SceneObject
@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     Color = tuple[float, float, float, float]
 
 WORLD = "world"
-SIZE = 0.3  # m: of a body without shapes
 
 
 class AssemblyBodies:
@@ -96,7 +95,7 @@ class AssemblyBodies:
         self._check_new(text(name, "the name of a body"), "body")
         where = f"body {name!r}"
         given = solids(shape, where)
-        length = rim(given, SIZE) if size is None else LENGTH(size, f"{where}: size")
+        length = rim(given, 0.3) if size is None else LENGTH(size, f"{where}: size")
         placed = pin.SE3ToXYZQUAT(target_placement(at, where))
         painted = None if color is None else checked_color(color, f"{where}: color")
         self._parts.append(name)
@@ -141,15 +140,17 @@ class AssemblyBodies:
         # The other bodies may carry it, so it is not taken for one that stands; its ranges have no equations of bodies.
         problem = Problem(Scene(figure), start, constraints=constraints, range_of_motion=False, balance=False)
         part = AssemblyFigure(name, problem, len(self._places))
-        part.batches(0)  # refuses what has no equations here
         self._parts.append(name)
         self._figures[name] = part
-        for frame, index, local in part.frames():
-            self._frames[frame] = index, pin.SE3.Identity() if local is None else pin.SE3(local)
-            if local is None:
-                self._names[frame] = index
+        for frame in part.model.frames:
+            if frame.parentJoint:
+                placed = part.index(int(frame.parentJoint)), pin.SE3(frame.placement)
+                self._frames.setdefault(f"{name}/{frame.name}", placed)
+        for joint, index in zip(part.names, range(part.first, part.first + part.count), strict=True):
+            self._names[f"{name}/{joint}"] = index
+            self._frames[f"{name}/{joint}"] = index, pin.SE3.Identity()
         self._places += list(part.variables(part.problem.start).reshape(-1, 7))
-        self._sizes += list(part.bodies.weight.reshape(-1, 7))
+        self._sizes += list(part.weight.reshape(-1, 7))
         if painted is not None:
             self._colors[name] = painted
         return self._changed()

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.methods.newton.batches import Role
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.tasks.inputs import point, target_placement
 
@@ -55,10 +56,10 @@ class AssemblyGoal:
         """Add the goal's equations."""
         local, target = self.local, self.target
         ends = np.array(local.translation), np.array(target.translation)
-        equations.coincide(self.index, -1, self.label, *ends, goal=True)
+        equations.coincide(self.index, -1, self.label, *ends, Role(weight=1.0))
         if self.whole:
             turns = pin.Quaternion(local.rotation), pin.Quaternion(target.rotation)
-            equations.turn(self.index, -1, self.label, *turns, 3, goal=True)
+            equations.turn(self.index, -1, self.label, *turns, 3, Role(weight=1.0))
 
 
 def to_target(target: Any, whole: bool, where: str) -> Any:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,17 +14,14 @@ from wholebody.base.checks import choice, flag, instance, known, numbers, shown
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.newton.assembly_bodies import WORLD, AssemblyBodies
-from wholebody.methods.newton.assembly_constraint import AssemblyConstraint, OwnRows, checked, names_of
-from wholebody.methods.newton.batches import Batch
+from wholebody.methods.newton.batches import HARD, ONE_SIDED
 from wholebody.methods.newton.equations import EquationSet, axes_along
-from wholebody.methods.newton.surfaces import OnSurface, surface
+from wholebody.methods.newton.own_rows import AssemblyConstraint, OwnRows, checked, names_of
+from wholebody.methods.newton.task_batches import OnSurface, surface
 from wholebody.tasks.inputs import direction, point, target_placement
 
 if TYPE_CHECKING:
     from typing_extensions import Self
-
-
-SAME_PLACE = 1e-9  # m: joints of one kind between two bodies that are nearer than this are the same joint
 
 
 class JointRegister:
@@ -52,7 +48,7 @@ class JointRegister:
         at = (np.zeros(3), np.zeros(3)) if places is None else places
         here = {first: at[0], second: at[1]}
         for other in listed:
-            if all(np.abs(other[name] - place).max() <= SAME_PLACE for name, place in here.items()):
+            if all(np.abs(other[name] - place).max() <= 1e-9 for name, place in here.items()):  # m: the same place
                 where = "" if places is None else " there"
                 raise InputError(f"{kind}: {first!r} and {second!r} have one already{where}; leave the second out")
         listed.append(here)
@@ -188,7 +184,7 @@ class AssemblyJoints(AssemblyBodies):
         unit = in_a.rotation @ direction(normal, f"{what}: normal")
         height = float(unit @ in_a.act(point(through, f"{what}: through")))
         local = np.array(in_b.act(point(place, f"{what}: place")))
-        self._holding.slide(a, b, what, unit, local, height, above=side == "above")
+        self._holding.slide(a, b, what, unit, local, height, ONE_SIDED if side == "above" else HARD)
         return self._changed()
 
     def on_surface(self, body: str, place: ArrayLike, *, of: str) -> Self:
@@ -217,7 +213,7 @@ class AssemblyJoints(AssemblyBodies):
         (shape, at), local = listed[0], in_b.act(point(place, f"{what}: place"))
         half, radius = surface(shape, what)
         numbers_of = (at.rotation[None], at.translation[None], half[None], np.array([radius]), local[None])
-        self._holding.add(partial(_surface, a, b, what, numbers_of), "surface")
+        self._holding.add(OnSurface(np.array([[a, b]]), [what], *numbers_of), HARD)
         return self._changed()
 
     def constrain(self, term: AssemblyConstraint) -> Self:
@@ -236,7 +232,7 @@ class AssemblyJoints(AssemblyBodies):
         bodies = [self._names[known(name, self._names, "body", label)] for name in names_of(term, label)]
         one_sided = flag(term.one_sided, f"{label}: one_sided")
         size = checked(term, np.array([self._places[index] for index in bodies]), label)
-        self._holding.add(partial(_own, bodies, label, term, size), "own", one_sided=one_sided)
+        self._holding.add(OwnRows(np.array([bodies]), label, term, size), ONE_SIDED if one_sided else HARD)
         return self._changed()
 
     # ---- internals
@@ -276,11 +272,3 @@ class AssemblyJoints(AssemblyBodies):
             ends = np.array(sides[0]), np.array(sides[1])
         self._joints.add(kind, first, second, ends)
         return ends
-
-
-def _surface(a: int, b: int, label: str, numbers_of: tuple[Array, ...], world: int) -> Batch:
-    return OnSurface(np.array([[world if a < 0 else a, b]]), [label], *numbers_of)
-
-
-def _own(bodies: list[int], label: str, term: AssemblyConstraint, size: int, world: int) -> Batch:
-    return OwnRows(np.array([bodies]), label, term, size)

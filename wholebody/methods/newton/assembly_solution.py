@@ -1,26 +1,17 @@
-"""The solution of an assembly."""
+"""Answers of an assembly: of a solve, and of one frame of a drag."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
-from wholebody.assessment.all_pairs import all_pairs
 from wholebody.base.arrays import Array
-from wholebody.methods.newton.assembly_system import AssemblySystem
-from wholebody.methods.newton.feasibility import satisfy
-from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.kkt import project
-from wholebody.methods.newton.linear_algebra.quasi_definite import QuasiDefinite
-from wholebody.methods.newton.system import unit
-from wholebody.scene.scene import Scene
+from wholebody.methods.newton.feasibility import FeasibilityResult
+from wholebody.methods.newton.system import System
+from wholebody.scene.moving_obstacles import Collision
 from wholebody.solution import Status
-
-FINEST = 1e-9  # least tolerance of the KKT system: redundant equations leave an error of about a tenth of it
 
 
 @dataclass(frozen=True)
@@ -71,68 +62,36 @@ class AssemblySolution:
         return len(self.residuals) - 1
 
 
-def solved(
-    names: Sequence[str],
-    active_system: AssemblySystem,
-    before: Array,
-    *,
-    tolerance: float,
-    iterations: int,
-    kind: Kind,
-    nearest: QuasiDefinite | None,
-    scene: Scene | None,
-    to_scene: Callable[[Array], Array],
-) -> tuple[Array, AssemblySolution]:
-    """Solve from the variables `before` (7 n,); where the bodies end, as variables and in words.
+class AssemblyStep(NamedTuple):
+    """Answer of one frame of a drag.
 
-    With `nearest`, the factorisation of the system's KKT matrix, they end at the place nearest to `before`.
+    Attributes:
+        goal_error: largest distance [m] or angle [rad] of a goal from its target, as `Assembly.goal_error` says it.
+        joint_error: largest distance [m] or angle [rad] by which a joint, a constraint or a contact is open.
+        iterations: Newton iterations.
+        systems: linear systems solved.
+        taken: whether the bodies moved there.
+        collisions: what things that move passed through, or are inside of; empty if nothing.
+        path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty.
     """
-    found = satisfy(
-        active_system,
-        before,
-        tolerance=tolerance,
-        iterations=iterations,
-        kind=kind,
-        improve_goals=True,
-        leave_saddles=True,
-    )
-    system, x = active_system.system, found.x
-    nearness: tuple[float, ...] = ()
-    if nearest is not None and found.met:
-        settled = project(system, nearest, x, before, tolerance=max(tolerance, FINEST), iterations=iterations)
-        x, nearness = (unit(settled.x) if settled.met else x), settled.errors
-    residual = system.residual(x)
-    joint_error, goal_error = system.largest_errors(residual)
-    status: Status = "solved"
-    message = f"solved in {found.iterations} iterations"
-    if not found.met:
-        hard = found.hard > tolerance
-        status = ("infeasible" if hard else "unreachable") if found.stationary else "stalled"
-        counted = np.where(system.goal_groups == hard, 0.0, system.errors(residual))
-        worst = system.label(int(system.group_starts[counted.argmax()]))
-        why = {"infeasible": "the joints cannot all hold", "unreachable": "all joints hold, the goals cannot"}
-        left = f"{worst} is missed by {counted.max():.3g} m or rad"
-        message = f"{why.get(status, 'ran out of iterations')}: {left}"
-    least = np.inf
-    if scene is not None:
-        with all_pairs(scene.built).borrow() as pairs:
-            pairs.move(to_scene(x))
-            least = pairs.least
-    path = active_system.path
-    if not np.array_equal(path[-1], x):
-        path = (*path, x)
-    placements = {name: pin.XYZQUATToSE3(place) for name, place in zip(names, x.reshape(-1, 7), strict=True)}
-    return x, AssemblySolution(
-        placements=placements,
-        status=status,
-        goal_error=goal_error,
-        joint_error=joint_error,
-        residuals=found.residuals,
-        systems=found.systems,
-        algebra=active_system.algebra.name,
-        nearness=nearness,
-        penetration=max(0.0, -least),
-        least_distance=least,
-        path=np.array([to_scene(state) for state in path]),
-        message=message,
-    )
+
+    goal_error: float
+    joint_error: float
+    iterations: int
+    systems: int
+    taken: bool
+    collisions: tuple[Collision, ...] = ()
+    path: tuple[tuple[float, Array], ...] = ()
+
+
+def explained(system: System, x: Array, found: FeasibilityResult, tolerance: float) -> tuple[Status, str]:
+    """The status of a solve that ended at the variables x (7 n,), and the sentence that explains it."""
+    if found.met:
+        return "solved", f"solved in {found.iterations} iterations"
+    hard = found.hard > tolerance
+    status: Status = ("infeasible" if hard else "unreachable") if found.stationary else "stalled"
+    counted = np.where(system.goal_groups == hard, 0.0, system.errors(system.residual(x)))
+    worst = system.label(int(system.group_starts[counted.argmax()]))
+    why = {"infeasible": "the joints cannot all hold", "unreachable": "all joints hold, the goals cannot"}
+    missed = f"{worst} is missed by {counted.max():.3g} m or rad"
+    return status, f"{why.get(status, 'ran out of iterations')}: {missed}"

@@ -1,16 +1,17 @@
 """Equations of bodies, all of one type together: residuals, Jacobians and second derivatives as arrays.
 
 A body has seven variables: its position r [m] and its Euler parameters e. Bodies are rows of an array (N + 1, 7) whose
-last row is the world, which does not move. Each batch has k groups of `size` equations between one or two bodies.
+last row is the world, which does not move and has the index -1. Each batch has k groups of `size` equations between one
+or two bodies.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Hashable
 from typing import NamedTuple
 
 import numpy as np
-import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
@@ -20,27 +21,39 @@ PLACE, TURN = slice(0, 3), slice(3, 7)
 OTHER_PLACE, OTHER_TURN = slice(7, 10), slice(10, 14)
 
 
-OBJECTIVE = "objective"
-"""Kind of batches whose squares are minimised; their equations need not hold."""
+def with_world(x: Array) -> Array:
+    """The variables (7 n,) as bodies (n + 1, 7), the world last."""
+    return np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
 
 
-class Key(NamedTuple):
-    """Type of a batch, whether it is a goal or an inequality, and its weight."""
+class Role(NamedTuple):
+    """What equations are for.
 
-    kind: str
-    goal: bool
-    one_sided: bool
-    weight: float
+    Attributes:
+        weight: of goals, which may be violated; None for what must hold, and for measures.
+        one_sided: whether they are inequalities, residual >= 0.
+        objective: whether they need not hold, and their squares are minimised.
+    """
+
+    weight: float | None = None
+    one_sided: bool = False
+    objective: bool = False
+
+    @property
+    def goal(self) -> bool:
+        """Whether they may be violated."""
+        return self.weight is not None
 
 
-HARD, ONE_SIDED = Key("", False, False, 1.0), Key("", False, True, 1.0)
+HARD, ONE_SIDED, OBJECTIVE = Role(), Role(one_sided=True), Role(objective=True)
 
 
 class Batch(ABC):
     """Equations of one type.
 
     Attributes:
-        bodies: (k, b) indices of the bodies of each equation group; b is 1 or 2.
+        role: what they are for; `HARD` unless it is set.
+        bodies: (k, b) indices of the bodies of each equation group, -1 for the world; b is 1 or 2.
         size: rows of each group.
         pattern: (size, 7 b) structural non-zeros of the Jacobian.
         labels: (k,) names of the groups in messages.
@@ -52,6 +65,7 @@ class Batch(ABC):
     size: int
     pattern: Mask
     half_sines = False
+    role = HARD
 
     def __init__(self, bodies: Indices, labels: list[str]) -> None:
         self.bodies = np.asarray(bodies, dtype=np.intp)
@@ -61,6 +75,11 @@ class Batch(ABC):
     def __len__(self) -> int:
         """Number of equation groups."""
         return len(self.bodies)
+
+    @property
+    def signature(self) -> Hashable:
+        """What lays it out: batches alike in it have the same rows and the same pattern."""
+        return type(self), self.size, self.bodies.tobytes(), self.role
 
     @abstractmethod
     def residual(self, x: Array) -> Array:
@@ -253,72 +272,68 @@ class Slide(Batch):
         return result
 
 
-class MassCenter(Batch):
-    """The centre of mass along directions: n . sum_j s_j (r_j + R_j c_j) - h = 0, with s_j the bodies' shares of mass.
+class Angle(Batch):
+    """Angle of a revolute joint about z of its axes: sign (2 atan2(z, w) of conj(e1 f1) (e2 f2) - bound).
 
-    One group of equations of all bodies with mass. As an inequality it keeps the centre of mass above a polygon.
+    As an inequality it is a limit. Multiples of a full turn are chosen so that the angle is nearest to `center`.
     """
+
+    size = 1
+    pattern = np.array([([False] * 3 + [True] * 4) * 2])
 
     def __init__(
-        self, bodies: Indices, labels: list[str], shares: Array, centers: Array, directions: Array, height: Array
+        self, bodies: Indices, labels: list[str], forms: Array, center: Array, bound: Array, sign: Array
     ) -> None:
-        """Take bodies (1, b), shares (b,), centers (b, 3) in the bodies, directions (m, 3) and heights (m,) [m]."""
+        """Take forms (k, 2, 4, 4) of z and w, and centers, bounds [rad] and signs (k,)."""
         super().__init__(bodies, labels)
-        self.size = len(directions)
-        self.shares, self.centers, self.directions, self.height = shares, centers, directions, height
-        along = (directions != 0.0)[:, None, :].repeat(bodies.shape[1], axis=1)
-        self.pattern = np.concatenate([along, np.ones((*along.shape[:2], 4), dtype=bool)], axis=2).reshape(
-            self.size, -1
-        )
+        self.forms, self.center, self.bound, self.sign = forms, center, bound, sign
+        self._parts: tuple[Array, tuple[Array, Array, Array]] | None = None
 
-    def residual(self, x: Array) -> Array:  # noqa: D102
-        pair = x[self.bodies[0]]
-        center = self.shares @ (pair[:, PLACE] + quat.rotate(pair[:, TURN], self.centers))
-        result: Array = (self.directions @ center - self.height)[None]
+    def _components(self, x: Array) -> tuple[Array, Array, Array]:
+        """Components (k, 2) z and w, and their derivatives by either quaternion, (k, 2, 4)."""
+        if self._parts is not None and self._parts[0] is x:
+            return self._parts[1]
+        first, second = x[self.bodies[:, 0], 3:], x[self.bodies[:, 1], 3:]
+        right = np.einsum("kiab,kb->kia", self.forms, second)
+        left = np.einsum("ka,kiab->kib", first, self.forms)
+        parts = np.einsum("kia,ka->ki", right, first), right, left
+        self._parts = (x, parts)
+        return parts
+
+    def angle(self, x: Array) -> Array:
+        """(k,) the angles [rad]."""
+        part = self._components(x)[0]
+        angle = 2.0 * np.arctan2(part[:, 0], part[:, 1])
+        result: Array = angle - 2.0 * np.pi * np.round((angle - self.center) / (2.0 * np.pi))
         return result
 
-    def jacobian(self, x: Array) -> Array:  # noqa: D102
-        turns = x[self.bodies[0]][:, TURN]
-        result = np.empty((1, self.size, len(turns), 7))
-        result[0, :, :, PLACE] = self.directions[:, None, :] * self.shares[:, None]
-        slopes = self.shares[:, None, None] * quat.rotate_derivative(turns, self.centers)  # (b, 3, 4)
-        result[0, :, :, TURN] = np.einsum("mi,bij->mbj", self.directions, slopes)
-        return result.reshape(1, self.size, -1)
-
-
-class RootMotion(Batch):
-    """Displacement of a free root from a posture, in its own axes there, less a target; linear in the body.
-
-    Three rows are R_a' (r - r_a), three are 2 vec(conj(e_a) e). At r = r_a and e = e_a their derivative is that of
-    Pinocchio's tangent displacement.
-    """
-
-    size = 6
-    pattern = np.zeros((6, 7), dtype=bool)
-    pattern[:3, PLACE] = pattern[3:, TURN] = True
-
-    def __init__(self, body: int, label: str) -> None:
-        """Take the number of the root's body; `anchor` says from where it moves."""
-        super().__init__(np.array([[body]]), [label])
-        self._place, self._target, self._slope = np.zeros(3), np.zeros(6), np.zeros((6, 7))
-
-    def anchor(self, root: Array, target: Array) -> None:
-        """Count from the root's placement (7,), position and quaternion x, y, z, w, towards a displacement (6,)."""
-        a, b, c, w = root[3:].tolist()
-        self._place, self._target = root[:3].copy(), target
-        self._slope[:3, PLACE] = pin.Quaternion(root[3:]).toRotationMatrix().T
-        self._slope[3:, TURN] = 2.0 * np.array(((w, c, -b, -a), (-c, w, a, -b), (b, -a, w, -c)))
-
     def residual(self, x: Array) -> Array:  # noqa: D102
-        body = x[self.bodies[0, 0]]
-        turned = self._slope[3:, TURN] @ body[TURN]
-        moved = self._slope[:3, PLACE] @ (body[PLACE] - self._place)
-        result: Array = np.concatenate([moved, turned])[None] - self._target
+        result: Array = (self.sign * (self.angle(x) - self.bound))[:, None]
         return result
 
+    def _gradients(self, x: Array) -> tuple[Array, Array, Array]:
+        part, right, left = self._components(x)
+        gradient = np.zeros((len(self), 2, 14))
+        gradient[:, :, TURN], gradient[:, :, OTHER_TURN] = right, left
+        square = np.maximum((part * part).sum(axis=1), 1e-12)
+        return part, gradient, square
+
     def jacobian(self, x: Array) -> Array:  # noqa: D102
-        result: Array = self._slope[None].copy()
+        part, gradient, square = self._gradients(x)
+        row = part[:, 1:] * gradient[:, 0] - part[:, :1] * gradient[:, 1]
+        result: Array = (2.0 * self.sign / square)[:, None, None] * row[:, None, :]
         return result
 
     def curvature(self, x: Array, force: Array) -> Array:  # noqa: D102
-        return np.zeros((1, 7, 7))
+        part, gradient, square = self._gradients(x)
+        mixed = part[:, 1, None, None] * self.forms[:, 0] - part[:, 0, None, None] * self.forms[:, 1]
+        second = np.zeros((len(self), 14, 14))
+        second[:, TURN, OTHER_TURN] = mixed
+        second[:, OTHER_TURN, TURN] = mixed.transpose(0, 2, 1)
+        s, c = gradient[:, 0], gradient[:, 1]
+        row = part[:, 1:] * s - part[:, :1] * c
+        second += s[:, :, None] * c[:, None, :] - c[:, :, None] * s[:, None, :]
+        radial = part[:, :1] * s + part[:, 1:] * c
+        second -= (2.0 / square)[:, None, None] * row[:, :, None] * radial[:, None, :]
+        result: Array = (2.0 * self.sign * force[:, 0] / square)[:, None, None] * second
+        return result

@@ -70,14 +70,8 @@ class ContactSet:
             return False
         return not passes_through(self.workspace, self._here, self._there, before, after)
 
-    def renew(self, data: Any, bodies: Array, world: int) -> Coincide:
-        """The inequalities at the posture of the last `measure`.
-
-        Args:
-            data: Pinocchio's, with the joint placements there.
-            bodies: (n + 1, 7) the same as variables.
-            world: index of the world among the bodies.
-        """
+    def renew(self, data: Any, bodies: Array) -> Coincide:
+        """The inequalities at the posture of the last `measure`, in Pinocchio's data and as bodies (n + 1, 7)."""
         assert self._there is not None
         self._here = self._there
         contacts = self._here.contacts
@@ -96,9 +90,9 @@ class ContactSet:
             names = self._names
             for a, b in self.workspace.table.pairs[wanted]:
                 self._labels += [f"the distance of {names[a]!r} and {names[b]!r}"] * CONTACTS.slots
-        return self._rows(contacts, bodies, world)
+        return self._rows(contacts, bodies)
 
-    def _rows(self, contacts: Any, bodies: Array, world: int) -> Coincide:
+    def _rows(self, contacts: Any, bodies: Array) -> Coincide:
         clearance = self.clearances[contacts.number]
         rows = self.workspace.rows.rows(contacts, clearance)
         slot_of = np.full(len(self.clearances) + 1, -1, dtype=np.intp)
@@ -110,8 +104,7 @@ class ContactSet:
         order, rank = order[rank < CONTACTS.slots], rank[rank < CONTACTS.slots]
         at = slot[order] * CONTACTS.slots + rank
         count = len(self.pairs) * CONTACTS.slots
-        joints = np.repeat(self._joint[self.pairs], CONTACTS.slots, axis=0)
-        pair = np.where(joints == 0, world, joints - 1)[:, ::-1]
+        pair = np.repeat(self._joint[self.pairs], CONTACTS.slots, axis=0)[:, ::-1] - 1
         normal = np.zeros((count, 3))
         normal[:, 2] = 1.0
         place = np.zeros((count, 3))

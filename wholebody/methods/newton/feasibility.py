@@ -49,8 +49,7 @@ def satisfy(
     kind: Kind = "slack",
     goal_tolerance: float | None = None,
     early_exit: bool = False,
-    improve_goals: bool = False,
-    leave_saddles: bool = False,
+    thorough: bool = False,
 ) -> FeasibilityResult:
     """Satisfy all equations from x (7 n,), or reduce their error as far as possible.
 
@@ -61,19 +60,20 @@ def satisfy(
         iterations: most iterations.
         kind: treatment of inequalities.
         goal_tolerance: of the goals, if it differs.
-        improve_goals: go on from where goals out of reach pulled the constraints open and these were restored, with
-            goals that give way; the end is nearer to the goals then.
-        leave_saddles: where no step lowers the error, go on from states nearby.
         early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
+        thorough: where no step lowers the error, go on from states nearby; and, unless `early_exit`, from where goals
+            out of reach pulled the constraints open and these were restored, with goals that give way: the end is
+            nearer to the goals then.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     far = run.goal
     run.iterate(iterations, goals=True, measures="lower", early_exit=early_exit)
     if not early_exit and run.stationary and not run.met and len(run.objective):
         run.iterate(iterations, goals=True, measures="ignore")
+    improve_goals = thorough and not early_exit
     _restore(run, iterations, improve_goals)
     stuck = run.goal > (1.0 - FRAMES.least_progress) * far if early_exit else run.stationary
-    if leave_saddles and stuck and not run.met:
+    if thorough and stuck and not run.met:
         _leave_saddle(run, 1 if early_exit else ENDINGS.nudges, iterations, improve_goals)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
 

@@ -12,35 +12,37 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.memory_views import placement_view
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.angles import Angle
+from wholebody.methods.newton.batches import ONE_SIDED, Angle, Role, with_world
 from wholebody.methods.newton.equations import EquationSet
 from wholebody.methods.newton.quaternions import axes_with_z, relative_forms
 
-AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
-SMALLEST = 0.1  # m: size of a body without pieces; smaller = rotations of such bodies have less weight
-
 
 class FigureBodies:
-    """Bodies of a figure: one for each joint, at the joint's placement. Body k moves with Pinocchio's joint k + 1.
+    """Bodies of a figure: one for each joint, at the joint's placement.
 
     Attributes:
+        first: index of the first body, among all bodies, which moves with Pinocchio's joint 1.
         count: number of bodies.
         weight: (7 count,) weight of each variable in the least motion.
         names: of the joints.
         equations: the joints.
+        limits: one row for each limited joint, for the nearer of its two limits; `choose_limits` chooses it.
+        q: (nq,) the posture at the last `retract`.
+        data: Pinocchio's, with the placements of the joints at the last `variables` or `retract`.
     """
 
-    def __init__(self, figure: Figure, start: Array | None = None) -> None:
+    def __init__(self, figure: Figure, start: Array | None = None, first: int = 0) -> None:
         """Read the joints.
 
         Args:
             figure: the figure.
             start: (nq,) where terms of one's own tell how many rows they have; None for the neutral configuration.
+            first: index of the first body.
 
         Raises:
             UnsupportedTermError: a joint of a type that has no equations here.
         """
-        self.figure, self.model = figure, figure.model
+        self.figure, self.model, self.first = figure, figure.model, first
         self.count = self.model.njoints - 1
         self.names = list(self.model.names)[1:]
         self.data = self.model.createData()
@@ -51,9 +53,9 @@ class FigureBodies:
             self._add(joint)
         pin.forwardKinematics(self.model, self.data, pin.neutral(self.model))
         self._placements = placement_view(self.data.oMi)
-        first, second = (np.array([row[k] for row in self._turning]).reshape(-1, 4) for k in (2, 3))
-        pairs = np.array([(row[1] - 1, row[0] - 1) for row in self._turning], dtype=np.intp).reshape(-1, 2)
-        pairs[pairs < 0] = self.count
+        axes = [np.array([row[k] for row in self._turning]).reshape(-1, 4) for k in (2, 3)]
+        pairs = [(self.index(row[1]), self.index(row[0])) for row in self._turning]
+        turning: Indices = np.array(pairs, dtype=np.intp).reshape(-1, 2)
         limits = figure.limits
         low, high = np.full(self.model.nq, -np.inf), np.full(self.model.nq, np.inf)
         low[limits.idx_q], high[limits.idx_q] = limits.lower, limits.upper
@@ -63,14 +65,21 @@ class FigureBodies:
         center = np.zeros(len(pairs))
         center[finite] = 0.5 * (self.low + self.high)[finite]
         labels = [f"the limit of {self.names[row[0] - 1]!r}" for row in self._turning]
-        forms = relative_forms(first, second)[:, 2:]
-        self.angles = Angle(pairs, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
+        forms = relative_forms(*axes)[:, 2:]
+        self.angles = Angle(turning, labels, forms, center, np.zeros(len(pairs)), np.ones(len(pairs)))
+        self._limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
+        self.limits = self._rows(self._limited, self.low[self._limited].copy())
+        self.limits.role = ONE_SIDED
         self.weight = self._weight()
         self._tangent: Indices = np.array([self.model.joints[row[0]].idx_v for row in self._turning], dtype=np.intp)
         self._step: tuple[Array, Array, Array] | None = None
-        self._start = pin.neutral(self.model) if start is None else start
+        self.q = self._start = pin.neutral(self.model) if start is None else start
         self._state: State | None = None
         self._state_of: Array | None = None
+
+    def index(self, joint: int) -> int:
+        """Index of the body of one of Pinocchio's joints; -1, the world, for joint 0."""
+        return self.first + joint - 1 if joint else -1
 
     @property
     def floating(self) -> bool:
@@ -97,7 +106,7 @@ class FigureBodies:
     def state_at(self, x: Array) -> State:
         """The kinematic state at the bodies x (count + 1, 7)."""
         if self._state_of is not x:
-            self._present.update(self.posture(x[:-1].ravel()))
+            self._present.update(self._posture(x))
             self._state_of = x
         return self._present
 
@@ -136,32 +145,31 @@ class FigureBodies:
         """Bound later postures by limits alone."""
         self._step = None
 
-    def limits(self) -> Angle:
-        """One row for each limited joint, for the nearer of its two limits; `choose_limits` chooses it."""
-        limited = np.flatnonzero(np.isfinite(self.low) | np.isfinite(self.high))
-        part = self.angles
-        labels = [part.labels[k] for k in limited]
-        bound, sign = self.low[limited].copy(), np.ones(len(limited))
-        self._limited = limited
-        return Angle(part.bodies[limited], labels, part.forms[limited], part.center[limited], bound, sign)
-
     def distance(self, q: Array) -> tuple[Angle, Indices]:
         """One row for each revolute joint, its angle relative to q (nq,); and the joints' tangent indices."""
-        part = self.angles
-        bound, sign = q[self._places].copy(), np.ones(len(part))
-        return Angle(part.bodies, part.labels, part.forms, part.center, bound, sign), self._tangent
+        return self._rows(np.arange(len(self.angles)), self.angles_at(q).copy()), self._tangent
 
     def angles_at(self, q: Array) -> Array:
         """(k,) angles of the revolute joints at the posture q (nq,)."""
         return q[self._places]
 
-    def choose_limits(self, limits: Angle, q: Array) -> None:
-        """Set the rows of `limits` to the limits that are nearer at q (nq,)."""
-        value = q[self._places[self._limited]]
+    def choose_limits(self) -> None:
+        """Set the rows of `limits` to the limits that are nearer at the last posture."""
+        value = self.angles_at(self.q)[self._limited]
         low, high = self.low[self._limited], self.high[self._limited]
         upper = high - value < value - low
-        limits.bound = np.where(upper, high, low)
-        limits.sign = np.where(upper, -1.0, 1.0)
+        self.limits.bound = np.where(upper, high, low)
+        self.limits.sign = np.where(upper, -1.0, 1.0)
+
+    def _rows(self, chosen: Indices, bound: Array) -> Angle:
+        """One row for each of these revolute joints, its angle beyond a bound (k,) [rad]."""
+        part, labels = self.angles, [self.angles.labels[k] for k in chosen]
+        return Angle(part.bodies[chosen], labels, part.forms[chosen], part.center[chosen], bound, np.ones(len(chosen)))
+
+    def retract(self, x: Array) -> None:
+        """Move the figure's bodies, among the variables x (7 n,), to the nearest posture, which becomes `q`."""
+        self.q = self.posture(x)
+        x[7 * self.first : 7 * (self.first + self.count)] = self.variables(self.q)
 
     def variables(self, q: Array) -> Array:
         """The bodies (7 count,) at the posture q (nq,)."""
@@ -177,14 +185,17 @@ class FigureBodies:
         return result
 
     def posture(self, x: Array) -> Array:
-        """The posture (nq,), within limits, of the bodies x (7 count,): each joint from its own two bodies."""
-        bodies = np.concatenate([x, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)]).reshape(-1, 7)
+        """The posture (nq,), within limits, at all variables x (7 n,): each joint from its own two bodies."""
+        return self._posture(with_world(x))
+
+    def _posture(self, bodies: Array) -> Array:
         q = pin.neutral(self.model)
         q[self._places] = self.angles.angle(bodies)
         for joint in self._others:
             kind = self.model.joints[joint]
-            parent = pin.XYZQUATToSE3(_unit(bodies[self.model.parents[joint] - 1]))
-            place = (parent * self.model.jointPlacements[joint]).actInv(pin.XYZQUATToSE3(_unit(bodies[joint - 1])))
+            parent, child = (bodies[self.index(int(one))] for one in (self.model.parents[joint], joint))
+            before = pin.XYZQUATToSE3(_unit(parent)) * self.model.jointPlacements[joint]
+            place = before.actInv(pin.XYZQUATToSE3(_unit(child)))
             if kind.nq == 7:
                 q[kind.idx_q : kind.idx_q + 7] = pin.SE3ToXYZQUAT(place)
             elif kind.nq == 4:
@@ -205,38 +216,35 @@ class FigureBodies:
         result: Array = self.figure.clamp(q)
         return result
 
-    def add_posture_goals(self, equations: EquationSet, label: str, q: Array, dofs: set[int], weight: float) -> None:
+    def add_posture_goals(self, equations: EquationSet, label: str, q: Array, dofs: set[int], role: Role) -> None:
         """Add goals that move the joints of some degrees of freedom to their values in the posture q (nq,)."""
         model = self.model
         turning = {row[0]: k for k, row in enumerate(self._turning)}
         for joint in range(1, model.njoints):
-            kind, a, b = model.joints[joint], int(model.parents[joint]) - 1, joint - 1
+            kind, a, b = model.joints[joint], self.index(int(model.parents[joint])), self.index(joint)
             if kind.idx_v not in dofs:
                 continue
             if joint in turning:
                 k = turning[joint]
-                first, second = (pin.Quaternion(part) for part in self._turning[k][2:])
                 center = float(self.angles.center[k])
-                equations.angle(a, b, label, first, second, center, float(q[kind.idx_q]), weight)
+                equations.angle(a, b, label, self._turning[k][2:], center, float(q[kind.idx_q]), role)
                 continue
             pin.forwardKinematics(model, self.data, q)
-            here = self.data.oMi[a + 1].actInv(self.data.oMi[joint])
+            here = self.data.oMi[model.parents[joint]].actInv(self.data.oMi[joint])
             if kind.shortname().startswith("JointModelP"):
                 along = model.jointPlacements[joint].rotation @ _axis(kind)
                 height = float(along @ here.translation)
-                equations.slide(a, b, label, along, np.zeros(3), height, goal=True, weight=weight)
+                equations.slide(a, b, label, along, np.zeros(3), height, role)
                 continue
-            identity = pin.Quaternion.Identity()
-            equations.turn(a, b, label, pin.Quaternion(here.rotation), identity, 3, goal=True, weight=weight)
+            equations.turn(a, b, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3, role)
             if kind.nq == 7:
-                place = np.array(here.translation)
-                equations.coincide(a, b, label, place, np.zeros(3), goal=True, weight=weight)
+                equations.coincide(a, b, label, np.array(here.translation), np.zeros(3), role)
 
     def _add(self, joint: int) -> None:
         model, equations = self.model, self.equations
         kind, parent, placement = model.joints[joint], int(model.parents[joint]), model.jointPlacements[joint]
         name, label = kind.shortname(), f"the joint {model.names[joint]!r}"
-        a, b = parent - 1, joint - 1
+        a, b = self.index(parent), self.index(joint)
         place, turn = np.array(placement.translation), pin.Quaternion(placement.rotation)
         if name == "JointModelFreeFlyer":
             self._others.append(joint)
@@ -262,14 +270,14 @@ class FigureBodies:
             for bound, sign in ((low, 1.0), (high, -1.0)):
                 if np.isfinite(bound):
                     height = sign * float(along @ place + bound)
-                    equations.slide(a, b, f"the limit of {label[4:]}", sign * along, np.zeros(3), height, above=True)
+                    equations.slide(a, b, f"the limit of {label[4:]}", sign * along, np.zeros(3), height, ONE_SIDED)
             self._others.append(joint)
         else:
             raise UnsupportedTermError("newton", [f"{label}, a {name} (figure.reduced can lock it)"])
 
     def _weight(self) -> Array:
         """Weights: a rotation of a body counts as the motion of its farthest point."""
-        size = np.full(self.count, SMALLEST)
+        size = np.full(self.count, 0.1)  # m: of a body without pieces; smaller = its rotations have less weight
         for joint in range(1, self.model.njoints):
             parent = int(self.model.parents[joint])
             if parent:
@@ -292,7 +300,8 @@ def _axis(kind: Any) -> Array:
         data = kind.createData()  # Pinocchio gives the axis of unbounded joints only as their motion
         kind.calc(data, np.array([1.0, 0.0]))
         return np.array(data.S).ravel()[3:]
-    return np.array(AXES[name[-1]])
+    result: Array = np.eye(3)["XYZ".index(name[-1])]
+    return result
 
 
 def _unit(body: Array) -> Array:

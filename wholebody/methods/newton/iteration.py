@@ -16,7 +16,7 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.errors import UndefinedTermError
 from wholebody.methods.newton.inequalities import FREE, Inequalities, Kind, inequalities
-from wholebody.methods.newton.linear_algebra.base import LinearSystem, SingularSystemError
+from wholebody.methods.newton.linear_algebra import LinearSystem, SingularSystemError
 from wholebody.methods.newton.settings import FRAMES, STEPS
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.solution import TraceEntry
@@ -132,7 +132,7 @@ class Iteration:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
-            far = self.goal > self.goal_tolerance and before[0] > STEPS.restore_above * trust.funnel
+            far = self.goal > self.goal_tolerance and before[0] > trust.funnel
             restore = not goals or far
             step = self._trusted_step(trust, before[0], restore, goals, measures)
             length = self.length(step)

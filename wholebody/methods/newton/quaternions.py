@@ -14,6 +14,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 
+CONJUGATE = np.array((-1.0, -1.0, -1.0, 1.0))
+
 
 def product(a: Array, b: Array) -> Array:
     """Hamilton product of quaternions, (..., 4)."""
@@ -24,7 +26,7 @@ def product(a: Array, b: Array) -> Array:
 
 def conjugate(a: Array) -> Array:
     """The inverse of unit quaternions, (..., 4)."""
-    result: Array = a * np.array((-1.0, -1.0, -1.0, 1.0))
+    result: Array = a * CONJUGATE
     return result
 
 

@@ -1,4 +1,4 @@
-"""All equations of an assembly as one sparse system: the pattern is made once, the values at every iteration."""
+"""All equations of some bodies as one sparse system, and the systems that an iteration passes through."""
 
 from __future__ import annotations
 
@@ -10,18 +10,16 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.methods.control import Control
-from wholebody.methods.newton.batches import OBJECTIVE, ONE_SIDED, Batch, Key
+from wholebody.methods.newton.batches import ONE_SIDED, Batch, with_world
 from wholebody.methods.newton.contacts import ContactSet
-from wholebody.methods.newton.linear_algebra.base import LinearAlgebra, Pattern
-from wholebody.methods.newton.linear_algebra.choice import linear_algebra
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.linear_algebra import LinearAlgebra, Pattern, linear_algebra
 from wholebody.methods.newton.settings import CONTACTS
 from wholebody.scene.workspace import Workspace
 
-WORLD = np.array((0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0))
-
 
 class System:
-    """Equations c(x) = 0 and inequalities c(x) >= 0 of n bodies.
+    """Equations c(x) = 0 and inequalities c(x) >= 0 of n bodies: the pattern is made once, the values at every step.
 
     Attributes:
         batches: the equations.
@@ -37,56 +35,48 @@ class System:
         weight: (7 n,) weight of each variable in the least motion.
     """
 
-    def __init__(self, count: int, batches: Sequence[tuple[Batch, Key]], weight: Array) -> None:
-        """Build rows and pattern.
-
-        Args:
-            count: number of bodies, without the world.
-            batches: equations; empty batches are left out.
-            weight: (7 count,).
-        """
-        keys = [key for batch, key in batches if len(batch)]
-        self.count = count
-        self.batches = [batch for batch, _ in batches if len(batch)]
+    def __init__(self, batches: Sequence[Batch], weight: Array) -> None:
+        """Build rows and pattern of equations, of which empty ones are left out, for weights (7 n,)."""
+        self.batches = [batch for batch in batches if len(batch)]
         self.weight = weight
         self._seen: tuple[Array, Array] | None = None
         self._found: tuple[Array, Array] | None = None
+        roles = [batch.role for batch in self.batches]
         sizes = [len(batch) * batch.size for batch in self.batches]
         self.starts = np.concatenate([[0], np.cumsum(sizes)]).astype(np.intp)
-        self.goal = np.repeat([key.goal for key in keys], sizes).astype(bool)
-        self.inequality = np.repeat([key.one_sided for key in keys], sizes).astype(bool)
-        self.objective = np.repeat([key.kind == OBJECTIVE for key in keys], sizes).astype(bool)
+        self.goal = np.repeat([role.goal for role in roles], sizes).astype(bool)
+        self.inequality = np.repeat([role.one_sided for role in roles], sizes).astype(bool)
+        self.objective = np.repeat([role.objective for role in roles], sizes).astype(bool)
         self.stiffness = np.ones(len(self.objective))
-        rows_of = [1 if key.one_sided else batch.size for batch, key in batches if len(batch)]
+        rows_of = [1 if batch.role.one_sided else batch.size for batch in self.batches]
         counts = [size // rows for size, rows in zip(sizes, rows_of, strict=True)]
         groups = np.repeat(np.array(rows_of, dtype=np.intp), counts)
         self.group_starts = (np.cumsum(groups) - groups).astype(np.intp)
         self.goal_groups = self.goal[self.group_starts]
         self._group_half_sines = np.repeat([batch.half_sines for batch in self.batches], counts).astype(bool)
-        weights = np.repeat([key.weight if key.goal else 0.0 for key in keys], sizes)
+        weights = np.repeat([role.weight or 0.0 for role in roles], sizes)
         self.share = np.where(self.goal, np.sqrt(weights / weights.max(initial=1e-300)), 1.0)
         rows, columns = [np.zeros(0, np.intp)], [np.zeros(0, np.intp)]
         self._masks = []
         for batch, start in zip(self.batches, self.starts, strict=False):
             column = _columns(batch)
             row = start + np.arange(len(batch) * batch.size).reshape(len(batch), batch.size, 1)
-            mask = batch.pattern[None] & (column < 7 * count)[:, None, :]
-            mask = np.broadcast_to(mask, (len(batch), *batch.pattern.shape))
+            mask = batch.pattern[None] & (column >= 0)[:, None, :]
             self._masks.append(np.flatnonzero(mask))
             rows.append(np.broadcast_to(row, mask.shape)[mask])
             columns.append(np.broadcast_to(column[:, None, :], mask.shape)[mask])
-        self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), 7 * count)
+        self.pattern = Pattern(np.concatenate(rows), np.concatenate(columns), int(self.starts[-1]), len(weight))
         self._curvature_places: tuple[Indices, Indices, list[Indices]] | None = None
 
-    def renew(self, batches: Sequence[tuple[Batch, Key]]) -> None:
+    def renew(self, batches: Sequence[Batch]) -> None:
         """Take other numbers for equations of the same pattern."""
         self._found = None
-        self.batches = [batch for batch, _ in batches if len(batch)]
+        self.batches = [batch for batch in batches if len(batch)]
 
     def bodies(self, x: Array) -> Array:
         """The variables (7 n,) as bodies (n + 1, 7), the world last."""
         if self._seen is None or self._seen[0] is not x:
-            self._seen = (x, np.concatenate([x, WORLD]).reshape(-1, 7))
+            self._seen = (x, with_world(x))
         return self._seen[1]
 
     def residual(self, x: Array) -> Array:
@@ -145,7 +135,7 @@ class System:
             shape = (*column.shape, column.shape[1])
             row = np.broadcast_to(column[:, :, None], shape)
             other = np.broadcast_to(column[:, None, :], shape)
-            keep = np.flatnonzero((row < 7 * self.count) & (other < 7 * self.count) & (row >= other))
+            keep = np.flatnonzero((other >= 0) & (row >= other))
             keeps.append(keep)
             rows.append(row.ravel()[keep])
             columns.append(other.ravel()[keep])
@@ -153,7 +143,7 @@ class System:
 
 
 def _columns(batch: Batch) -> Indices:
-    """(k, 7 b) columns of the variables of each equation; those of the world come after all others."""
+    """(k, 7 b) columns of the variables of each equation; negative for those of the world."""
     return (7 * batch.bodies[:, :, None] + np.arange(7)).reshape(len(batch), -1)
 
 
@@ -165,35 +155,12 @@ def unit(x: Array) -> Array:
     return result
 
 
-class Patterns:
-    """Systems by what lays them out: each pattern is analysed once while it is remembered; contacts come and go.
-
-    Attributes:
-        structures: number of patterns that were analysed.
-        laying: processor's time of these analyses [s].
-    """
-
-    def __init__(self, count: int, weight: Array, algebra: str) -> None:
-        """Take the number of bodies, the weights (7 count,) of the least motion, and the name of the factorisation."""
-        self._count, self._weight, self._algebra = count, weight, algebra
-        self._known: dict[Hashable, tuple[System, LinearAlgebra]] = {}
-        self.structures, self.laying = 0, 0.0
-
-    def system(self, laid: Hashable, batches: Sequence[tuple[Batch, Key]]) -> tuple[System, LinearAlgebra]:
-        """The system of these equations and its factorisation; `laid` tells patterns apart."""
-        if laid not in self._known:
-            if len(self._known) >= 32:  # more would take more memory
-                self._known.clear()
-            began = time.process_time()
-            system = System(self._count, batches, self._weight)
-            self._known[laid] = (system, linear_algebra(system.pattern, self._algebra))
-            self.structures += 1
-            self.laying += time.process_time() - began
-        return self._known[laid]
-
-
 class ActiveSystem:
-    """Equations during an iteration; subclasses renew theirs from state to state.
+    """The equations of bodies during an iteration: what holds stays, goals, limits and contacts are renewed.
+
+    After every step the Euler parameters of bodies get unit length, and the bodies of figures are placed by the forward
+    kinematics of the nearest posture: their joints never drift, and their limits always hold. Patterns are analysed
+    once while they are remembered, as contacts come and go.
 
     Attributes:
         system: the equations.
@@ -202,26 +169,61 @@ class ActiveSystem:
         q: (nq,) posture at the last `retract`, where pairs can touch.
         longest: largest motion of any part of a body in a step, metres.
         control: may end the iteration early.
-        path: the accepted states (7 n,), where a system records them.
+        path: the states (7 n,) since `begin`.
         even: whether goals count alike, whatever their weights.
+        structures: number of patterns that were analysed.
+        laying: processor's time of these analyses [s].
     """
 
+    system: System
+    algebra: LinearAlgebra
     path: tuple[Array, ...] = ()
     even = False
     longest = np.inf
     control = Control(np.inf)
     contacts: ContactSet | None = None
     q = _left = np.zeros(0)
-    patterns: Patterns
-    _laid: Hashable = None
 
-    def __init__(self, system: System, algebra: LinearAlgebra) -> None:
-        """Take equations that do not change."""
-        self.system, self.algebra = system, algebra
+    def __init__(
+        self, held: Sequence[Batch], weight: Array, algebra: str, figures: Sequence[FigureBodies] = ()
+    ) -> None:
+        """Take equations, and goals by `begin`.
+
+        Args:
+            held: what holds.
+            weight: (7 n,) of each variable in the least motion.
+            algebra: name of the factorisation.
+            figures: whose bodies are placed by their postures.
+        """
+        self.algebra_name, self._weight = algebra, weight
+        self._held, self._figures, self._goals = list(held), tuple(figures), list[Batch]()
+        self._known: dict[Hashable, tuple[System, LinearAlgebra]] = {}
+        self._laid: Hashable = None
+        self._goals_laid: Hashable = None
+        self._here = np.zeros(0)
+        self.structures, self.laying = 0, 0.0
+
+    def begin(self, x: Array, goals: Sequence[Batch]) -> Array:
+        """Begin a solve at x (7 n,) with these goals, and with the things where they are now; returns the start."""
+        self.aim(goals)
+        if self.contacts is not None:
+            self.contacts.workspace.refresh()
+        self._here = np.zeros(0)
+        self.arrive(x)
+        return self._here
+
+    def aim(self, goals: Sequence[Batch]) -> None:
+        """Take other goals for the next `arrive`."""
+        self._goals, self._goals_laid = list(goals), tuple(batch.signature for batch in goals)
+        self.path = ()
 
     def retract(self, x: Array) -> Array:
-        """The variables (7 n,) after a step, projected to valid states."""
-        return unit(x)
+        """The variables (7 n,) after a step, projected to the nearest valid state."""
+        if x is not self._here:
+            self._here = x = self._projected(x)
+            if self.contacts is not None:
+                self.contacts.measure(self._data)
+        return x
 
     def runs_into(self) -> bool:
         """Whether a pair that is no inequality overlaps at the result of the last `retract`: then it becomes one."""
@@ -232,29 +234,47 @@ class ActiveSystem:
         return self.contacts is None or self.contacts.passes(self._left, self.q)
 
     def arrive(self, x: Array) -> bool:
-        """Renew the equations at x, the end of a step; returns whether their number or pattern changed."""
-        return False
-
-    def _find_contacts(self, clearances: Array, workspace: Workspace) -> None:
-        """Let pairs that can touch be inequalities; none where there are no pairs."""
-        if len(clearances):
-            self.contacts, self.longest = ContactSet(clearances, workspace), CONTACTS.longest
-
-    def _lay(self, batches: list[tuple[Batch, Key]], laid: Hashable, x: Array, data: Any) -> bool:
-        """Take these equations, and contacts at x (7 n,), where Pinocchio's `data` have the joints.
-
-        Returns:
-            Whether the pattern changed; `laid` and the pairs tell patterns apart.
-        """
+        """Renew the equations at x, the end of a step; returns whether their pattern changed."""
+        x = self.retract(x)
+        self._left = self.q
+        fresh = not self.path
+        if fresh or not np.array_equal(self.path[-1], x):
+            self.path = (*self.path, x)
+        if self.contacts is None and not self._figures and not fresh:
+            return False  # nothing depends on the state
+        for figure in self._figures:
+            figure.choose_limits()
+        batches, laid = [*self._held, *self._goals], self._goals_laid
         if self.contacts is not None:
-            bodies = np.concatenate([x, WORLD]).reshape(-1, 7)
-            rows = self.contacts.renew(data, bodies, len(bodies) - 1)
+            rows = self.contacts.renew(self._data, with_world(x))
+            rows.role = ONE_SIDED
+            batches.append(rows)
             laid = (laid, self.contacts.pairs.tobytes())
-            if len(rows):
-                batches = [*batches, (rows, ONE_SIDED)]
         changed = laid != self._laid
         if changed:
             self._laid = laid
-            self.system, self.algebra = self.patterns.system(laid, batches)
+            self.system, self.algebra = self._analysed(laid, batches)
         self.system.renew(batches)
         return changed
+
+    def _projected(self, x: Array) -> Array:
+        """The nearest valid state to the variables (7 n,); where pairs can touch, subclasses set `q` and the data."""
+        return unit(x)
+
+    def _find_contacts(self, clearances: Array, workspace: Workspace, data: Any) -> None:
+        """Let pairs that can touch be inequalities, none where there are none, where Pinocchio's `data` have joints."""
+        self._data = data
+        if len(clearances):
+            self.contacts, self.longest = ContactSet(clearances, workspace), CONTACTS.longest
+
+    def _analysed(self, laid: Hashable, batches: Sequence[Batch]) -> tuple[System, LinearAlgebra]:
+        """The system of these equations and its factorisation; `laid` tells patterns apart."""
+        if laid not in self._known:
+            if len(self._known) >= 32:  # more would take more memory
+                self._known.clear()
+            began = time.process_time()
+            system = System(batches, self._weight)
+            self._known[laid] = (system, linear_algebra(system.pattern, self.algebra_name))
+            self.structures += 1
+            self.laying += time.process_time() - began
+        return self._known[laid]

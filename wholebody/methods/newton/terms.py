@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from functools import partial
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,12 +11,11 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import Batch, MassCenter
-from wholebody.methods.newton.directions import Cone, Toward
-from wholebody.methods.newton.equations import EquationSet
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, Role
+from wholebody.methods.newton.equations import EquationSet, axes_along
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.quaternions import axes_with_z
-from wholebody.methods.newton.tangent_rows import constraint_rows, goal_rows
+from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
+from wholebody.methods.newton.task_batches import Cone, MassCenter, Toward
 from wholebody.problem import Problem
 from wholebody.tasks import (
     Axis,
@@ -51,7 +49,7 @@ def state_equations(problem: Problem, state: State) -> None:
     bodies = FigureBodies(problem.scene.figure, problem.start)
     goal_equations(problem, bodies, problem.goals)
     constraint_equations(problem, bodies)
-    bound_equations(problem, state)
+    bound_equations(problem, bodies, state)
 
 
 def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]) -> EquationSet:
@@ -62,24 +60,21 @@ def goal_equations(problem: Problem, bodies: FigureBodies, goals: Sequence[Goal]
     """
     result = EquationSet()
     for number, goal in enumerate(goals):
-        label = f"goals[{number}], {type(goal).__name__}"
+        label, role = f"goals[{number}], {type(goal).__name__}", Role(goal.weight)
         if isinstance(goal, Point):
-            place = goal.place
-            point = _local(problem, place.frame).act(goal.resolved_offset)
-            result.coincide(place.joint - 1, -1, label, point, goal.resolved_target, goal=True, weight=goal.weight)
+            point = _local(bodies, goal.place.frame).act(goal.resolved_offset)
+            result.coincide(bodies.index(goal.place.joint), -1, label, point, goal.resolved_target, role)
         elif isinstance(goal, (Frame, Orientation, Relative)):
-            _placement(result, problem, goal.residual, label, goal=True, weight=goal.weight)
+            _placement(result, bodies, goal.residual, label, role)
         elif isinstance(goal, Axis):
-            _axis(result, problem, goal, label)
+            _axis(result, bodies, goal, label)
         elif isinstance(goal, CenterOfMass):
-            directions = np.eye(3)[: len(goal.axes)]
-            make = partial(_mass_center, bodies, label, directions, goal.resolved_target)
-            result.add(make, "mass center", goal=True, weight=goal.weight)
+            result.add(_mass_center(bodies, label, np.eye(3)[: len(goal.axes)], goal.resolved_target), role)
         elif isinstance(goal, Posture):
-            bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), goal.weight)
+            bodies.add_posture_goals(result, label, goal.resolved_target, set(goal.dofs.tolist()), role)
         else:
             _check_own(bodies, label)
-            result.add(_as_made(goal_rows(bodies, goal, label)), "own", goal=True, weight=goal.weight)
+            result.add(goal_rows(bodies, goal, label), role)
     return result
 
 
@@ -93,30 +88,30 @@ def constraint_equations(problem: Problem, bodies: FigureBodies) -> EquationSet:
     for number, term in enumerate(problem.constraints):
         label = f"constraints[{number}], {type(term).__name__}"
         if isinstance(term, Hold):
-            _placement(result, problem, term.residual, label)
+            _placement(result, bodies, term.residual, label)
         elif isinstance(term, Plane):
-            place = np.array(_local(problem, term.place.frame).translation)
-            above = term.side == "above"
-            result.slide(-1, term.place.joint - 1, label, term.resolved_normal, place, term.height, above=above)
+            place, body = np.array(_local(bodies, term.place.frame).translation), bodies.index(term.place.joint)
+            role = ONE_SIDED if term.side == "above" else HARD
+            result.slide(-1, body, label, term.resolved_normal, place, term.height, role)
         elif isinstance(term, Balance):
             normals = np.column_stack([term.normals, np.zeros(len(term.normals))])
-            make = partial(_mass_center, bodies, label, normals, term.offsets + term.margin)
-            result.add(make, "mass center", one_sided=True)
+            result.add(_mass_center(bodies, label, normals, term.offsets + term.margin), ONE_SIDED)
         elif isinstance(term, ReachCones):
-            result.add(partial(_cones, problem, term, label), "cone", one_sided=True)
+            result.add(_cones(bodies, term, label), ONE_SIDED)
         else:
             _check_own(bodies, label)
-            for rows, one_sided in zip(constraint_rows(bodies, term, label), (False, True), strict=True):
+            for rows, role in zip(constraint_rows(bodies, term, label), (HARD, ONE_SIDED), strict=True):
                 if rows is not None:
-                    result.add(_as_made(rows), "own", one_sided=one_sided)
+                    result.add(rows, role)
     return result
 
 
-def bound_equations(problem: Problem, state: State) -> EquationSet:
+def bound_equations(problem: Problem, bodies: FigureBodies, state: State) -> EquationSet:
     """Equations of bounds.
 
     Args:
         problem: gives the bounds.
+        bodies: of its figure.
         state: of the run; it is moved to the problem's start.
 
     Raises:
@@ -125,7 +120,7 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
     result = EquationSet()
     for number, bound in enumerate(problem.bounds):
         if isinstance(bound, Freeze):
-            _frozen(result, problem, bound, state)
+            _frozen(result, bodies, bound, state.update(problem.start))
         elif not isinstance(bound, StepLimit):  # a solve has no time step, so a step limit bounds nothing
             raise UnsupportedTermError(
                 "newton", [f"bounds[{number}], {type(bound).__name__} (it takes Freeze and StepLimit)"]
@@ -133,84 +128,64 @@ def bound_equations(problem: Problem, state: State) -> EquationSet:
     return result
 
 
-def _axis(equations: EquationSet, problem: Problem, goal: Axis, label: str) -> None:
+def _axis(equations: EquationSet, bodies: FigureBodies, goal: Axis, label: str) -> None:
     """An axis along a direction, or towards a point."""
-    local, joint = _local(problem, goal.place.frame), goal.place.joint
+    local, body, role = _local(bodies, goal.place.frame), bodies.index(goal.place.joint), Role(goal.weight)
     if goal.toward is None:
-        ours = pin.Quaternion(axes_with_z((local.rotation @ goal.basis[2])[None])[0])
-        wanted = pin.Quaternion(axes_with_z(goal.resolved_target[None])[0])
-        equations.turn(joint - 1, -1, label, ours, wanted, 2, goal=True, weight=goal.weight)
+        ours, wanted = axes_along(local.rotation @ goal.basis[2]), axes_along(goal.resolved_target)
+        equations.turn(body, -1, label, ours, wanted, 2, role)
         return
-    axes, point, place = goal.basis @ local.rotation.T, np.array(local.translation), goal.resolved_target
-
-    def make(world: int) -> Batch:
-        body = np.array([[joint - 1 if joint else world]])
-        return Toward(body, [label], axes[None], point[None], place[None])
-
-    equations.add(make, "toward", goal=True, weight=goal.weight)
+    axes, point = goal.basis @ local.rotation.T, np.array(local.translation)
+    places = goal.resolved_target[None]
+    equations.add(Toward(np.array([[body]]), [label], axes[None], point[None], places), role)
 
 
-def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Array, world: int) -> Batch:
+def _mass_center(bodies: FigureBodies, label: str, directions: Array, height: Array) -> Batch:
     inertias = list(bodies.model.inertias)[1:]
     mass = np.array([inertia.mass for inertia in inertias])
     heavy = np.flatnonzero(mass > 0.0)
     centers = np.array([inertias[k].lever for k in heavy])
-    return MassCenter(heavy[None], [label], mass[heavy] / mass.sum(), centers, directions, height)
+    return MassCenter(bodies.first + heavy[None], [label], mass[heavy] / mass.sum(), centers, directions, height)
 
 
-def _cones(problem: Problem, term: ReachCones, label: str, world: int) -> Batch:
+def _cones(bodies: FigureBodies, term: ReachCones, label: str) -> Batch:
     limbs = term.limbs
-    pairs = np.array([(limb.reference.joint - 1, limb.limb.joint - 1) for limb in limbs], dtype=np.intp)
-    pairs[pairs < 0] = world
-    turns = np.array([_local(problem, limb.reference.frame).rotation for limb in limbs])
-    axes = np.array([_local(problem, limb.limb.frame).rotation @ limb.axis for limb in limbs])
+    pairs = np.array([(bodies.index(limb.reference.joint), bodies.index(limb.limb.joint)) for limb in limbs])
+    turns = np.array([_local(bodies, limb.reference.frame).rotation for limb in limbs])
+    axes = np.array([_local(bodies, limb.limb.frame).rotation @ limb.axis for limb in limbs])
     return Cone(pairs, [label] * len(limbs), [limb.cone for limb in limbs], turns, axes)
 
 
 def _placement(
-    equations: EquationSet,
-    problem: Problem,
-    residual: PlacementResidual,
-    label: str,
-    *,
-    goal: bool = False,
-    weight: float = 1.0,
+    equations: EquationSet, bodies: FigureBodies, residual: PlacementResidual, label: str, role: Role = HARD
 ) -> None:
     """The residual of one frame in another: a point that coincides, and axes that agree."""
-    base, local = _local(problem, residual.base.frame), _local(problem, residual.place.frame)
-    a, b = residual.base.joint - 1, residual.place.joint - 1
+    base, local = _local(bodies, residual.base.frame), _local(bodies, residual.place.frame)
+    a, b = bodies.index(residual.base.joint), bodies.index(residual.place.joint)
     if residual.position:
-        point = base.act(residual.target)
-        equations.coincide(a, b, label, point, np.array(local.translation), goal=goal, weight=weight)
+        equations.coincide(a, b, label, base.act(residual.target), np.array(local.translation), role)
     if residual.orientation:
         wanted = pin.Quaternion(base.rotation @ residual.undo.rotation.T)
-        equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, goal=goal, weight=weight)
+        equations.turn(a, b, label, wanted, pin.Quaternion(local.rotation), 3, role)
 
 
-def _frozen(equations: EquationSet, problem: Problem, bound: Freeze, state: State) -> None:
-    """Joints that keep their placement relative to their parent."""
-    figure, model = problem.scene.figure, problem.scene.model
-    state.update(problem.start)
+def _frozen(equations: EquationSet, bodies: FigureBodies, bound: Freeze, state: State) -> None:
+    """Joints that keep their placement relative to their parent at a state."""
+    figure, model = bodies.figure, bodies.model
     for name in figure.joint_names(bound.joints):
         joint = figure.joint_id(name)
         parent = int(model.parents[joint])
         here = state.data.oMi[parent].actInv(state.data.oMi[joint])
-        label = f"Freeze, {name!r}"
-        if model.joints[joint].nv == 1 and model.joints[joint].shortname().startswith("JointModelR"):
-            # the joint's own equations leave only this rotation: one of the three rows, the others are redundant
-            equations.turn(parent - 1, joint - 1, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
-        else:
-            equations.coincide(parent - 1, joint - 1, label, np.array(here.translation), np.zeros(3))
-            equations.turn(parent - 1, joint - 1, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
+        a, b, label = bodies.index(parent), bodies.index(joint), f"Freeze, {name!r}"
+        if model.joints[joint].nv > 1 or not model.joints[joint].shortname().startswith("JointModelR"):
+            equations.coincide(a, b, label, np.array(here.translation), np.zeros(3))
+        # of a revolute joint, whose own equations leave only this rotation, two of the three rows are redundant
+        equations.turn(a, b, label, pin.Quaternion(here.rotation), pin.Quaternion.Identity(), 3)
 
 
-def _local(problem: Problem, frame: int) -> Any:
+def _local(bodies: FigureBodies, frame: int) -> Any:
     """Placement of a frame in its body."""
-    return problem.scene.model.frames[frame].placement
-
-
-def _as_made(batch: Batch) -> Callable[[int], Batch]:
-    return lambda world: batch
+    return bodies.model.frames[frame].placement
 
 
 def _check_own(bodies: FigureBodies, label: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,11 +13,11 @@ from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, begun, judged, nearest_to
+from wholebody.methods.base import begun, judged, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.linear_algebra.base import Pattern
+from wholebody.methods.newton.linear_algebra import Pattern
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.settings import FRAMES, STARTS
 from wholebody.problem import Problem
@@ -25,8 +25,6 @@ from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-
-TRADED = 0.5  # greater = weights count in more frames, and light goals wait in more
 
 
 class NewtonStep(NamedTuple):
@@ -64,22 +62,23 @@ class NewtonTracker(NotCopyable):
     unswept = SHORT
     leaves_overlap = True
 
-    def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None, method: Method) -> None:
+    def __init__(
+        self, problem: Problem, settings: Settings, dt: float | None, solve: Callable[[Problem], Solution]
+    ) -> None:
         """Build the equations.
 
         Args:
             problem: the problem whose goals it follows.
-            algebra: name of the factorisation.
             settings: of whole solves.
             dt: seconds a frame; None for frames without a time step.
-            method: for solves with measures relative to another posture.
+            solve: the method, for solves with measures relative to another posture.
 
         Raises:
             InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = None if dt is None else time_step(dt, "dt")
-        self._algebra, self._settings, self._method = algebra, settings, method
+        self._settings, self._solve = settings, solve
         self.workspace = problem.workspace()
         self._alone = OneAtATime("tracker")
         self._lay_out()
@@ -127,7 +126,7 @@ class NewtonTracker(NotCopyable):
             if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
-            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.patterns.structures)
+            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.structures)
 
     def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
         """The end of the iteration from the posture q (nq,); goals count alike if `even`."""
@@ -157,11 +156,11 @@ class NewtonTracker(NotCopyable):
             state = self.workspace.state.update(q)
             errors.append(np.array([np.linalg.norm(goal.error(state)) for goal in goals]))
         even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
-        return bool(1.0 - weighted < TRADED * (1.0 - even))
+        return bool(1.0 - weighted < 0.5 * (1.0 - even))
 
     def nearest(self, q: Array) -> Solution:
         """The method's answer from q (nq,), with measures relative to q."""
-        return self._method.solve(nearest_to(self.problem, q))
+        return self._solve(nearest_to(self.problem, q))
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """No postures: the steps lead out."""
@@ -188,11 +187,11 @@ class NewtonTracker(NotCopyable):
     @property
     def laid_out(self) -> tuple[int, float]:
         """Number of patterns, and the processor's time of their analysis [s]."""
-        return self._active_system.patterns.structures, self._active_system.patterns.laying
+        return self._active_system.structures, self._active_system.laying
 
     def _lay_out(self) -> None:
         problem = self.problem
-        self._active_system = FigureSystem(problem, self.workspace, self._algebra)
+        self._active_system = FigureSystem(problem, self.workspace, self._settings.algebra)
         self._terms = (problem.constraints, problem.bounds, problem.measures)
 
     def _renewed(self) -> FigureSystem:

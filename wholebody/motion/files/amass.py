@@ -19,9 +19,6 @@ from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
-SKELETON = Path(__file__).parents[1] / "data" / "smpl.csv"
-"""Joints of SMPL, their parents and offsets."""
-
 RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""
@@ -44,7 +41,7 @@ def read_motion(path: Path) -> SkeletonMotion:
     name = one_line(path.name)
     poses, places, frequency = _arrays(name, read_arrays(path))
     frames = len(poses)
-    bones = packaged_table(SKELETON)
+    bones = packaged_table(Path(__file__).parents[1] / "data" / "smpl.csv")
     names = tuple(bone["joint"] for bone in bones)
     offsets = np.array([[float(bone[axis]) for axis in "xyz"] for bone in bones])
     local = np.tile(np.eye(3), (frames, len(names), 1, 1))

@@ -16,8 +16,8 @@ import scipy.sparse as sp
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.trajectory.banded_program import BandedQP
 from wholebody.motion.trajectory.deviations import Chart, Objective
+from wholebody.motion.trajectory.interior_point import BandedQP
 from wholebody.motion.trajectory.nodes import Rows
 
 SOFT = 1e3  # 1/m, of loads that are beyond their bounds: large, so that they are met where contacts let them be

@@ -12,11 +12,11 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, Adapter
-from wholebody.bench.suite.adapters.registry import ALL, adapters, missing, names
+from wholebody.bench.suite.adapters.registry import adapters, missing, names
 from wholebody.bench.suite.compare.settings import Settings
 from wholebody.bench.suite.problem_sets.registry import SETS
 
-INSTALLED = adapters([ALL])
+INSTALLED = adapters(["all"])
 CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)])
 
 
@@ -133,7 +133,7 @@ def test_unknown_and_missing_adapters_are_named() -> None:
     assert [adapter.name for adapter in adapters(["newton", "newton/kkt"])] == [
         "newton/slack", "newton/barrier", "newton/kkt",
     ]  # fmt: skip
-    assert {adapter.name for adapter in adapters([ALL], starts=True)} | set(missing()) == set(names())
+    assert {adapter.name for adapter in adapters(["all"], starts=True)} | set(missing()) == set(names())
     for name, command in missing().items():
         assert command.startswith("pip install")
         with pytest.raises(MissingPackageError, match="pip install"):

@@ -12,7 +12,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.problem_sets import robot_arm
+from wholebody.bench.suite.problem_sets import robots
 
 pytest.importorskip("embodik")
 
@@ -21,7 +21,7 @@ CUBE = 0.05 * np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1
 
 def _among_all_shapes() -> wb.Problem:
     """An arm among a thing of every shape that its file can have, turned, and a slope below."""
-    figure, ready = robot_arm.arm("seven axes", np.random.default_rng(2))
+    figure, ready = robots.arm("seven axes", np.random.default_rng(2))
     turn = pin.rpy.rpyToMatrix(0.3, -0.4, 0.9)
     scene = wb.Scene(figure).add(wb.HalfSpace((0.1, -0.2, 1.0), -0.1), name="slope")
     scene.add(wb.Box((0.1, 0.2, 0.3)), name="box", at=pin.SE3(turn, np.array([0.6, 0.4, 0.2])))
@@ -59,11 +59,11 @@ def test_its_distances_are_ours_for_every_pair() -> None:
             assert pair.minimum_distance >= problem.clearance
 
 
-@pytest.mark.parametrize("kind", robot_arm.given.kinds)
+@pytest.mark.parametrize("kind", robots.given.kinds)
 @pytest.mark.parametrize("turned", [False, True])
 def test_it_brings_the_tool_of_an_arm_to_a_place(kind: str, turned: bool) -> None:
     rng = np.random.default_rng(6)
-    figure, ready = robot_arm.arm(kind, rng)
+    figure, ready = robots.arm(kind, rng)
     start = figure.with_joints(figure.neutral, ready)
     witness = figure.clamp(start + rng.uniform(-0.5, 0.5, figure.model.nv))
     place = figure.placement(witness, "tool")
@@ -106,7 +106,7 @@ def test_what_it_cannot_express_is_refused_and_named() -> None:
     free = wb.Problem(wb.Scene(wb.load("human")), goals=[wb.Point("right_index_tip", (0.4, -0.2, 1.0))])
     with pytest.raises(InputError, match="free root"):
         embodik.solve(free)
-    figure, _ = robot_arm.arm("industrial", np.random.default_rng(1))
+    figure, _ = robots.arm("industrial", np.random.default_rng(1))
     scene, goal = wb.Scene(figure), wb.Point("tool", (0.4, 0.0, 0.5))
     held = wb.Problem(scene, goals=[goal], constraints=[wb.Hold("tool")])
     assert "Hold" in str(embodik.accepts(held))

@@ -11,15 +11,15 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.registry import adapters
-from wholebody.bench.suite.problem_sets import robot_arm
+from wholebody.bench.suite.problem_sets import robots
 
 pytest.importorskip("optik")
 
 
-@pytest.mark.parametrize("kind", robot_arm.given.kinds)
+@pytest.mark.parametrize("kind", robots.given.kinds)
 def test_it_places_the_tool_of_an_arm(kind: str) -> None:
     rng = np.random.default_rng(4)
-    figure, ready = robot_arm.arm(kind, rng)
+    figure, ready = robots.arm(kind, rng)
     witness = rng.uniform(figure.model.lowerPositionLimit, figure.model.upperPositionLimit)
     target = figure.placement(witness, "tool")
     problem = wb.Problem(wb.Scene(figure), figure.with_joints(figure.neutral, ready), goals=[wb.Frame("tool", target)])
@@ -33,7 +33,7 @@ def test_it_places_the_tool_of_an_arm(kind: str) -> None:
 
 
 def test_a_place_out_of_reach_is_not_called_solved() -> None:
-    figure, ready = robot_arm.arm("industrial", np.random.default_rng(1))
+    figure, ready = robots.arm("industrial", np.random.default_rng(1))
     problem = wb.Problem(
         wb.Scene(figure), figure.with_joints(figure.neutral, ready), goals=[wb.Frame("tool", (5, 0, 0))]
     )

@@ -13,7 +13,7 @@ import pytest
 import wholebody as wb
 from tests.bench.following import followed
 from wholebody.base.errors import InputError, MissingPackageError, UnknownNameError
-from wholebody.bench.measure.track import CLEARANCE, Track, judge, track
+from wholebody.bench.measure.track import SETTING, Track, judge, track
 from wholebody.bench.suite.adapters.own import MovingPoint
 from wholebody.bench.suite.adapters.registry import chosen_tools, installed_tools, make_tool, tool_differences
 from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
@@ -79,7 +79,7 @@ def test_our_steps_jolt_joints_no_more_than_the_best_peers(name: str, most: floa
     assert verdict.acceleration < most
     assert verdict.foot_drift < 2e-6
     assert verdict.error[-1] < 1e-6
-    assert verdict.least_distance.min() > 0.9999 * CLEARANCE
+    assert verdict.least_distance.min() > 0.9999 * SETTING.clearance
 
 
 def test_unknown_and_missing_tools_are_named() -> None:

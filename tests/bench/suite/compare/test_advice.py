@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from wholebody.bench.suite.compare.advice import OURS, advice, best, choices, standings
-from wholebody.bench.suite.compare.charts import curve, groups
+from wholebody.bench.suite.compare.report import curve, groups
 from wholebody.bench.suite.compare.results import ANSWERED, EFFORT, FLOOR, OVERTIME, REFUSED, WORST, Record, Results
 from wholebody.bench.suite.compare.summary import summaries
 

@@ -18,6 +18,7 @@ from wholebody.bench.suite.problem_sets.registry import SETS, problem_set
 
 NUMBERS = (0, 199)  # of every kind, side and tip: sets take them in turn, of two and three, by number
 SPARE = 5e-4  # m
+TOLD = ("clutter", "self_contact", "balance", "robot_arm")  # every way of drawing things, postures and figures
 STILL = [name for name, group in SETS.items() if not group.moving]
 
 
@@ -56,11 +57,11 @@ def test_no_start_solves_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", SETS)
 def test_numbers_and_seeds_make_different_problems(name: str) -> None:
-    assert len({fingerprint(made(name, number, seed)) for number, seed in ((0, 0), (1, 0), (0, 1))}) == 3
+    assert len({fingerprint(made(name, number, seed)) for number, seed in ((0, 0), (199, 0), (0, 1))}) == 3
 
 
 def test_another_process_makes_the_same_problems() -> None:
-    here = {name: fingerprint(made(name, 0, 1)) for name in SETS}
+    here = {name: fingerprint(made(name, 0, 1)) for name in TOLD}
     code = f"import sys; sys.path.insert(0, {str(__file__).rpartition('/')[0]!r}); import test_cases as t; t.tell(0, 1)"
     told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert dict(line.split() for line in told.splitlines()) == here
@@ -72,7 +73,7 @@ def test_an_unknown_set_is_named_with_those_near_it() -> None:
 
 
 def tell(number: int, seed: int) -> None:
-    for name in SETS:
+    for name in TOLD:
         print(name, fingerprint(made(name, number, seed)))
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.bench.suite.problem_sets import drag
+from wholebody.bench.suite.problem_sets import reaching
 from wholebody.bench.suite.problem_sets.bodies import human
 from wholebody.bench.suite.problem_sets.case import generator
 from wholebody.bench.suite.problem_sets.registry import problem_set
@@ -14,7 +14,7 @@ from wholebody.bench.suite.problem_sets.registry import problem_set
 
 def test_a_known_posture_meets_each_frame() -> None:
     case = problem_set("drag").make(0, 0)
-    problem, postures = case.problem, drag.way(human(), generator("drag", 0, 0))
+    problem, postures = case.problem, reaching.way(human(), generator("drag", 0, 0))
     assert 100 <= len(case.frames) == len(postures) - 1 <= 200
     for q, goals in zip(postures[1:], case.frames, strict=True):
         problem.retarget(goals)
@@ -40,6 +40,6 @@ def test_the_goals_move_far_smoothly_and_at_a_speed_of_people(number: int) -> No
 def test_the_spline_has_no_corners() -> None:
     """Value, first and second differences go on from one span to the next."""
     control = np.random.default_rng(0).normal(size=(6, 2))
-    whole = np.vstack([drag._span(control[k : k + 4]) for k in range(3)])
-    third = np.abs(np.diff(whole, 3, axis=0)).max() * drag.given.frames_a_span**3
+    whole = np.vstack([reaching._span(control[k : k + 4]) for k in range(3)])
+    third = np.abs(np.diff(whole, 3, axis=0)).max() * reaching.of_drag.frames_a_span**3
     assert third < 3.0 * np.abs(np.diff(control, 3, axis=0)).max()

@@ -35,4 +35,4 @@ def test_without_the_files_a_sentence_says_what_to_do(monkeypatch: pytest.Monkey
         with pytest.raises(InputError, match="example-robot-data"):
             robots.folder()
     assert "robots" not in SETS
-    assert len(set(robots.given.files)) == 12
+    assert len(set(robots.of_robots.files)) == 12

@@ -28,10 +28,6 @@ FEASIBILITY_ONLY = -1
 LADDER: tuple[Budget, ...] = tuple((tol, None) for tol in (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4, 1e-5, 1e-6, 1e-8))
 """Tolerances from cheap to exact; each adapter begins and ends where it makes sense for it."""
 
-REACH_COST = 1.0
-POSTURE_COST = 1e-3
-"""Ratio of what a metre and a radian cost in the tools that weigh them: errors are squared after this."""
-
 
 def _nothing(method: Any, problem: Problem) -> None:
     pass

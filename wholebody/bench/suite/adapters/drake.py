@@ -22,8 +22,6 @@ from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
-SLAB = 50.0  # m: edges of the box that stands for a half-space
-
 
 def drake_adapter() -> Adapter:
     """The method: InverseKinematics of drake."""
@@ -294,6 +292,7 @@ def _shape(piece: Any, lower: float) -> tuple[Any, pin.SE3]:
         return Convex(points.T.copy(), piece.name.replace("\n", " ")), place
     if isinstance(shape, coal.Halfspace):
         turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(shape.n)).matrix()
-        middle = (shape.d - lower - 0.5 * SLAB) * np.array(shape.n)
-        return Box(SLAB, SLAB, SLAB), place * pin.SE3(turn, middle)
+        edge = 50.0  # m: of the box that stands for a half-space
+        middle = (shape.d - lower - 0.5 * edge) * np.array(shape.n)
+        return Box(edge, edge, edge), place * pin.SE3(turn, middle)
     raise InputError(f"{piece.name!r} is a {type(shape).__name__}; drake's plant is made for convex shapes")

@@ -18,10 +18,6 @@ from wholebody.methods.base import named_terms
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 
-DAMPING = 0.1  # its examples'
-GAIN = 10.0  # 1/s: its examples', for positions and orientations
-LARGER, AT = 10.0, 0.02  # its examples' largest factor on the time step, and m of error from which it grows
-
 
 def embodik_adapter() -> Adapter:
     """The kinematics of embodik in our loop."""
@@ -75,8 +71,8 @@ class _EmbodikStepper:
         problem = self._problem
         self._solver = solver = embodik.KinematicsSolver(self._robot)
         solver.dt = 0.01  # s: its examples' time step
-        solver.set_damping(DAMPING)
-        solver.set_tolerance(DAMPING)
+        solver.set_damping(0.1)  # its examples'
+        solver.set_tolerance(0.1)
         self._options, self._targets = embodik.PositionStepOptions(), list[Any]()
         for goal in problem.goals:
             self._goal(goal)
@@ -88,7 +84,8 @@ class _EmbodikStepper:
             task.set_joint_weights(self._spread(cost.weights))
         options = self._options
         options.max_steps = 1
-        options.adaptive_dt, options.adaptive_dt_max_scale, options.adaptive_dt_reference_distance = True, LARGER, AT
+        # Its examples' largest factor on the time step, and m of error from which it grows.
+        options.adaptive_dt, options.adaptive_dt_max_scale, options.adaptive_dt_reference_distance = True, 10.0, 0.02
         options.primary_solve_mode = embodik.TaskSolveMode.SCALE_ELASTIC
         options.primary_allow_min_error_fallback = True
         frozen = {dof for bound in problem.bounds if isinstance(bound, wb.Freeze)
@@ -183,4 +180,5 @@ class _EmbodikStepper:
         name = f"goal {len(self._targets)}"
         task = self._solver.add_frame_task(name, self._frame(goal), kind)
         task.priority, task.weight, task.solve_mode = 0, 1.0, embodik.TaskSolveMode.SCALE_ELASTIC
-        self._targets.append(embodik.TaskTarget(name, target.homogeneous, GAIN, GAIN))
+        gain = 10.0  # 1/s: its examples', for positions and orientations
+        self._targets.append(embodik.TaskTarget(name, target.homogeneous, gain, gain))

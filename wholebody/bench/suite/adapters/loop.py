@@ -21,11 +21,6 @@ from wholebody.methods.differential import Iteration, Settings
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-NEAR = 0.1  # of the size of a figure: pairs nearer than this have a row, where a tool has such a setting
-SHARE = 0.5  # of the room that a pair has at the start: most of its margin
-QUARTERS = 4  # margins that differ by less than this part of the largest are one: tools have a class for each value
-OUT = 0.1  # of the room beside things that move: what a pair that lacks it gains in one step
-
 
 class PostureCost(NamedTuple):
     """A measure as a weighted squared distance from a posture.
@@ -58,10 +53,12 @@ class Loop(Outside[Stepper], ABC):
         longest: most that anything moves in one step, radians and shares of the figure's size.
         margin: most that a pair keeps beyond its clearance, as a share of the figure's size: 1 mm for a person. Less
             fits into narrower gaps, more is against what linearised rows leave out.
+        out: share of the room beside things that move that a pair which lacks it gains in one step.
     """
 
     longest: ClassVar[float] = 0.05
     margin: ClassVar[float] = 7e-4
+    out: ClassVar[float] = 0.1
     kinds: ClassVar[tuple[type, ...]] = (
         wb.CenterOfMass, wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Orientation, wb.Point, wb.Posture,
         wb.Relative, wb.StepLimit,
@@ -168,12 +165,14 @@ def margins(problem: Problem, most: float) -> Array:
     found = np.full(len(problem.clearances), most)
     if most <= 0.0:
         return found
-    reach = float(problem.clearances.max(initial=0.0)) + most / SHARE
+    share = 0.5  # of the room that a pair has at the start: most of its margin
+    reach = float(problem.clearances.max(initial=0.0)) + most / share
     with problem.borrow() as workspace:
         near = workspace.near(problem.scene.figure.clamp(problem.start), reach)
         room = near.distance - problem.clearances[near.number]
-        found[near.number] = np.clip(SHARE * room, 0.0, most)
-    return np.floor(QUARTERS * found / most) * most / QUARTERS
+        found[near.number] = np.clip(share * room, 0.0, most)
+    # Tools have a class for each value: margins that differ by less than a quarter of the largest are one.
+    return np.floor(4.0 * found / most) * most / 4.0
 
 
 def longest_moves(figure: Figure, longest: float) -> Array:

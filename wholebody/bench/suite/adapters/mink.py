@@ -11,11 +11,9 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, WITHIN, Track
-from wholebody.bench.suite.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
+from wholebody.bench.measure.track import SETTING, Track
+from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool, few
 from wholebody.bench.suite.adapters.loop import (
-    NEAR,
-    OUT,
     Loop,
     Stepper,
     kept_apart,
@@ -24,7 +22,7 @@ from wholebody.bench.suite.adapters.loop import (
     posture_costs,
     size,
 )
-from wholebody.bench.suite.adapters.urdf import ROOT, Frames, mjcf, own_frame
+from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
 from wholebody.figures.figure import Figure
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
@@ -42,6 +40,7 @@ class MinkLoop(Loop):
 
     name = "mink"
     kinds = (*Loop.kinds, wb.Axis)
+    near: ClassVar[float] = 0.1  # of the size of a figure: pairs nearer than this have a row
     gain: ClassVar[float] = 0.85  # share of what is free of a gap that may be used up in one step: mink's default
 
     def build(self, problem: Problem) -> Stepper:
@@ -132,7 +131,9 @@ class _MinkStepper:
             mink.VelocityLimit(model, {name: float(most[figure.dofs([name])[0]]) for name in figure.joints}),
         ]
         if figure.root == "free":
-            limits.append(mink.FreeJointVelocityLimit(model, self._longest * reach, self._longest, joint_name=ROOT))
+            limits.append(
+                mink.FreeJointVelocityLimit(model, self._longest * reach, self._longest, joint_name="root_joint")
+            )
         names = [piece.name for piece in problem.scene.geometry.geometryObjects]
         pieces = problem.scene.geometry.geometryObjects
         groups: dict[tuple[float, float], list[Any]] = {}
@@ -146,8 +147,8 @@ class _MinkStepper:
                 pairs,
                 gain=self._loop.gain,
                 minimum_distance_from_collisions=clearance,
-                collision_detection_distance=clearance + NEAR * reach,
-                bound_relaxation=-OUT * room,  # without it, a pair that is nearer than it may be stays so
+                collision_detection_distance=clearance + self._loop.near * reach,
+                bound_relaxation=-self._loop.out * room,  # without it, a pair that is nearer than it may be stays so
             )
             limits.append(apart)
         return limits
@@ -255,8 +256,8 @@ class MinkTool(Tool):
         model = self._mujoco_model = mujoco.MjModel.from_xml_string(mjcf(track.scene, sites))
         self._order = _Order(figure, model)
         self.reset(track.start)
-        self._reach = self._task(track.tip, REACH_COST, 0.0)
-        posture = mink.PostureTask(model, cost=POSTURE_COST)
+        self._reach = self._task(track.tip, 1.0, 0.0)
+        posture = mink.PostureTask(model, cost=SETTING.posture_cost)
         posture.set_target(self._configuration.q)
         self._tasks = [self._reach, posture]
         self._feet = [self._task(foot, 1.0, 1.0) for foot in track.feet]
@@ -267,18 +268,20 @@ class MinkTool(Tool):
         apart = mink.CollisionAvoidanceLimit(
             model,
             [([names[pair.first]], [names[pair.second]]) for pair in geometry.collisionPairs],
-            gain=0.5 * DT,  # half of what is free of a gap may be used up in one step of a reach
+            gain=0.5 * SETTING.dt,  # half of what is free of a gap may be used up in one step of a reach
             minimum_distance_from_collisions=track.clearance,
-            collision_detection_distance=WITHIN,
+            collision_detection_distance=SETTING.within,
         )
         self.pairs = len(apart.geom_id_pairs)
         self._limits = [
             mink.ConfigurationLimit(model),
-            mink.VelocityLimit(model, dict.fromkeys(figure.joints, JOINT_SPEED)),
+            mink.VelocityLimit(model, dict.fromkeys(figure.joints, SETTING.joint_speed)),
             apart,
         ]
         if track.floating:
-            self._limits.append(mink.FreeJointVelocityLimit(model, ROOT_SPEED, ROOT_TURN, joint_name=ROOT))
+            self._limits.append(
+                mink.FreeJointVelocityLimit(model, SETTING.root_speed, SETTING.root_turn, joint_name="root_joint")
+            )
 
     def _task(self, frame: str, position: float, orientation: float) -> Any:
         return self._mink.FrameTask(frame, "site", position_cost=position, orientation_cost=orientation)
@@ -293,13 +296,13 @@ class MinkTool(Tool):
         self._reach.set_target(self._mink.SE3.from_translation(target))
         try:
             velocity = self._mink.solve_ik(
-                self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
+                self._configuration, self._tasks, SETTING.dt, solver="daqp", damping=SETTING.posture_cost**2,
                 limits=self._limits, constraints=self._feet or None,
             )  # fmt: skip
         except self._mink.NoSolutionFound:
             self.failures += 1
             return
-        self._configuration.integrate_inplace(velocity, DT)
+        self._configuration.integrate_inplace(velocity, SETTING.dt)
 
     def posture(self) -> Array:
         """Where it is."""

@@ -12,7 +12,7 @@ import numpy as np
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
+from wholebody.bench.measure.track import SETTING, Track
 from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Tool, few, made
 from wholebody.figures.state import State, Wrench
 from wholebody.methods.base import Method
@@ -20,8 +20,8 @@ from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.solvers.qpsolvers_solver import GUESS_TOLERANCE
 from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 
@@ -147,8 +147,8 @@ class MovingPoint(Goal):
 def reach_problem(track: Track, **terms: Any) -> tuple[wb.Problem, MovingPoint]:
     """The problem of a reach with its feet and bounds on speed, and its goal, whose target is moved afterwards."""
     goal = MovingPoint(track.tip, np.array(track.targets[0]))
-    speed, turn = (ROOT_SPEED, ROOT_TURN) if track.floating else (np.inf, np.inf)
-    bound = wb.StepLimit(JOINT_SPEED, root_velocity=speed, root_turn=turn)
+    speed, turn = (SETTING.root_speed, SETTING.root_turn) if track.floating else (np.inf, np.inf)
+    bound = wb.StepLimit(SETTING.joint_speed, root_velocity=speed, root_turn=turn)
     kept: list[Any] = [*(wb.Hold(foot) for foot in track.feet), bound]
     stated = wb.Problem(
         track.scene, track.start, goals=[goal], constraints=kept, clearance=track.clearance, **terms
@@ -165,7 +165,7 @@ class WholebodyTool(Tool):
         # the other tools cannot be told of what a person keeps
         self.problem, goal = reach_problem(track, measures=[wb.Displacement()], range_of_motion=False, balance=False)
         self._target = goal.target
-        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, DT)
+        self._tracker = wb.QP(**qp_settings(solver)).tracker(self.problem, SETTING.dt)
         self._q = np.array(track.start)
         self._told: list[QPStep] = []
 

@@ -13,15 +13,14 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
-from wholebody.bench.measure.track import DT, JOINT_SPEED, ROOT_SPEED, ROOT_TURN, Track
-from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few
-from wholebody.bench.suite.adapters.loop import OUT, Loop, Stepper, kept_apart, longest_moves, posture_costs, size
+from wholebody.bench.measure.track import SETTING, Track
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, Tool, few
+from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, posture_costs, size
 from wholebody.methods.differential import TOOL, StepError
 from wholebody.problem import Problem
 from wholebody.tasks.residuals import PlacementResidual
 
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
-BARRIER_GAIN = 0.5 / DT  # 1/s: half of what is free of a gap may be used up in one step of a reach
 
 
 def pink_adapter() -> Adapter:
@@ -61,7 +60,7 @@ class _PinkStepper:
     def __init__(self, problem: Problem, loop: type[PinkLoop]) -> None:
         from pink.limits import FloatingBaseVelocityLimit
 
-        self._problem, self._safe, figure = problem, loop.safe, problem.scene.figure
+        self._problem, self._safe, self._out, figure = problem, loop.safe, loop.out, problem.scene.figure
         longest, margin = loop.longest, loop.margin * size(figure)
         self._model = model = figure.model.copy()  # pink hangs attributes onto it
         for goal in problem.goals:
@@ -100,7 +99,7 @@ class _PinkStepper:
                     min(NEAREST, pairs),
                     # All that is free of a gap may be used up in one iteration: with less, held feet cannot
                     # come back
-                    gain=OUT if room else 1.0,
+                    gain=self._out if room else 1.0,
                     safe_displacement_gain=self._safe,
                     d_min=self._least + room,
                 )
@@ -219,23 +218,26 @@ class PinkTool(Tool):
 
         self._pink, self._scene = pink, track.scene
         self._model = track.scene.model.copy()
-        self._model.velocityLimit = np.full(self._model.nv, JOINT_SPEED)
+        self._model.velocityLimit = np.full(self._model.nv, SETTING.joint_speed)
         if track.floating:
-            root = FloatingBaseVelocityLimit(self._model, None, ROOT_SPEED, ROOT_TURN)
+            root = FloatingBaseVelocityLimit(self._model, None, SETTING.root_speed, SETTING.root_turn)
             self._model.floating_base_velocity_limit = root
         self._solvers_failure = pink.exceptions.NoSolutionFound
         self.reset(track.start)
-        self._reach = FrameTask(track.tip, position_cost=REACH_COST, orientation_cost=0.0)
+        self._reach = FrameTask(track.tip, position_cost=1.0, orientation_cost=0.0)
         self._at = pin.SE3.Identity()
-        posture = PostureTask(cost=POSTURE_COST)
+        posture = PostureTask(cost=SETTING.posture_cost)
         posture.set_target(track.start)
         self._tasks = [self._reach, posture]
         self._feet = [FrameTask(foot, position_cost=1.0, orientation_cost=1.0) for foot in track.feet]
         for task in self._feet:
             task.set_target_from_configuration(self._configuration)
         pairs = min(NEAREST, track.pairs)
+        # Half of what is free of a gap may be used up in one step.
         self._barriers = (
-            [SelfCollisionBarrier(n_collision_pairs=pairs, gain=BARRIER_GAIN, d_min=track.clearance)] if pairs else []
+            [SelfCollisionBarrier(n_collision_pairs=pairs, gain=0.5 / SETTING.dt, d_min=track.clearance)]
+            if pairs
+            else []
         )
 
     def reset(self, q: Array) -> None:
@@ -251,13 +253,13 @@ class PinkTool(Tool):
         self._reach.set_target(self._at)
         try:
             velocity = self._pink.solve_ik(
-                self._configuration, self._tasks, DT, solver="daqp", damping=POSTURE_COST**2,
+                self._configuration, self._tasks, SETTING.dt, solver="daqp", damping=SETTING.posture_cost**2,
                 barriers=self._barriers, constraints=self._feet, safety_break=False,
             )  # fmt: skip
         except self._solvers_failure:
             self.failures += 1
             return
-        self._configuration.integrate_inplace(velocity, DT)
+        self._configuration.integrate_inplace(velocity, SETTING.dt)
 
     def posture(self) -> Array:
         """Where it is."""

@@ -15,8 +15,8 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.bench.measure.track import DT, JOINT_SPEED, WITHIN, Track
-from wholebody.bench.suite.adapters.base import LADDER, POSTURE_COST, REACH_COST, Adapter, Tool, few, made
+from wholebody.bench.measure.track import SETTING, Track
+from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool, few, made
 from wholebody.bench.suite.adapters.urdf import own_frame
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
@@ -60,28 +60,28 @@ class PlacoTool(Tool):
             pieces.addGeometryObject(pin.GeometryObject(piece.name, there, piece.placement, piece.geometry))
         for first, second in self.pairs(track):
             pieces.addCollisionPair(pin.CollisionPair(first, second))
-        wrapper.set_velocity_limits(JOINT_SPEED)
+        wrapper.set_velocity_limits(SETTING.joint_speed)
         self.reset(track.start)
 
         self._solver = placo.KinematicsSolver(wrapper)
         self._solver.mask_fbase(not track.floating)
         self._robot.couple(self._solver)
-        self._solver.dt = DT
+        self._solver.dt = SETTING.dt
         self._solver.enable_joint_limits(True)
         self._solver.enable_velocity_limits(True)
         self._reach = self._solver.add_position_task(track.tip, np.array(track.targets[0]))
-        self._reach.configure("reach", "soft", REACH_COST**2)
+        self._reach.configure("reach", "soft", 1.0)
         for foot in track.feet:
             task = self._solver.add_frame_task(foot, wrapper.get_T_world_frame(foot))
             task.configure(foot, "hard", 1.0, 1.0)
         posture = self._solver.add_joints_task()
         values = figure.joint_values(track.start)
         posture.set_joints({self._robot.joint_name(figure.joint_id(name)): value for name, value in values.items()})
-        posture.configure("posture", "soft", POSTURE_COST**2)
-        self._solver.add_regularization_task(POSTURE_COST**2)
+        posture.configure("posture", "soft", SETTING.posture_cost**2)
+        self._solver.add_regularization_task(SETTING.posture_cost**2)
         if track.pairs:
             apart = self._solver.add_avoid_self_collisions_constraint()
-            apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, WITHIN
+            apart.self_collisions_margin, apart.self_collisions_trigger = track.clearance, SETTING.within
             apart.configure("apart", "hard", 1.0)
 
     def pairs(self, track: Track) -> Sequence[tuple[int, int]]:
@@ -123,13 +123,13 @@ class PrunedPlacoTool(PlacoTool):
 
 @lru_cache(maxsize=4)
 def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
-    """Pairs of pieces that come nearer than `WITHIN` in 2000 sampled postures.
+    """Pairs of pieces that come nearer than `Setting.within` in 2000 sampled postures.
 
     Args:
         scene: whose pairs.
         start: (nq,) posture about which the root is sampled, as bytes.
     """
-    found = _sampled(scene, np.frombuffer(start), 2000, WITHIN)
+    found = _sampled(scene, np.frombuffer(start), 2000, SETTING.within)
     pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
     return [pair for pair, near in zip(pairs, found, strict=True) if near]
 

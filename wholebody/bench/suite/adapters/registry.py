@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
@@ -20,40 +20,12 @@ from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
 from wholebody.methods.qp.solvers.registry import solver_names
 
-ALL = "all"
-"""In place of a name: every method that is installed."""
-
-USUAL = ("qp", "newton/slack", "ccd", "placo", "pink", "mink", "dls", "drake", "optik")
-"""Methods where none is named: one of each algorithm. Their other settings take part by name, or with `ALL`."""
-
-USUAL_FURTHER = (
-    "placo/pruned",
-    *(f"{family}/{STARTS}" for family in ("dls", "placo", "pink", "mink", "drake")),
-    *(f"{family}/{ONE}" for family in ("qp", "newton", "ccd")),
-)
-"""With those, placo takes part with the pairs that a careful user leaves it, and every method but optik, which draws
-its own, from one start and from several: qp, newton and ccd have several by default."""
-
-OUTSIDE = {
-    "placo": (("placo",), "placo"),
-    "placo/pruned": (("placo",), "placo"),
-    "pink": (("pink", "daqp"), "compare"),
-    "mink": (("mink", "mujoco", "daqp"), "compare"),
-    "drake": (("pydrake",), "drake"),
-    "optik": (("optik",), "optik"),
-    "embodik": (("embodik",), "embodik"),
-}
-"""Methods of other packages: the modules that each needs, and the extra that installs them."""
-
-SOLVERS = {"quadprog": "quadprog", "proxqp": "proxsuite", "piqp": "piqp"}
-"""Further QP solvers that the extra `solvers` installs: their names in qpsolvers -> the modules they need."""
-
 
 class _Row(NamedTuple):
     """How to build an adapter, the modules it needs, and the extra that installs them."""
 
     build: Callable[[], Adapter]
-    modules: tuple[str, ...] = ()
+    modules: Sequence[str] = ()
     extra: str = ""
 
     def installed(self) -> bool:
@@ -68,7 +40,7 @@ class _Row(NamedTuple):
 
 
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
-    """The adapters of these names, in the order given; where None, the installed ones of `USUAL`.
+    """The adapters of these names, in the order given; where None, one of each algorithm that is installed.
 
     The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
     "all" means every method that is installed. Methods that differ from another in their starts alone, such as
@@ -80,13 +52,14 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     """
     rows = _rows()
     if names is None:
-        usual = (*USUAL, *(USUAL_FURTHER if starts else ()))
+        listed = _texts()["taking_part"]
+        usual = (*listed["usual"], *(listed["further"] if starts else ()))
         return tuple(rows[name].build() for name in usual if rows[name].installed())
     families = {name.partition("/")[0] for name in rows}
     plain = [name for name in rows if starts or not name.endswith((f"/{ONE}", f"/{STARTS}"))]
     chosen: dict[str, None] = {}
     for name in names:
-        if name == ALL:
+        if name == "all":
             chosen.update(dict.fromkeys(key for key in plain if rows[key].installed()))
         elif name in rows:
             chosen[name] = None
@@ -94,7 +67,7 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
             family = (key for key in plain if key.startswith(f"{name}/"))
             chosen.update(dict.fromkeys(key for key in family if rows[key].installed()))
         else:
-            raise UnknownNameError("method", name, {*rows, *families, ALL})
+            raise UnknownNameError("method", name, {*rows, *families, "all"})
     for name in chosen:
         rows[name].check(name)
     return tuple(rows[name].build() for name in chosen)
@@ -120,12 +93,14 @@ def _rows() -> dict[str, _Row]:
     """All methods, in the order of reports."""
     rows = {"qp": _Row(partial(qp_adapter, ""))}
     rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver)) for solver in ("active_set", "osqp", "daqp")}
-    rows |= {f"qp/{solver}": _Row(partial(qp_adapter, solver), (need,), "solvers") for solver, need in SOLVERS.items()}
+    for solver, need in _texts()["solvers"].items():
+        rows[f"qp/{solver}"] = _Row(partial(qp_adapter, solver), (need,), "solvers")
     for solver in solver_names():  # any other that qpsolvers finds on this machine
         rows.setdefault(f"qp/{solver}", _Row(partial(qp_adapter, solver)))
     rows |= {f"newton/{way}": _Row(partial(newton_adapter, way)) for way in NEWTONS}
     rows |= {"ccd": _Row(ccd_adapter), "dls": _Row(dls_adapter)}
-    rows |= {name: _Row(partial(_outside, name), *needs) for name, needs in OUTSIDE.items()}
+    outside = {name: said for name, said in _texts().items() if "extra" in said}
+    rows |= {name: _Row(partial(_outside, name), said["modules"], said["extra"]) for name, said in outside.items()}
     rows |= {f"{family}/{ONE}": _Row(partial(one_start, family)) for family in ("qp", "newton", "ccd")}
     rows = {name: with_values(row, build=partial(_described, name, row)) for name, row in rows.items()}
     for family in ("qp", "newton", "ccd", "dls", "placo", "mink", "pink", "drake", "embodik"):
@@ -158,11 +133,11 @@ def _restarted(row: _Row) -> Adapter:
     return restarted(row.build())
 
 
-STEPPING = (
-    "wholebody", "wholebody/active_set", "wholebody/osqp", "wholebody/daqp", *(f"wholebody/{name}" for name in SOLVERS),
-    "placo", "placo/pruned", "pink", "mink",
-)  # fmt: skip
-"""Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
+@cache
+def stepping() -> tuple[str, ...]:
+    """Every tool that follows reaches: an adapter, of which qp is called wholebody here."""
+    ours = (f"wholebody/{solver}" for solver in ("active_set", "osqp", "daqp", *_texts()["solvers"]))
+    return "wholebody", *ours, "placo", "placo/pruned", "pink", "mink"
 
 
 def _row_of(tool: str) -> _Row:
@@ -171,7 +146,7 @@ def _row_of(tool: str) -> _Row:
 
 def installed_tools() -> tuple[str, ...]:
     """Names of the tools whose packages are installed."""
-    return tuple(name for name in STEPPING if _row_of(name).installed())
+    return tuple(name for name in stepping() if _row_of(name).installed())
 
 
 def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
@@ -185,8 +160,8 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
         return installed_tools()
     chosen = tuple(names)
     for name in chosen:
-        if name not in STEPPING:
-            raise UnknownNameError("tool", name, STEPPING)
+        if name not in stepping():
+            raise UnknownNameError("tool", name, stepping())
         _row_of(name).check(name)
     return chosen
 

@@ -29,10 +29,6 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import Solution
 
-SECONDS = 1.5
-"""Processor time of all starts of a solve; the last one that began within it is finished."""
-
-
 STARTS, ONE = "starts", "one_start"
 """Ends of the names of methods."""
 
@@ -42,10 +38,10 @@ class Restarted:
 
     Attributes:
         method: what solves from each start.
-        seconds: see `SECONDS`.
+        seconds: processor time of all starts of a solve; the last one that began within it is finished.
     """
 
-    def __init__(self, method: Any, prepare: Callable[[Any, Problem], None], seconds: float = SECONDS) -> None:
+    def __init__(self, method: Any, prepare: Callable[[Any, Problem], None], seconds: float = 1.5) -> None:
         """Take a method with one start, and what builds its model."""
         self.method, self.seconds, self._prepare = method, seconds, prepare
         self.tolerance: float = method.tolerance
@@ -107,7 +103,7 @@ def restarted(adapter: Adapter) -> Adapter:
         prepare=Restarted.prepare,
         setup=adapter.setup.replace("; one start,", "; from each start").removesuffix(".")
         + ". No other budgets than the default one. "
-        + f"Further starts within {SECONDS:g} s of processor time where there is no answer: joints moved at random "
+        + "Further starts within 1.5 s of processor time where there is no answer: joints moved at random "
         "within their limits, the root and what holds it excepted, free of overlap.",
     )
 

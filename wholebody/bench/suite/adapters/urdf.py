@@ -20,8 +20,6 @@ from wholebody.figures.urdf.writing import FOLLOWS, UrdfAxis, add_joint, exact, 
 from wholebody.scene.scene import Scene
 from wholebody.tasks.inputs import Place
 
-FAST = 1e3  # rad/s, m/s: in place of a limit of speed that is none
-
 
 class Frames(dict[str, tuple[int, pin.SE3]]):
     """Frames, and points in them, that a tool is given by name: name -> our joint and the placement in it."""
@@ -94,8 +92,8 @@ def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: st
         InputError: a joint of another kind.
     """
     joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
-    speed = float(model.velocityLimit[joint.idx_v])
-    limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < FAST else FAST}
+    speed, fast = float(model.velocityLimit[joint.idx_v]), 1e3  # rad/s, m/s: in place of a limit that is none
+    limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < fast else fast}
     if joint.nq == 1:
         limit["lower"] = model.lowerPositionLimit[joint.idx_q]
         limit["upper"] = model.upperPositionLimit[joint.idx_q]
@@ -176,9 +174,6 @@ def _obj(shape: Any) -> str:
         triangle = shape.polygons(k)
         lines.append("f " + " ".join(str(triangle[corner] + 1) for corner in range(3)))
     return "\n".join(lines) + "\n"
-
-
-ROOT = "root_joint"
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:

@@ -16,8 +16,6 @@ from wholebody.bench.suite.compare.summary import Summary, summaries
 from wholebody.bench.suite.problem_sets import robots
 from wholebody.bench.suite.problem_sets.registry import TUNED_ON, problem_set
 
-METHODS = ("qp", "placo", "placo/starts", "dls/starts")
-
 
 class Beside(NamedTuple):
     """One method in a held-out set, and in the one that constants were tuned on; None where it took part in none."""

@@ -18,8 +18,6 @@ from wholebody.bench.suite.compare.results import DEFAULT, FAILED, OVERTIME, REF
 from wholebody.bench.suite.compare.solving import BUILDING, Which, built, solved, warmed
 from wholebody.bench.suite.problem_sets.case import ProblemSet
 
-SIZE = 64  # of the matrices: about the degrees of freedom of a person
-
 
 def kernel_seconds() -> float:
     """Seconds of the processor that the kernel takes now; about 4 ms on a processor of 2020."""
@@ -47,7 +45,7 @@ def _made() -> tuple[Any, Any]:
     import coal
 
     rng = np.random.default_rng(0)
-    matrix = np.linalg.qr(rng.normal(size=(SIZE, SIZE)))[0]
+    matrix = np.linalg.qr(rng.normal(size=(64, 64)))[0]  # about the degrees of freedom of a person
     shapes = (coal.Box(0.3, 0.2, 0.1), coal.Capsule(0.05, 0.3))
     pairs = []
     for number in range(1000):  # distances: about the pairs of a person among twenty things

@@ -24,8 +24,7 @@ from wholebody.bench.suite.problem_sets.registry import problem_set
 from wholebody.bench.tables import write_text
 
 NAME = "lock.json"
-FORMAT = "wholebody comparison"
-VERSION = "1.0"
+HEAD = {"format": "wholebody comparison", "version": "1.0"}
 AMOUNTS = ("cases", "sweep", "levels", "seed", "cap", "minutes")
 
 
@@ -91,8 +90,7 @@ def locked(given: Material) -> Locked:
 def write_lock(path: Path, found: Locked) -> None:
     """Write a lock file."""
     content = {
-        "format": FORMAT,
-        "version": VERSION,
+        **HEAD,
         "sets": list(found.sets),
         "methods": list(found.methods),
         "amounts": dict(found.amounts),
@@ -111,8 +109,8 @@ def read_lock(path: Path) -> Locked:
     text = read_text(path, "lock file")
     try:
         content: Any = json.loads(text)
-        if content["format"] != FORMAT or content["version"] != VERSION:
-            raise ValueError(f"its format is not {FORMAT!r} {VERSION}")
+        if {name: content[name] for name in HEAD} != HEAD:
+            raise ValueError(f"its format is not {' '.join(HEAD.values())}")
         return Locked(
             tuple(map(str, content["sets"])),
             tuple(map(str, content["methods"])),

@@ -25,11 +25,10 @@ from wholebody.problem import Problem
 from wholebody.taskfile import read_task
 
 REPEATS = 5  # warm solves, of which the median counts
-CAP = 20.0  # s of the processor's time: after which a solve is ended
 
 
 def compared(
-    path: Path, adapters: Iterable[Adapter], cap: float = CAP, tell: Callable[[str], None] = lambda name: None
+    path: Path, adapters: Iterable[Adapter], cap: float = 20.0, tell: Callable[[str], None] = lambda name: None
 ) -> list[Row]:
     """Every method on the problem of a task file: what solves it first, by time; then by the worst error.
 
@@ -116,7 +115,7 @@ def _row(name: str, cold: float, records: Sequence[Record]) -> Row:
     return Row("task", name, figures)
 
 
-def report(rows: Sequence[Row], title: str, facts: Mapping[str, str], cap: float = CAP) -> str:
+def report(rows: Sequence[Row], title: str, facts: Mapping[str, str], cap: float = 20.0) -> str:
     """The table as Markdown, refusals and failures below it."""
     answered = [Row(title, row.tool, row.figures) for row in rows if "worst" in row.figures]
     silent = [f"`{row.tool}`, {row['outcome']}: {row['said']}" for row in rows if "worst" not in row.figures]

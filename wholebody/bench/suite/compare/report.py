@@ -1,21 +1,110 @@
-"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out."""
+"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out.
+
+A chart has at most six methods; a method has the same colour in all of them.
+"""
 
 from __future__ import annotations
 
 import re
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
+import numpy as np
+
+from wholebody.bench import plot_style
+from wholebody.bench.plot_style import MOST, method_style
 from wholebody.bench.report import page, render
-from wholebody.bench.suite.compare.advice import advice, choices, named, reference, standings
-from wholebody.bench.suite.compare.charts import chart_name, draw_all, groups
+from wholebody.bench.rows import Panel, chart
+from wholebody.bench.suite.compare.advice import OURS, advice, choices, named, reference, standings
 from wholebody.bench.suite.compare.lock import NAME as LOCK
 from wholebody.bench.suite.compare.lock import locked, write_lock
-from wholebody.bench.suite.compare.results import COARSE, DEFAULT, FLOOR, Store
+from wholebody.bench.suite.compare.results import COARSE, DEFAULT, FLOOR, Quantity, Results, Store, middle
 from wholebody.bench.suite.compare.settings import Settings
-from wholebody.bench.suite.compare.summary import GOOD, Material, kernel_of, left_out, material
+from wholebody.bench.suite.compare.summary import GOOD, Material, Summary, kernel_of, left_out, material
 from wholebody.bench.tables import replace_section, write_rows, write_text
+
+
+def curve(results: Results, family: str, adapter: str, quantity: Quantity) -> tuple[list[float], list[float]]:
+    """Median milliseconds and values of a method in a set at its budgets, from the fastest on.
+
+    Without the budgets than which another is both faster and more accurate, and those of which more than half of the
+    answers are none.
+    """
+    cases = results.swept(family, adapter)
+    found: tuple[list[float], list[float]] = [], []
+    for level in results.levels(family, adapter):
+        seconds, values = results.values(family, adapter, level, quantity, cases)
+        value, spent = middle(values), seconds[np.isfinite(seconds)]
+        if np.isfinite(value) and len(spent) and value < min(found[1], default=np.inf):
+            found[0].append(1e3 * middle(spent))
+            found[1].append(value)
+    return found
+
+
+def speed_accuracy(results: Results, family: str, title: str, adapters: Sequence[str], path: Path) -> tuple[Path, Path]:
+    """One panel a quantity: median error over median time at every budget of a method."""
+    what = "a frame" if results.moving(family) else "a solve"
+    panels = []
+    for quantity in results.quantities(family):
+        lines = {name: curve(results, family, name, quantity) for name in adapters}
+        heading = f"{title}: {quantity.title}"
+        panels.append(Panel(heading, f"time of {what} [ms]", quantity.label, lines, "xy", "o", [COARSE]))
+    return chart(panels, path)
+
+
+def overview(
+    rows: Sequence[Summary], titles: Mapping[str, str], adapters: Sequence[str], path: Path
+) -> tuple[Path, Path]:
+    """One row a set: share solved and mean time of each method, with their intervals of 95 %."""
+    shown = {
+        title: {
+            row.method: (row.success.scaled(100.0), row.mean_ms)
+            for row in rows
+            if row.set == family and row.method in adapters and row.refused < row.cases
+        }
+        for family, title in titles.items()
+    }
+    note = "failures as the longest"
+    heading = "Every set: solved, and how fast; bands are intervals of 95 %"
+    return plot_style.shares_and_times(shown, {name: method_style(name) for name in adapters}, note, heading, path)
+
+
+def chart_name(family: str, number: int = 0) -> str:
+    """Name of the chart of a set for a group of methods; the first group has no number."""
+    return f"compare-{family.replace('_', '-')}{f'-{number + 1}' if number else ''}"
+
+
+def groups(adapters: Sequence[str]) -> list[tuple[str, ...]]:
+    """Methods as they stand together in charts: at most `MOST`, first one of each algorithm, then the others.
+
+    Our default stands in every group, to compare with.
+    """
+    kinds: dict[str, str] = {}
+    for name in adapters:
+        kinds.setdefault(re.split(r"[/,+ ]", name)[0], name)
+    order = [*kinds.values(), *(name for name in adapters if name not in kinds.values())]
+    if len(order) <= MOST:
+        return [tuple(order)] if order else []
+    base = [OURS] if OURS in order else []
+    others = [name for name in order if name not in base]
+    size = MOST - len(base)
+    return [tuple(base + others[first : first + size]) for first in range(0, len(others), size)]
+
+
+def draw_all(
+    results: Results, rows: Sequence[Summary], titles: Mapping[str, str], folder: Path
+) -> dict[str, tuple[Path, Path]]:
+    """All charts of a comparison, by name; `titles` are those of the sets by their names."""
+    drawn = {}
+    for number, adapters in enumerate(groups(results.adapters)):
+        name = chart_name("overview", number)
+        drawn[name] = overview(rows, titles, adapters, folder / name)
+        for family, title in titles.items():
+            name = chart_name(family, number)
+            drawn[name] = speed_accuracy(results, family, title, adapters, folder / name)
+    return drawn
+
 
 PAGE = "report.html"
 
@@ -55,22 +144,22 @@ def publish(
 
 
 def _to_docs(given: Material, charts: Mapping[str, Path], docs: Path) -> None:
-    """Write the report below a heading of the page of results, with its charts and its lock file beside."""
-    text = re.sub(r"(?m)^#", "##", as_markdown(given, "assets/bench"))
-    replace_section(docs / "results.md", "compare", text)
+    """Write the short report into the page of results, with its charts and its lock file beside."""
+    replace_section(docs / "results.md", "compare", as_markdown(given, "assets/bench", "compare_page.md"))
     assets = docs / "assets" / "bench"
     write_lock(assets / f"compare-{LOCK}", locked(given))
     for svg in charts.values():
         shutil.copyfile(svg, assets / svg.name)
 
 
-def as_markdown(given: Material, charts: str) -> str:
-    """The report as Markdown; `charts` is the folder of the charts."""
-    results = given.results
+def as_markdown(given: Material, charts: str, template: str = "compare.md") -> str:
+    """The report as Markdown; `charts` is the folder of the charts, "compare_page.md" the template of the docs."""
+    results, ranked = given.results, standings(given.results, given.rows)
+    kinds = {re.split(r"[/,+ ]", one.method)[0]: one.method for one in reversed(ranked)}
     return render(
-        "compare.md",
+        template, kinds=list(kinds.values())[::-1], cells={(row.set, row.method): row for row in given.rows},
         given=given, charts=charts, advice=advice(results, given.rows), picked=choices(results, given.rows),
-        ranked=standings(results, given.rows), reference=reference(results), named=named, chart=chart_name,
+        ranked=ranked, reference=reference(results), named=named, chart=chart_name,
         groups=groups(results.adapters), counts=[row.cases for row in given.rows],
         left_out=left_out(given.settings, given.chunks, given.rows), kernel=kernel_of(given.chunks),
         good=GOOD, coarse=COARSE, floor=FLOOR, tolerance=DEFAULT[0],

@@ -122,9 +122,6 @@ def frame_cap(cap: float, frames: float) -> float:
     return max(cap / frames, 0.1)
 
 
-EFFORT_FLOOR = 1e-5  # share of the best effort below which efforts are not told apart
-
-
 @dataclass(frozen=True)
 class Quantity:
     """What is charted against time.
@@ -132,13 +129,11 @@ class Quantity:
     Attributes:
         title: over a chart.
         label: of its axis.
-        floor: below which values are not told apart.
         of: its value from a record and the best known measure of the case; infinite for a failure.
     """
 
     title: str
     label: str
-    floor: float
     of: Callable[[Record, float], float]
 
 
@@ -146,11 +141,11 @@ def effort_excess(record: Record, best: float) -> float:
     """Effort above the best known, as a share of it; infinite for an answer that does not solve the problem."""
     if not record.success(COARSE) or best < 1e-9 or best == inf:  # nothing is a share of no effort
         return inf
-    return max(record.measure / best - 1.0, EFFORT_FLOOR)
+    return max(record.measure / best - 1.0, 1e-5)  # smaller ones are not told apart
 
 
-WORST = Quantity("worst of all", "worst error [m, rad]", FLOOR, lambda record, best: record.worst)
-EFFORT = Quantity("effort", "effort above the best known [share]", EFFORT_FLOOR, effort_excess)
+WORST = Quantity("worst of all", "worst error [m, rad]", lambda record, best: record.worst)
+EFFORT = Quantity("effort", "effort above the best known [share]", effort_excess)
 
 
 class Results:

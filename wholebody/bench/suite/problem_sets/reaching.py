@@ -1,4 +1,4 @@
-"""Reaches of a fingertip, or of both hands and the eyes: nothing around but the floor, or many things.
+"""Reaches of a fingertip, or of both hands and the eyes: alone, among things, through a passage, along a curve.
 
 The last three sets have other witnesses, other people and other things: no constant was tuned on them. What is solved
 of the one and not of the other is a matter of the distribution, not of the question.
@@ -9,14 +9,17 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+import pinocchio as pin
 
 import wholebody as wb
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.bodies import (
     FEET,
     ROOM,
     TIPS,
     alone,
+    bent,
     fitted,
     floor_scene,
     human,
@@ -24,10 +27,11 @@ from wholebody.bench.suite.problem_sets.bodies import (
     movable,
     point,
     sampled_posture,
+    shaken,
     standing_problem,
     until_found,
 )
-from wholebody.bench.suite.problem_sets.case import numbers
+from wholebody.bench.suite.problem_sets.case import Posed, numbers
 from wholebody.bench.suite.problem_sets.things import Occupied, add_things
 
 
@@ -129,3 +133,119 @@ def _other_thing(number: int, rng: np.random.Generator) -> tuple[str, wb.Shape]:
         a, b, c = rng.uniform(0.03, 0.25, 3)
         return kind, wb.Ellipsoid((float(a), float(b), float(c)))
     return kind, wb.Hull(rng.uniform(-1.0, 1.0, (20, 3)) * (*rng.uniform(0.1, 0.3, 2), rng.uniform(0.01, 0.03)))
+
+
+of_passage = numbers("passage")
+
+
+def passage(number: int, rng: np.random.Generator) -> tuple[wb.Problem, Array]:
+    """In turn a window and two boards; left and right in turn of two."""
+    figure, side = human(), ("left", "right")[number // 2 % 2]
+    start = figure.posture("standing")
+    begin = bent(figure, start, vars(of_passage.begin_degrees), [side])
+    standing = Occupied(figure, (start,))
+
+    def attempt() -> tuple[Array, list[tuple[wb.Box, pin.SE3]]] | None:
+        wrist = _wrist(side, rng)
+        boards = _boards(number % 2, wrist, rng)
+        goal = wb.Frame(f"{side}_hand", wrist).resolve(alone(figure), start)
+        witness = fitted(figure, shaken(figure, begin, of_passage.spread, rng), [goal], figure.dofs("upper_body"))
+        if witness is None or not is_free(alone(figure), witness):
+            return None
+        taken = standing, Occupied(figure, (witness,))
+        clear = all(body.clear_of(board, at, ROOM) for body in taken for board, at in boards)
+        return (witness, boards) if clear else None
+
+    witness, boards = until_found(attempt)
+    scene = floor_scene(figure)
+    for count, (board, at) in enumerate(boards):
+        scene.add(board, name=f"board {count}", at=at)
+    return standing_problem(scene, start, [point(figure, witness, f"{side}_index_tip")]), witness
+
+
+def _wrist(side: str, rng: np.random.Generator) -> pin.SE3:
+    """Where the hand segment is when it is through: its -z is the way, its x the breadth, its y the thickness."""
+    out = 1.0 if side == "left" else -1.0
+    place = rng.uniform(*of_passage.place_m) * (1.0, out, 1.0)
+    turn, rise = (
+        rng.uniform(-of_passage.turn_rad, of_passage.turn_rad),
+        rng.uniform(-of_passage.rise_rad, of_passage.rise_rad),
+    )
+    way = np.array((np.cos(rise) * np.cos(turn), np.cos(rise) * np.sin(turn), np.sin(rise)))
+    level = np.cross((0.0, 0.0, 1.0), way)
+    level /= np.linalg.norm(level)
+    upright = np.column_stack([np.cross(way, level), level, -way])
+    roll = out * rng.uniform(-0.3, of_passage.roll_rad)
+    return pin.SE3(upright @ pin.exp3(np.array((0.0, 0.0, roll))), place)
+
+
+def _boards(kind: int, wrist: pin.SE3, rng: np.random.Generator) -> list[tuple[wb.Box, pin.SE3]]:
+    """Four boards around a window, or two on both sides of a slot, where the hand and the forearm go through."""
+    narrow, broad = of_passage.gap_m
+    half = np.array(of_passage.half_m) + rng.uniform(narrow, broad, 2)
+    past, wide, thick = float(rng.uniform(*of_passage.past_wrist_m)), of_passage.wide_m, of_passage.thick_m
+    if kind == 1:
+        deep = float(rng.uniform(*of_passage.deep_m))
+        across, along = 2.0 * (half[0] + wide), past + 0.5 * deep - 0.1
+        middles = [(0.0, sign * (half[1] + 0.5 * thick), -along) for sign in (-1.0, 1.0)]
+        return [(wb.Box((across, thick, deep)), wrist * _at(middle)) for middle in middles]
+    boards = []
+    for sign in (-1.0, 1.0):
+        boards.append((wb.Box((wide, 2.0 * (half[1] + wide), thick)), (sign * (half[0] + 0.5 * wide), 0.0, -past)))
+        boards.append((wb.Box((2.0 * half[0], wide, thick)), (0.0, sign * (half[1] + 0.5 * wide), -past)))
+    return [(board, wrist * _at(middle)) for board, middle in boards]
+
+
+def _at(middle: tuple[float, float, float]) -> pin.SE3:
+    return pin.SE3(np.eye(3), np.array(middle))
+
+
+of_drag = numbers("drag")
+
+
+def drag(number: int, rng: np.random.Generator) -> Posed:
+    """The goals are where the fingertip is in each posture of `way`; the first is where it is at the start."""
+    figure, tip = human(), TIPS[number % len(TIPS)]
+    postures = way(figure, rng)
+    scene = floor_scene(figure)
+    add_things(scene, of_drag.things, Occupied(figure, postures), ROOM, rng)
+    goals = [point(figure, q, tip) for q in postures]
+    moving = tuple((goal,) for goal in goals[1:])
+    return standing_problem(scene, postures[0], goals[:1]), postures[0], moving, tuple(postures[1:])
+
+
+def way(figure: wb.Figure, rng: np.random.Generator) -> Array:
+    """Postures (frames + 1, nq) of a smooth motion from standing, at rest at both ends, each one free.
+
+    A uniform cubic B-spline (de Boor 1978, "A Practical Guide to Splines") whose control postures are random. It stays
+    within their convex hull, so within the limits; a span depends on four of them, so a new one is tried until the span
+    that it ends is free.
+
+    Raises:
+        InputError: none was found.
+    """
+    standing = figure.posture("standing")
+    spans = int(rng.integers(of_drag.spans[0], of_drag.spans[1] + 1))
+    for _ in range(50):
+        control, frames = [standing] * 3, [standing[None]]
+        while len(frames) <= spans:
+            resting = len(frames) > spans - of_drag.spans_to_rest
+            for _ in range(1 if resting else 40):
+                point = control[-1] if resting else shaken(figure, control[-1], of_drag.stride, rng)
+                span = _span(np.array([*control[-3:], point]))
+                if all(is_free(alone(figure), q) for q in span):
+                    control.append(point)
+                    frames.append(span)
+                    break
+            else:
+                break
+        else:
+            return np.vstack(frames)
+    raise InputError("none of 50 ways is free; give another seed")
+
+
+def _span(control: Array) -> Array:
+    """Postures (frames, nq) of the span between the second and the third of four control postures (4, nq)."""
+    t = np.arange(1, of_drag.frames_a_span + 1)[:, None] / of_drag.frames_a_span
+    weights = np.hstack([(1.0 - t) ** 3, 3.0 * t**3 - 6.0 * t**2 + 4.0, -3.0 * t**3 + 3.0 * t**2 + 3.0 * t + 1.0, t**3])
+    return np.asarray(weights @ control / 6.0)

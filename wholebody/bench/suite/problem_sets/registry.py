@@ -6,17 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from wholebody.base.errors import UnknownNameError
-from wholebody.bench.suite.problem_sets import (
-    balance,
-    closed_loop,
-    drag,
-    drivers,
-    passage,
-    reaching,
-    robot_arm,
-    robots,
-    self_contact,
-)
+from wholebody.bench.suite.problem_sets import balance, drivers, hands, reaching, robots
 from wholebody.bench.suite.problem_sets.case import Pose, ProblemSet, numbers
 
 
@@ -33,12 +23,12 @@ SETS = _sets(
         "free_reach": reaching.free,
         "free_reach_several": reaching.several,
         "clutter": reaching.among,
-        "self_contact": self_contact.posed,
+        "self_contact": hands.self_contact,
         "balance": balance.posed,
-        "closed_loop": closed_loop.posed,
-        "passage": passage.posed,
-        "drag": drag.posed,
-        "robot_arm": robot_arm.posed,
+        "closed_loop": hands.closed_loop,
+        "passage": reaching.passage,
+        "drag": reaching.drag,
+        "robot_arm": robots.arms,
     }
 )
 """By name, as they are listed in reports."""
@@ -48,7 +38,7 @@ NAMED = _sets(
         "uniform_witnesses": reaching.uniform,
         "other_people": reaching.people,
         "other_clutter": reaching.clutter,
-        "robots": robots.posed,
+        "robots": robots.described,
         "drivers": drivers.posed,
     }
 )

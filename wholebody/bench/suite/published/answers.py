@@ -13,14 +13,10 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError
-from wholebody.bench.suite.published.reading import VERSION, loaded, read_index
-from wholebody.bench.suite.published.rebuilt import UNIT, Rebuilt
+from wholebody.bench.suite.published.rebuilt import VERSION, Rebuilt, loaded, read_index
 
 Seed = Literal["near", "far"]
 SEEDS: tuple[Seed, ...] = ("near", "far")
-KEYS = {"format", "version", "method", "about", "machine", "kernel_seconds", "answers"}
-ANSWER_KEYS = {"problem", "seed", "posture", "postures", "seconds", "refused"}
-LONGEST = 200  # characters of a method's name
 
 
 @dataclass(frozen=True)
@@ -71,7 +67,8 @@ def read_answers(path: Path, folder: Path) -> Answers:
     content = loaded(path, "file of answers")
     if not isinstance(content, dict):
         raise FileFormatError(f"{path}: holds {_kind(content)}, not an object with method and answers")
-    _check_keys(content, KEYS, f"{path}")
+    keys = {"format", "version", "method", "about", "machine", "kernel_seconds", "answers"}
+    _check_keys(content, keys, f"{path}")
     for key, wanted in (("format", "wholebody answers"), ("version", VERSION)):
         if content.get(key) != wanted:
             raise FileFormatError(f'{path}: {key} is {shown(content.get(key))}; write "{key}": "{wanted}"')
@@ -81,8 +78,8 @@ def read_answers(path: Path, folder: Path) -> Answers:
     if not listed:
         raise FileFormatError(f"{path}: answers is empty; give an object for each problem, or refuse it with a reason")
     texts = {key: _text(content, key, str(path)) for key in ("method", "about", "machine")}
-    if not texts["method"].strip() or len(texts["method"]) > LONGEST:
-        raise FileFormatError(f"{path}: method has no name, or one of more than {LONGEST} letters; name your solver")
+    if not 0 < len(texts["method"].strip()) <= 200:
+        raise FileFormatError(f"{path}: method has no name, or one of more than 200 letters; name your solver")
     reader = _Reader(path, folder, known)
     return Answers(
         **texts,
@@ -99,7 +96,7 @@ class _Reader:
     def read(self, item: Any, where: str) -> Answer:
         if not isinstance(item, dict):
             raise FileFormatError(f"{where} is {_kind(item)}; give an object with problem and posture")
-        _check_keys(item, ANSWER_KEYS, where)
+        _check_keys(item, {"problem", "seed", "posture", "postures", "seconds", "refused"}, where)
         name, seed = item.get("problem"), item.get("seed", "near")
         if not isinstance(name, str):
             raise FileFormatError(f"{where}.problem is {shown(name)}; give a name such as 'clutter/0007'")
@@ -147,7 +144,7 @@ def _posture(row: Any, problem: Rebuilt, where: str) -> Array:
     q = np.array(row, dtype=float)
     if problem.free:
         length = float(np.linalg.norm(q[3:7]))
-        if abs(length - 1.0) > UNIT:
+        if abs(length - 1.0) > 1e-6:
             raise FileFormatError(
                 f"{where}: the root's quaternion (numbers 3 to 6: x, y, z, w) has length {length:.6g}; normalise it"
             )

@@ -18,7 +18,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.published.reading import VERSION
+from wholebody.bench.suite.published.rebuilt import VERSION
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
 
@@ -64,10 +64,6 @@ def _obj(convex: Any) -> str:
     return "\n".join(lines) + "\n"
 
 
-ROOT = ("root x", "root y", "root z", "root qx", "root qy", "root qz", "root qw")
-NO_LIMIT = 1e6  # rad, m: beyond which a limit is none
-
-
 @dataclass(frozen=True)
 class BodyFiles:
     """A body, written.
@@ -109,13 +105,14 @@ def body_files(figure: Figure, name: str, meshes: Meshes) -> BodyFiles:
     known = figure.limits
     limits = {int(k): (float(a), float(b)) for k, a, b in zip(known.idx_q, known.lower, known.upper, strict=True)}
     bounds = {joint: limits[place[joint].idx_q] for joint in joints if place[joint].idx_q in limits}
+    root = [f"root {name}" for name in ("x", "y", "z", "qx", "qy", "qz", "qw")] if figure.root == "free" else []
     content = {
         "format": "wholebody body",
         "version": VERSION,
         "name": name,
         "urdf": f"bodies/{name}.urdf",
         "root": figure.root,
-        "coordinates": [*(ROOT if figure.root == "free" else ()), *joints],
+        "coordinates": [*root, *joints],
         "limits": {joint: list(ends) for joint, ends in bounds.items()},
         "effort_weights": {joint: float(figure.effort_weights[place[joint].idx_v]) for joint in joints},
         "root_effort_weights": [float(weight) for weight in figure.effort_weights[: 6 if figure.root == "free" else 0]],
@@ -181,9 +178,10 @@ def _joint(model: pin.Model, joint: int, links: tuple[str, ...]) -> list[str]:
             "are published"
         )
     low, high = float(model.lowerPositionLimit[at]), float(model.upperPositionLimit[at])
-    if not max(abs(low), abs(high)) < NO_LIMIT:
+    most = 1e6  # rad, m: beyond which a limit is none
+    if not max(abs(low), abs(high)) < most:
         raise InputError(f"joint {model.names[joint]!r} has no limits; give it limits to publish it")
-    speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), NO_LIMIT)
+    speed = min(float(model.velocityLimit[model.joints[joint].idx_v]), most)
     return [
         f'  <joint name={quoteattr(model.names[joint])} type="{known.kind}">',
         f"    <parent link={quoteattr(links[model.parents[joint]])}/><child link={quoteattr(links[joint])}/>",

@@ -28,14 +28,17 @@ from wholebody.bench.suite.published.problems import (
     problem_name,
     witness_content,
 )
-from wholebody.bench.suite.published.reading import INDEX, VERSION, dumped
-from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, read_body, worst_of
-
-STATIC = Path(__file__).parent / "static"
-NAMES = ("problem", "body", "answers", "verdict")
-"""Schemas that are published: `NAME.schema.json`."""
-
-DIGITS = 9  # of efforts and distances: what is left of the last digits is rounding
+from wholebody.bench.suite.published.rebuilt import (
+    EXACT,
+    INDEX,
+    SOLVED,
+    VERSION,
+    Rebuilt,
+    Score,
+    dumped,
+    read_body,
+    worst_of,
+)
 
 
 @dataclass
@@ -80,10 +83,9 @@ def export(
     described: dict[str, Any] = {}
     for family in sets:
         described[family.name] = _written_set(done, family, per_set, seed, say)
-    for name in NAMES:
-        done.write(f"{name}.schema.json", read_text(STATIC / f"{name}.schema.json"))
-    for name, source in (("LICENSE", "LICENSE.txt"), ("README.md", "README.txt")):
-        done.write(name, read_text(STATIC / source))
+    schemas = {f"{name}.schema.json": f"{name}.schema.json" for name in ("problem", "body", "answers", "verdict")}
+    for name, source in {**schemas, "LICENSE": "LICENSE.txt", "README.md": "README.txt"}.items():
+        done.write(name, read_text(Path(__file__).parent / "static" / source))
     for path in client_paths():
         done.write(f"clients/{path.name}", read_text(path))
     index = {
@@ -200,7 +202,7 @@ def _of_set(measured: Mapping[str, Any]) -> dict[str, Any]:
 
 def _rounded(value: Any) -> Any:
     if isinstance(value, float):
-        return float(f"{value:.{DIGITS}g}")
+        return float(f"{value:.9g}")  # what is left of the last digits is rounding
     return {name: _rounded(item) for name, item in value.items()} if isinstance(value, dict) else value
 
 

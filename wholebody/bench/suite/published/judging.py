@@ -12,8 +12,16 @@ from typing import Any
 from wholebody.bench.report import formatted, spanned, words
 from wholebody.bench.statistics import Interval, median, share, shifted_geometric_mean
 from wholebody.bench.suite.published.answers import SEEDS, Answer, Answers
-from wholebody.bench.suite.published.reading import VERSION, read_index, read_json
-from wholebody.bench.suite.published.rebuilt import EXACT, SOLVED, Rebuilt, Score, worst_of
+from wholebody.bench.suite.published.rebuilt import (
+    EXACT,
+    SOLVED,
+    VERSION,
+    Rebuilt,
+    Score,
+    read_index,
+    read_json,
+    worst_of,
+)
 from wholebody.bench.tables import flat
 
 TIMEOUT = 10.0  # s: that a failure counts with in a mean time
@@ -203,11 +211,6 @@ def _plain(value: Any) -> Any:
     return [_plain(item) for item in value] if isinstance(value, Iterable) and not isinstance(value, str) else value
 
 
-CRITERIA = {
-    "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
-    "limits": "joint limits", "holds": "holds and balance",
-}  # fmt: skip
-
 COLUMNS = (
     "problems", "seed", "asked", "refused", "unanswered", "solved %", "to 1e-4 %", "worst error", "overlap mm",
     "effort above best %", "median ms", "mean ms",
@@ -261,4 +264,8 @@ def left_out(verdict: Verdict) -> list[str]:
 
 def _worst(score: Score) -> str:
     """What an answer misses most, in words."""
-    return CRITERIA[max(CRITERIA, key=lambda name: float(getattr(score, name)))]
+    criteria = {
+        "goal_error": "goals (m)", "goal_angle": "goals (rad)", "overlap": "overlap", "clearance": "clearance",
+        "limits": "joint limits", "holds": "holds and balance",
+    }  # fmt: skip
+    return criteria[max(criteria, key=lambda name: float(getattr(score, name)))]

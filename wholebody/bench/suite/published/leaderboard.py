@@ -13,7 +13,7 @@ from wholebody.base.errors import InputError
 from wholebody.base.files import is_folder
 from wholebody.base.records import with_values
 from wholebody.bench import plot_style
-from wholebody.bench.plot_style import Style, method_style
+from wholebody.bench.plot_style import MOST, Style, method_style
 from wholebody.bench.report import page, render, spanned, words
 from wholebody.bench.statistics import ratio
 from wholebody.bench.suite.published.answers import read_answers
@@ -27,12 +27,10 @@ from wholebody.bench.suite.published.judging import (
     left_out,
     set_score,
 )
-from wholebody.bench.suite.published.reading import read_index
-from wholebody.bench.suite.published.rebuilt import EXACT
+from wholebody.bench.suite.published.rebuilt import EXACT, read_index
 from wholebody.bench.tables import write_text
 
 PAGE = "leaderboard.html"
-MOST = 6  # methods in a chart
 
 
 @dataclass(frozen=True)
@@ -198,7 +196,7 @@ def styles(names: Sequence[str]) -> dict[str, Style]:
     for name in names:
         style = method_style(name)
         taken = {other.color for other in found.values()}
-        free = (other for other in plot_style.OTHERS if other not in taken)
+        free = (other for other in plot_style.STYLE["others"]["all"] if other not in taken)
         found[name] = style if style.color not in taken else with_values(style, color=next(free, style.color))
     return found
 

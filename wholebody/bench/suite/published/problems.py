@@ -14,7 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.problem_sets.bodies import Held, fitted, held
 from wholebody.bench.suite.problem_sets.case import Case
 from wholebody.bench.suite.published.bodies import BodyFiles, Meshes, described, pose_of
-from wholebody.bench.suite.published.reading import VERSION
+from wholebody.bench.suite.published.rebuilt import VERSION
 from wholebody.tasks.base import Goal
 
 

@@ -116,7 +116,6 @@ def _left(found: Assessment) -> float:
 
 
 ASKED = 1e-5  # m, rad: tolerance that methods are asked for; they are judged by the case's own
-CAP = 20.0  # s of the processor: a method that has not answered by then, or has not made its next frame, hangs
 
 
 @dataclass(frozen=True)
@@ -129,10 +128,10 @@ class Cell:
     judged: Judged
 
 
-def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = CAP) -> Iterator[Cell]:
+def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = 20.0) -> Iterator[Cell]:
     """Cases, each by a method, as they end, in `jobs` processes.
 
-    `cap` is seconds of the processor for an answer, or for a frame.
+    `cap` is seconds of the processor for an answer, or for a frame, after which a method hangs.
     """
     _warm()
     left = (Job((case, adapter.name), _cell, (case, adapter, cap), BY_THE_CLOCK * cap) for case, adapter in asked)
@@ -147,11 +146,12 @@ def run(asked: Iterable[tuple[HardCase, Adapter]], jobs: int = 1, cap: float = C
 
 def _warm() -> None:
     """Import and compile in this process what most cells need, so that no cell is timed with it."""
-    from wholebody.bench.suite.stability.streams import thin_plate
+    from wholebody.bench.suite.stability.catalogue import cases
     from wholebody.methods.qp.method import QP
 
     compile_all()
-    question = thin_plate()
+    (question,) = (case.question() for case in cases(["thin-plate"]))
+    assert isinstance(question, Stream)
     judged = QP().solve(question.problem)
     question.problem.scene.sweep(question.problem.start, judged.q)
 

@@ -13,15 +13,6 @@ from wholebody.figures.description import Articulated, Description
 from wholebody.figures.figure import Figure
 from wholebody.geometry.shapes import Shape
 
-JOINTS = {
-    "rx": pin.JointModelRX, "ry": pin.JointModelRY, "rz": pin.JointModelRZ,
-    "px": pin.JointModelPX, "py": pin.JointModelPY, "pz": pin.JointModelPZ,
-}  # fmt: skip
-"""Kind of joint and its axis: r turns, p slides."""
-
-TURN = 2.9  # rad: limit of a joint if nothing else is said
-SLIDE = 2.0  # m
-
 
 class Builder:
     """Builds a figure joint by joint."""
@@ -35,11 +26,15 @@ class Builder:
     def joint(
         self, kind: str, name: str, *, parent: int = 0, at: Any = (0.0, 0.0, 0.0), limits: Sequence[float] | None = None
     ) -> int:
-        """Add a joint and the segment that it carries, which has the joint's name; return its index."""
-        low, high = limits if limits is not None else (-TURN, TURN) if kind[0] == "r" else (-SLIDE, SLIDE)
+        """Add a joint and the segment that it carries, which has the joint's name; return its index.
+
+        The kind has the axis in it: "rx" turns about x, "px" slides along it.
+        """
+        most = 2.9 if kind[0] == "r" else 2.0  # rad, m: limit of a joint if nothing else is said
+        low, high = (-most, most) if limits is None else limits
         bounds = [np.array([value]) for value in (100.0, 10.0, low, high)]
         place = pin.SE3(np.eye(3), np.array(at, dtype=float))
-        index = int(self.model.addJoint(parent, JOINTS[kind](), place, name, *bounds))
+        index = int(self.model.addJoint(parent, getattr(pin, f"JointModel{kind.upper()}")(), place, name, *bounds))
         self.model.appendBodyToJoint(index, pin.Inertia.FromSphere(1.0, 0.1), pin.SE3.Identity())
         self.model.addFrame(pin.Frame(f"{name}_link", index, 0, pin.SE3.Identity(), pin.FrameType.BODY))
         self._segments.append(f"{name}_link")
@@ -145,6 +140,19 @@ def human_arm(*, clavicle: bool = True) -> Figure:
     return figure.reduced([name for name in joints if clavicle or "clavicle" not in name])
 
 
-def turned(axis: str, angle: float, at: Any = (0.0, 0.0, 0.0)) -> pin.SE3:
-    """A placement turned about an axis of the world [rad]."""
-    return pin.SE3(pin.utils.rotate(axis, angle), np.array(at, dtype=float))
+def star() -> Figure:
+    """A hub that slides and turns, with twelve arms of two joints; frames "tip1" to "tip12"."""
+    builder = Builder("star of twelve arms")
+    slide = builder.joint("px", "slide_x")
+    slide = builder.joint("pz", "slide_z", parent=slide)
+    hub = builder.joint("ry", "hub", parent=slide)
+    for k in range(12):
+        angle = 2.0 * np.pi * k / 12
+        rim = 0.15 * np.array([np.cos(angle), 0.0, -np.sin(angle)])
+        upper = builder.joint("ry", f"upper{k + 1}", parent=hub, at=rim)
+        builder.model.jointPlacements[upper] = pin.SE3(pin.utils.rotate("y", angle), rim)
+        builder.rod(upper, (0.2, 0.0, 0.0), 0.01)
+        lower = builder.joint("ry", f"lower{k + 1}", parent=upper, at=(0.2, 0.0, 0.0))
+        builder.rod(lower, (0.2, 0.0, 0.0), 0.01)
+        builder.frame(lower, f"tip{k + 1}", (0.2, 0.0, 0.0))
+    return builder.figure(pairs=False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
@@ -74,7 +74,6 @@ class Nonsense:
 
 
 Question = Posed | Stream | Nonsense
-_Ask = TypeVar("_Ask", bound=Callable[[], Question])
 
 
 @dataclass(frozen=True)
@@ -117,25 +116,6 @@ class HardCase:
             miss: by how much its goal error is above that of the best known answer [m, rad].
         """
         return kind in self.also or (kind == self.expected and (kind != "honest" or miss <= self.near))
-
-
-QUESTIONS: dict[str, Callable[[], Question]] = {}
-"""What each case asks, by its name."""
-
-
-def asks(name: str) -> Callable[[_Ask], _Ask]:
-    """Make the decorated function the question of a case; `cases.toml` has all else of it."""
-
-    def kept(question: _Ask) -> _Ask:
-        QUESTIONS[name] = question
-        return question
-
-    return kept
-
-
-def still(target: tuple[float, float, float], count: int) -> tuple[Frame, ...]:
-    """As many frames in which nothing moves."""
-    return (Frame(target),) * count
 
 
 @dataclass(frozen=True)

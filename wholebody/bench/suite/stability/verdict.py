@@ -14,7 +14,6 @@ from typing import Any, NamedTuple
 from wholebody.bench import plot_style
 from wholebody.bench.report import render
 from wholebody.bench.rows import Figure, Row
-from wholebody.bench.suite.adapters.base import Adapter
 from wholebody.bench.suite.stability.asking import INSIDE, Cell, Judged
 from wholebody.bench.suite.stability.case import Answer, HardCase, Kind
 
@@ -161,13 +160,13 @@ class Result:
         found = [(method, case, self.verdicts[case.name, method]) for method in self.methods for case in self.cases]
         return [one for one in found if one[2].kind == kind]
 
-    def alike(self, case: HardCase) -> list[tuple[str, list[str]]]:
-        """The verdicts on a case in words, and the methods that have each, in the order in which they were asked."""
+    def short_of_best(self, case: HardCase) -> list[tuple[str, list[str]]]:
+        """Answers to a case that neither solve it nor are as good as can be: signs with figures, and their methods."""
         found: dict[str, list[str]] = {}
         for method in self.methods:
             verdict = self.verdicts[case.name, method]
-            words = f"{verdict.symbol} {WORDS[verdict.kind]}" + (f": {verdict.figure}" if verdict.figure else "")
-            found.setdefault(words, []).append(method)
+            if verdict.symbol not in ("✓", "●"):
+                found.setdefault(f"{verdict.symbol} {verdict.figure}".strip(), []).append(method)
         return list(found.items())
 
 
@@ -214,9 +213,6 @@ def _known(cells: Iterable[Cell]) -> dict[str, float]:
     return found
 
 
-METHODS = ("qp", "qp/osqp", "newton/slack", "newton/barrier", "ccd", "dls", "placo", "pink", "mink")
-"""One or two of each algorithm, for a chart that can be read; others are asked by name."""
-
 COLORS = {
     "✓": ("#8fd0b5", "solved"),
     "●": ("#f6ec9c", "honest, as good as can be"),
@@ -227,9 +223,9 @@ COLORS = {
 """Told apart by people with any colour vision, and by their signs in print."""
 
 
-def report(result: Result, adapters: Sequence[Adapter], facts: Mapping[str, str]) -> str:
-    """The counts, the cases by methods, every case in words, and every wrong answer."""
-    return render("stability.md", result=result, kinds=WORDS, adapters=adapters, facts=facts)
+def report(result: Result, facts: Mapping[str, str]) -> str:
+    """The counts, and every case in words with the answers that fall short."""
+    return render("stability.md", result=result, kinds=WORDS, facts=facts)
 
 
 def matrix(result: Result, path: Path) -> tuple[Path, Path]:

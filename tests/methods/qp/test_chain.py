@@ -1,0 +1,306 @@
+"""Compiled descents of plain chains against Pinocchio, the textbook method and scipy, and when an end is taken."""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.optimize import minimize
+
+import wholebody as wb
+from wholebody.bench.suite.stability.bodies import spatial_arm
+from wholebody.figures.description import Limits
+from wholebody.figures.state import State
+from wholebody.methods.control import Control
+from wholebody.methods.damped_least_squares import DampedLeastSquares
+from wholebody.methods.qp.chain import Chains, PlainChain, compiled_kernel, from_seeds, goal_entries
+from wholebody.methods.qp.chain_kernel import Goals
+from wholebody.methods.qp.multistart import Budget
+from wholebody.tasks.base import Goal
+from wholebody.terms.entries import RESIDUAL, Entry
+
+START = np.array([-0.4, 0.5, 0.9, 0.0, 0.5, 0.0])
+
+
+@pytest.fixture(scope="module")
+def arm() -> wb.Figure:
+    return spatial_arm()
+
+
+def found(problem: wb.Problem, tolerance: float = 1e-6, *, measures: bool = False, progress=None):
+    budget = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
+    with problem.borrow() as workspace:
+        return from_seeds(problem, workspace, budget, Control(progress=progress))
+
+
+def whole_chain(model: pin.Model, limits: Limits) -> PlainChain:
+    return PlainChain(model, limits, tuple(range(1, model.njoints)))
+
+
+def place_of(figure: wb.Figure, q: np.ndarray, frame: str) -> pin.SE3:
+    return pin.SE3(State(figure.model).update(q).frame(figure.frame_id(frame)))
+
+
+def random_goal(figure: wb.Figure, frame: str, rng: np.random.Generator, turned: bool) -> Goal:
+    q = rng.uniform(figure.model.lowerPositionLimit, figure.model.upperPositionLimit)
+    place = place_of(figure, q, frame)
+    return wb.Frame(frame, place) if turned else wb.Point(frame, place.translation)
+
+
+def test_joints_are_where_pinocchio_has_them():
+    """Axes along and across the frames, slides and branches, each joint turned against the one before."""
+    model, rng = pin.Model(), np.random.default_rng(3)
+    oblique = np.array([1.0, 2.0, -1.0]) / 6**0.5
+    kinds = [
+        pin.JointModelRX(), pin.JointModelPZ(), pin.JointModelRevoluteUnaligned(oblique), pin.JointModelRY(),
+        pin.JointModelPrismaticUnaligned(oblique), pin.JointModelRZ(),
+    ]  # fmt: skip
+    for number, (kind, parent) in enumerate(zip(kinds, (0, 1, 2, 2, 4, 5), strict=True)):
+        turn = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+        place = pin.SE3(turn * np.sign(np.linalg.det(turn)), rng.normal(size=3))
+        model.addJoint(parent, kind, place, f"joint {number}")
+    chain = whole_chain(model, Limits(*np.zeros((2, 0), dtype=np.intp), *np.zeros((2, 0))))
+    state, room, goals = State(model), chain.room(0), Goals(np.zeros((0, 36)), np.zeros((0, 6), dtype=np.int64))
+    for _ in range(20):
+        q = rng.uniform(-3.0, 3.0, model.nq)
+        compiled_kernel().evaluate(chain.chain, goals, room, q)
+        state.update(q)
+        np.testing.assert_allclose(room.joints, state.joints, atol=1e-13)
+        np.testing.assert_allclose(room.columns, state.columns, atol=1e-13)
+
+
+def test_rows_of_goals_are_derivatives_of_their_errors(two_arms):
+    """By central differences of the errors that the goals themselves compute, one goal relative to the other arm."""
+    rng = np.random.default_rng(5)
+    start = rng.uniform(-1.0, 1.0, 7)
+    goals = [random_goal(two_arms, "left", rng, True), wb.Relative("right", "left", (0.1, 0.2, 0.3))]
+    problem = wb.Problem(wb.Scene(two_arms), start, goals=goals)
+    chain, kernel = whole_chain(two_arms.model, two_arms.limits), compiled_kernel()
+    entries = chain.goals(goal_entries(problem))
+    room = chain.room(12)
+    kernel.evaluate(chain.chain, entries, room, start)
+    kernel.rows_of(chain.chain, entries, room)
+    state = State(two_arms.model)
+
+    def errors(q):
+        state.update(q)
+        return np.concatenate([goal.error(state) for goal in problem.goals])
+
+    np.testing.assert_allclose(room.value, errors(start), atol=1e-12)
+    step = 1e-6
+    for joint, row in enumerate(np.eye(7) * step):
+        slope = (errors(start + row) - errors(start - row)) / (2.0 * step)
+        np.testing.assert_allclose(room.jacobian[:, joint], slope, atol=1e-6)
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_steps_are_those_of_the_textbook_method(arm, two_arms, turned):
+    """`DampedLeastSquares` is an array version of the same steps, with kinematics and rows by Pinocchio."""
+    rng, stopped = np.random.default_rng(7), 0
+    for number in range(20):
+        figure, frame = (arm, "tip") if number % 2 else (two_arms, "left")
+        start = rng.uniform(figure.model.lowerPositionLimit, figure.model.upperPositionLimit)
+        problem = wb.Problem(wb.Scene(figure), start, goals=[random_goal(figure, frame, rng, turned)])
+        entries = goal_entries(problem)
+        chain = Chains(figure.model, figure.limits).of(frozenset(entry.integers[0] for entry in entries))
+        values = chain.angles(start)
+        for most in (1, 2, 3):
+            seeds, ends, asked = values[None].copy(), np.empty((1, 4)), np.array([1e-12, 1e-6, most, 1.0])
+            compiled_kernel().reach(
+                chain.chain, chain.goals(entries), chain.room(6 if turned else 3), seeds,
+                np.array([values, np.zeros(len(values))]), asked, ends,
+            )  # fmt: skip
+            q = chain.posture(seeds[0], start)
+            textbook = DampedLeastSquares(iterations=most, tolerance=1e-9).solve(problem)
+            if ends[0, 0] == pytest.approx(max(textbook.assessment.goal_errors), rel=1.0):
+                stopped += bool(np.isin(q, (*figure.limits.lower, *figure.limits.upper)).any())
+                np.testing.assert_allclose(q, textbook.q, atol=1e-9)
+    assert stopped > 0, "some steps end at limits"
+
+
+def test_what_is_found_is_at_the_goal_to_rounding(arm):
+    rng, count = np.random.default_rng(11), 0
+    for _ in range(40):
+        goal = random_goal(arm, "tip", rng, True)
+        met = found(wb.Problem(wb.Scene(arm), START, goals=[goal]))
+        if met is not None:
+            count += 1
+            off = pin.log6(place_of(arm, met.q, "tip").actInv(pin.SE3(goal.target))).vector
+            assert np.abs(off).max() < 1e-9
+            assert (arm.limits.lower <= met.q).all()
+            assert (met.q <= arm.limits.upper).all()
+            assert met.trace[-1].goal_error < 1e-9
+    assert count > 20
+
+
+def blocked_by_a_ball(arm, radius=0.03):
+    """A problem whose answer of least effort has a ball in its forearm; that answer is found without the ball."""
+    goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
+    met = found(wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", goal)]), measures=True)
+    assert met is not None
+    middle = np.array(State(arm.model).update(met.q).data.oMi[4].translation)
+    scene = wb.Scene(arm).add(wb.Sphere(radius), name="ball", at=middle)
+    return wb.Problem(scene, START, goals=[wb.Point("tip", goal)]), met
+
+
+def test_an_end_inside_of_something_is_rejected(arm):
+    """Without measures another end is the answer; with them the search begins at the rejected one too."""
+    problem, _ = blocked_by_a_ball(arm)
+    met = found(problem)
+    assert wb.assess(problem, met.q).met(1e-6)
+    assert wb.assess(problem, met.q).holds(1e-6)
+    measured = found(problem, measures=True)
+    if measured.blocked is not None:
+        assert wb.assess(problem, measured.blocked).penetration > 1e-4
+    solution = wb.QP().solve(problem)
+    assert solution.solved, solution.message
+    assert solution.assessment.penetration < 1e-5
+    assert solution.assessment.measure <= wb.assess(problem, measured.q).measure + 1e-6
+
+
+def test_a_clearance_that_is_missed_counts_as_something_in_the_way(arm):
+    goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
+    scene = wb.Scene(arm).add(wb.Sphere(0.02), name="ball", at=tuple(goal + (0.0, 0.0, 0.15)))
+    for clearance in (0.0, 0.03, 0.06):
+        problem = wb.Problem(scene, START, goals=[wb.Point("tip", goal)], clearance=clearance)
+        assert wb.assess(problem, found(problem).q).clearance_violation == 0.0
+
+
+def test_goals_out_of_reach_are_left_to_the_search(arm):
+    problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", (3.0, 0.0, 0.5))])
+    assert found(problem) is None
+    assert wb.QP().solve(problem).status == "unreachable"
+
+
+def test_what_it_does_not_know_it_does_not_take(arm):
+    class Own(wb.Point):
+        """A goal of one's own."""
+
+    point, scene = wb.Point("tip", (0.4, 0.2, 0.6)), wb.Scene(arm)
+    stated = {
+        "a point": (True, wb.Problem(scene, START, goals=[point])),
+        "two goals": (True, wb.Problem(scene, START, goals=[point, wb.Orientation("tip", np.eye(3))])),
+        "no goals": (False, wb.Problem(scene, START)),
+        "an axis": (False, wb.Problem(scene, START, goals=[point, wb.Axis("tip", (0, 0, 1), toward=(1.0, 0.0, 0.0))])),
+        "a frozen joint": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Freeze("base")])),
+        "a plane": (False, wb.Problem(scene, START, goals=[point], constraints=[wb.Plane("tip", normal=(0, 0, 1))])),
+        "a goal of one's own": (False, wb.Problem(scene, START, goals=[Own("tip", (0.4, 0.2, 0.6))])),
+    }
+    for what, (known, problem) in stated.items():
+        assert (goal_entries(problem) is not None) == known, what
+    avatar = wb.load("avatar")
+    free_root = wb.Problem(wb.Scene(avatar), goals=[wb.Point("right_palm", (0.4, -0.2, 1.0))], range_of_motion=False)
+    assert found(free_root) is None
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_the_effort_is_as_little_as_scipy_finds_from_many_starts(arm, turned):
+    """The posture is stationary too; more starts for the measure find the best of all."""
+    rng, state = np.random.default_rng(23), State(arm.model)
+    lower, upper = arm.model.lowerPositionLimit, arm.model.upperPositionLimit
+    for _ in range(4):
+        problem = wb.Problem(wb.Scene(arm), START, goals=[random_goal(arm, "tip", rng, turned)])
+        weights, errors = problem.measures[0].distance.weights, problem.goals[0].error
+        least = np.inf
+        for start in [START, *rng.uniform(lower, upper, (12, len(lower)))]:
+            answer = minimize(
+                lambda q, w: float(w @ (q - START) ** 2), start, (weights,), jac=lambda q, w: 2.0 * w * (q - START),
+                bounds=list(zip(lower, upper, strict=True)), method="SLSQP", options={"ftol": 1e-12},
+                constraints={"type": "eq", "fun": lambda q, e=errors: e(state.update(q))},
+            )  # fmt: skip
+            judged = wb.assess(problem, np.clip(answer.x, lower, upper))
+            if judged.met(1e-5) and judged.holds(1e-5):
+                least = min(least, judged.measure)
+        solution = wb.QP(restarts_for_measure=3).solve(problem)
+        assert solution.assessment.measure <= 1.001 * least
+        assert solution.assessment.optimality < 1e-4
+
+
+def test_wide_joints_end_the_shorter_way_round():
+    """A joint with two turns of range goes to the place that is nearer to where it begins."""
+    model = pin.Model()
+    for number, axis in enumerate((pin.JointModelRZ(), pin.JointModelRY(), pin.JointModelRY())):
+        place = pin.SE3(np.eye(3), np.array([0.0, 0.0, 0.3 if number else 0.1]))
+        model.addJoint(number, axis, place, f"joint {number}")
+    limits = Limits(np.arange(3), np.arange(3), np.full(3, -2.0 * np.pi), np.full(3, 2.0 * np.pi))
+    chain, kernel, rng = whole_chain(model, limits), compiled_kernel(), np.random.default_rng(2)
+    entry = Entry(RESIDUAL, (3, 0, 1, 0, 0), np.concatenate([np.eye(3).ravel(), (0, 0, 0.3), np.zeros(24)]), 3)
+    for _ in range(10):
+        start = rng.uniform(-2.0 * np.pi, 2.0 * np.pi, 3)
+        state = State(model).update(rng.uniform(-1.0, 1.0, 3))
+        entry.floats[24:27] = pin.SE3(state.data.oMi[3]).act(np.array([0.0, 0.0, 0.3]))
+        seeds, ends = np.array([start, *chain.seeds(start, rng, 15)]), np.empty((16, 4))
+        asked = np.array([1e-9, 1e-6, 60.0, 16.0])
+        kernel.reach(
+            chain.chain, chain.goals([entry]), chain.room(3), seeds, np.array([start, np.ones(3)]), asked, ends
+        )
+        best = seeds[ends[:, 1].argmin()]
+        assert np.isfinite(ends[:, 1].min())
+        for turns in itertools.product((-1, 0, 1), repeat=3):
+            other = best + 2.0 * np.pi * np.array(turns)
+            if (np.abs(other) <= 2.0 * np.pi).all():
+                assert np.sum((best - start) ** 2) <= np.sum((other - start) ** 2) + 1e-9
+
+
+def test_joints_without_limits_and_joints_that_follow_elsewhere(tmp_path):
+    """A continuous joint in the chain, and a gripper of a driven and a following finger behind it."""
+    names = ("base", "upper", "fore", "hand", "left", "right")
+    links = "".join(f'<link name="{name}"/>' for name in names)
+    joints = "".join(
+        f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin xyz="{at}"/>'
+        f'<axis xyz="{axis}"/>{more}</joint>'
+        for name, kind, parent, child, at, axis, more in (
+            ("turn", "continuous", "base", "upper", "0 0 0.2", "0 0 1", ""),
+            ("lift", "revolute", "upper", "fore", "0 0 0.3", "0 1 0", LIMIT),
+            ("bend", "revolute", "fore", "hand", "0 0 0.4", "0 1 0", LIMIT),
+            ("grip", "prismatic", "hand", "left", "0 0.02 0.2", "0 1 0", LIMIT),
+            ("follow", "prismatic", "hand", "right", "0 -0.02 0.2", "0 -1 0", LIMIT + '<mimic joint="grip"/>'),
+        )
+    )
+    path = tmp_path / "gripper.urdf"
+    path.write_text(f'<robot name="gripper">{links}{joints}</robot>', encoding="utf-8")
+    figure, rng = wb.load(path), np.random.default_rng(1)
+    for _ in range(10):
+        q = figure.with_joints(
+            figure.neutral, {"turn": rng.uniform(-9, 9), "lift": rng.uniform(0.2, 1), "bend": rng.uniform(0.2, 1)}
+        )
+        goal = wb.Point("hand", figure.placement(q, "hand").act(np.array((0.0, 0.0, 0.2))), offset=(0.0, 0.0, 0.2))
+        solution = wb.solve(wb.Problem(wb.Scene(figure), goals=[goal]))
+        assert solution.solved, solution.message
+        assert {entry.note for entry in solution.trace} == {"seed"}
+
+
+LIMIT = '<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/>'
+
+
+def test_every_descent_is_told_and_counted(arm):
+    goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
+    problem, told = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", goal)]), []
+    solution = wb.QP(measures=False).solve(problem, told.append)
+    assert solution.solved
+    assert solution.programs == {}
+    assert solution.iterations == len(solution.trace) == len(told) > 0
+    with_measures = wb.QP().solve(problem)
+    assert with_measures.assessment.measure <= solution.assessment.measure + 1e-9
+
+
+def test_progress_that_ends_is_not_called_again(arm):
+    problem = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", place_of(arm, START + 0.1, "tip").translation)])
+    told = []
+    solution = wb.solve(problem, wb.QP(measures=False), progress=lambda entry: told.append(entry) or True)
+    assert len(told) == 1
+    assert solution.solved
+
+
+@pytest.mark.parametrize("measures", [False, True])
+def test_an_end_that_the_assessment_refuses_is_searched_again(arm, monkeypatch, measures):
+    """As if a distance had been missed: the descent answers with a posture that is inside of a ball."""
+    problem, met = blocked_by_a_ball(arm)
+    assert wb.assess(problem, met.q).penetration > 0.01
+    monkeypatch.setattr("wholebody.methods.qp.method.from_seeds", lambda *_: met)
+    solution = wb.QP(measures=measures).solve(problem)
+    assert solution.solved, solution.message
+    assert wb.assess(problem, solution.q).penetration < 1e-5
+    assert solution.iterations > len(met.trace)

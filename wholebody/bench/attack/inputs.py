@@ -1,0 +1,334 @@
+"""Inputs that are not what they should be: mutated files of every kind, paths to nothing, and odd arguments.
+
+Mutations change bytes, lines, numbers, words and encodings, or put in what parsers have stumbled over. An odd argument
+of a public callable has to be taken, or refused by a WholebodyError.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Callable, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.bench.attack.case import CORPUS, Verdict, chosen
+from wholebody.figures.packaged_urdf import task_paths, urdf_path
+from wholebody.taskfile import read_task
+from wholebody.taskfile.result import read
+from wholebody.tracking.track_files import read_track
+
+_VALUE = rb'"[^"\n]*"|\[[^\[\]\n]*\]|-?\d+\.?\d*'
+_WORD = rb"[A-Za-z_]{2,}"
+
+
+@cache
+def _given(kind: str) -> list[Any]:
+    """What a number or a value becomes, what is put in between, and paths that lead to no file."""
+    lines = (CORPUS / "mutations.txt").read_text(encoding="utf-8").splitlines()
+    return [eval(line.partition(" ")[2]) for line in lines if line.startswith(f"{kind} ")]
+
+
+def mutated(text: bytes, rng: np.random.Generator) -> bytes:
+    """Return a text with one to three mutations, seldom more."""
+    ways = (
+        *(_number,) * 6, *(_value,) * 4, *(_word,) * 3, _misspelt, _misspelt, _flip, _delete, _delete, _repeat, _cut,
+        _insert, _insert, _lines, _lines, _encoded, _nested, _bomb, _empty,
+    )  # fmt: skip
+    count = int(rng.choice([1, 1, 1, 2, 3, 10]))
+    for _ in range(count):
+        text = ways[int(rng.integers(len(ways)))](text, rng)
+    return text
+
+
+def _flip(text: bytes, rng: np.random.Generator) -> bytes:
+    found = bytearray(text or b"x")
+    for _ in range(int(rng.integers(1, 4))):
+        found[int(rng.integers(len(found)))] = int(rng.integers(256))
+    return bytes(found)
+
+
+def _span(text: bytes, rng: np.random.Generator) -> tuple[int, int]:
+    first = int(rng.integers(len(text) + 1))
+    return first, min(len(text), first + int(rng.integers(1, 60)))
+
+
+def _delete(text: bytes, rng: np.random.Generator) -> bytes:
+    first, last = _span(text, rng)
+    return text[:first] + text[last:]
+
+
+def _repeat(text: bytes, rng: np.random.Generator) -> bytes:
+    first, last = _span(text, rng)
+    return text[:last] + text[first:last] + text[last:]
+
+
+def _cut(text: bytes, rng: np.random.Generator) -> bytes:
+    return text[: int(rng.integers(len(text) + 1))]
+
+
+def _insert(text: bytes, rng: np.random.Generator) -> bytes:
+    at = int(rng.integers(len(text) + 1))
+    odd: bytes = chosen(rng, _given("odd"))
+    return text[:at] + odd + text[at:]
+
+
+def _replaced(text: bytes, pattern: bytes, by: Callable[[bytes], bytes], rng: np.random.Generator) -> bytes:
+    found = list(re.finditer(pattern, text))
+    if not found:
+        return text
+    one = found[int(rng.integers(len(found)))]
+    return text[: one.start()] + by(one.group()) + text[one.end() :]
+
+
+def _number(text: bytes, rng: np.random.Generator) -> bytes:
+    number = rb"(?<![A-Za-z_])-?\d+\.?\d*(?:[eE][-+]?\d+)?"
+    return _replaced(text, number, lambda _: chosen(rng, _given("number")), rng)
+
+
+def _value(text: bytes, rng: np.random.Generator) -> bytes:
+    return _replaced(text, _VALUE, lambda _: chosen(rng, _given("value")), rng)
+
+
+def _word(text: bytes, rng: np.random.Generator) -> bytes:
+    words = re.findall(_WORD, text) or [b"x"]
+    return _replaced(text, _WORD, lambda _: chosen(rng, words), rng)
+
+
+def _misspelt(text: bytes, rng: np.random.Generator) -> bytes:
+    def swapped(word: bytes) -> bytes:
+        at = int(rng.integers(len(word) - 1))
+        return word[:at] + word[at + 1 : at + 2] + word[at : at + 1] + word[at + 2 :]
+
+    return _replaced(text, _WORD, swapped, rng)
+
+
+def _lines(text: bytes, rng: np.random.Generator) -> bytes:
+    lines = text.split(b"\n")
+    a, b = int(rng.integers(len(lines))), int(rng.integers(len(lines)))
+    what = int(rng.integers(3))
+    if what == 0:
+        lines[a], lines[b] = lines[b], lines[a]
+    elif what == 1:
+        lines.insert(b, lines[a])
+    else:
+        del lines[a]
+    return b"\n".join(lines)
+
+
+def _encoded(text: bytes, rng: np.random.Generator) -> bytes:
+    what = int(rng.integers(6))
+    if what == 0:
+        return text.decode("utf-8", errors="replace").encode("utf-16")
+    if what == 1:
+        return b"\xef\xbb\xbf" + text
+    if what == 2:
+        return text.replace(b"\n", b"\r\n")
+    if what == 3:
+        return text.replace(b"\n", b"\r")
+    name = (b"klingon", b"utf-16", b"us-ascii", b"latin-1")[int(rng.integers(4))]
+    return text.replace(b'encoding="utf-8"', b'encoding="' + name + b'"')
+
+
+def _nested(text: bytes, rng: np.random.Generator) -> bytes:
+    depth = int(rng.choice((50, 3000, 200_000), p=[0.6, 0.3, 0.1]))
+    opening, closing = ((b"[", b"]"), (b"{a=", b"}"), (b"<link>", b"</link>"), (b'{"a":', b"}"))[int(rng.integers(4))]
+    return _replaced(text, _VALUE, lambda old: opening * depth + old + closing * depth, rng)
+
+
+def _bomb(text: bytes, rng: np.random.Generator) -> bytes:
+    bomb: bytes = _given("bomb")[0]
+    return bomb + text.partition(b">")[2].partition(b">")[2] if rng.random() < 0.2 else _insert(text, rng)
+
+
+def _empty(text: bytes, rng: np.random.Generator) -> bytes:
+    return (b"", b"\n", b"\x00" * 100, text * 50)[int(rng.integers(4))]
+
+
+ROBOT = {"robot.urdf": "robot.urdf", "part.obj": "box.obj"}
+"""Names of files that belong together, and where they are stored."""
+
+
+class Reader(NamedTuple):
+    """A way to read a file.
+
+    Attributes:
+        read: reads the file at a path, and what lies beside it.
+        files: what it reads, by names; the first one is mutated, another one now and then.
+    """
+
+    read: Callable[[Path], Any]
+    files: Mapping[str, bytes]
+
+
+def file(rng: np.random.Generator, folder: Path) -> Verdict:
+    """Read a mutated file, or seldom a path that leads to none."""
+    reader = _reader(rng)
+    contents = dict(reader.files)
+    names = list(contents)
+    which = names[0] if rng.random() < 0.85 else names[int(rng.integers(len(names)))]
+    path = folder / names[0]
+    if rng.random() < 0.01:
+        path = Path(chosen(rng, _given("no-file")))
+    else:
+        contents[which] = mutated(contents[which], rng)
+    for name, text in contents.items():
+        (folder / name).write_bytes(text)
+    try:
+        return sane(reader.read(path))
+    except wb.WholebodyError as error:
+        return refused(error)
+
+
+def _reader(rng: np.random.Generator) -> Reader:
+    kind = str(rng.choice(["task", "robot", "mesh", "track", "result"], p=[0.3, 0.3, 0.1, 0.15, 0.15]))
+    task = {"task.toml": "everything.toml"} | ROBOT
+    if kind == "mesh":
+        name, stored = (("part.obj", "box.obj"), ("part.stl", "tetrahedron.stl"))[int(rng.integers(2))]
+        return Reader(lambda path: wb.Mesh(path).pieces(), _stored({name: stored}))
+    if kind == "track":
+        files = _stored({"track.csv": "track.csv"} | ROBOT)
+        return Reader(lambda path: read_track(path, wb.load(path.with_name("robot.urdf"))), files)
+    if kind == "result":
+        return Reader(read, _stored({"result.json": "result.json"} | task))
+    packaged = rng.random() < 0.15
+    if kind == "robot":
+        return Reader(wb.load, {"hand.urdf": urdf_path("hand").read_bytes()} if packaged else _stored(ROBOT))
+    if not packaged:
+        return Reader(read_task, _stored(task))
+    tasks = task_paths()
+    name = sorted(tasks)[int(rng.integers(len(tasks)))]
+    beside = {p.name: p.read_bytes() for p in tasks[name].parent.iterdir() if p.suffix in (".urdf", ".csv")}
+    return Reader(read_task, {"task.toml": tasks[name].read_bytes(), **beside})
+
+
+def _stored(names: Mapping[str, str]) -> dict[str, bytes]:
+    """Files of the corpus, under other names."""
+    return {name: (CORPUS / stored).read_bytes() for name, stored in names.items()}
+
+
+def refused(error: Exception) -> Verdict:
+    """Judge a refusal: one sentence that a person can read."""
+    words = str(error)
+    if len(words) > 1500:
+        return Verdict("wrong", f"a refusal of {len(words)} characters: {words[:100]!r}...")
+    if not words.strip() or "\n" in words.strip():
+        return Verdict("wrong", f"a refusal of other than one line: {words[:100]!r}")
+    return Verdict("refused", words[:200])
+
+
+def sane(read: Any) -> Verdict:
+    """Judge what was read: it has to be made of numbers that a body or a task can have."""
+    if isinstance(read, wb.Figure):
+        return _figure(read)
+    if isinstance(read, wb.taskfile.Task):
+        problem = read.problem
+        verdict = _figure(problem.scene.figure)
+        if verdict.outcome == "wrong":
+            return verdict
+        places = [thing.placement.homogeneous.ravel() for thing in problem.scene.objects.values()]
+        return _finite(np.concatenate([problem.start, [problem.clearance], problem.clearances, *places]), "a task")
+    if isinstance(read, tuple) and read and hasattr(read[0], "geometry"):
+        places = [np.append(piece.placement.homogeneous.ravel(), piece.volume) for piece in read]
+        return _finite(np.concatenate(places), "a mesh")
+    if isinstance(read, tuple):
+        return _finite(np.asarray(read[1], dtype=float), "a result")
+    return _finite(np.append(np.ravel(read.q), read.dt), "a track")
+
+
+def _finite(values: Any, what: str) -> Verdict:
+    if not np.isfinite(values).all():
+        return Verdict("wrong", f"{what} was taken that is not made of finite numbers")
+    return Verdict("right", f"{what} was taken")
+
+
+def _figure(figure: wb.Figure) -> Verdict:
+    model = figure.model
+    masses = np.array([inertia.mass for inertia in model.inertias])
+    places = np.array([place.homogeneous for place in model.jointPlacements]).ravel()
+    inner = np.array([inertia.inertia for inertia in model.inertias]).ravel()
+    limits = np.concatenate([model.lowerPositionLimit, model.upperPositionLimit, model.velocityLimit])
+    if not (np.isfinite(masses).all() and np.isfinite(places).all() and np.isfinite(inner).all()):
+        return Verdict("wrong", "a robot was taken whose masses or places are not made of finite numbers")
+    most = 1e9  # kg, m: greater numbers of a robot are slips
+    if (masses < 0.0).any() or masses.max() > most or np.abs(places).max() > most:
+        words = f"a robot was taken with a mass of {masses.min():g} to {masses.max():g} kg, or far apart"
+        return Verdict("wrong", words)
+    if np.isnan(limits).any() or (model.velocityLimit < 0.0).any():
+        return Verdict("wrong", "a robot was taken with limits that are not numbers, or with negative velocities")
+    for name in figure.postures:
+        q = figure.posture(name)
+        if not np.isfinite(q).all() or not pin.isNormalized(model, q, 1e-6):
+            return Verdict("wrong", f"a robot was taken whose posture {name!r} is not made of numbers")
+    return Verdict("right", "a robot was taken")
+
+
+def argument(rng: np.random.Generator, folder: Path) -> Verdict:
+    """A call with one odd argument, seldom two."""
+    calls, odd = calls_that_are_right(), _corpus("odd.txt")
+    name, arguments = calls[int(rng.integers(len(calls)))]
+    given = dict(arguments)
+    for key in rng.permutation(list(arguments))[: 1 if rng.random() < 0.85 else 2]:
+        given[str(key)] = odd[int(rng.integers(len(odd)))]
+    return called(name, given, folder)
+
+
+def called(name: str, given: dict[str, str], folder: Path) -> Verdict:
+    """Call a public callable with arguments, as Python by their names; "*" for one without.
+
+    What the call makes is used: what is refused late is refused too.
+    """
+    (folder / "robot.urdf").write_bytes((CORPUS / "two-links.urdf").read_bytes())
+    robot = folder / "robot.urdf"
+    figure = wb.load(robot)
+    scene = wb.Scene(figure).add(wb.Sphere(0.1), name="ball", at=(0.5, 0.5, 0.5))
+    problem = wb.Problem(scene, goals=[wb.Point("link2", (0.1, 0.0, 0.5))])
+    known = {"np": np, "pin": pin, "wb": wb, "Path": Path, "task_paths": task_paths}
+    known |= {"robot": robot, "figure": figure, "scene": scene, "problem": problem}
+    call = f"{name}({', '.join(f'*({v},)' if key == '*' else f'{key}={v}' for key, v in given.items())})"
+    try:
+        _use(eval(call, known), problem)
+    except wb.WholebodyError as error:
+        return refused(error)
+    return Verdict("right", f"{call[:200]} was taken")
+
+
+def _use(made: Any, problem: wb.Problem) -> None:
+    """Use what a call has made, by itself."""
+    scene, qp = problem.scene, wb.QP(budget=5)
+    if isinstance(made, wb.Goal):
+        wb.solve(wb.Problem(scene, goals=[made]), method=qp)
+    elif isinstance(made, wb.Constraint):
+        wb.solve(wb.Problem(scene, constraints=[made]), method=qp)
+    elif isinstance(made, wb.Measure):
+        wb.solve(wb.Problem(scene, measures=[made]), method=qp)
+    elif isinstance(made, wb.Shape):
+        scene.add(made, name="made", at=(3, 0, 0)).contacts(scene.figure.neutral)
+    elif isinstance(made, wb.Problem):
+        wb.solve(made, method=qp)
+    elif hasattr(made, "solve"):
+        wb.solve(problem, method=made)
+
+
+@cache
+def calls_that_are_right() -> list[tuple[str, dict[str, str]]]:
+    """Public callables with arguments that are right, both as Python."""
+    return [_call(line) for line in _corpus("calls.txt")]
+
+
+def _call(line: str) -> tuple[str, dict[str, str]]:
+    node = ast.parse(line, mode="eval").body
+    assert isinstance(node, ast.Call)
+    given = {str(each.arg): ast.get_source_segment(line, each.value) or "" for each in node.keywords}
+    if node.args:
+        given["*"] = ast.get_source_segment(line, node.args[0]) or ""
+    return ast.get_source_segment(line, node.func) or "", given
+
+
+def _corpus(name: str) -> list[str]:
+    return (CORPUS / name).read_text(encoding="utf-8").splitlines()

@@ -1,0 +1,204 @@
+"""One chain: cyclic coordinate descent that moves its overlapping link to the goal outside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from wholebody.base.arrays import Array
+from wholebody.methods.ccd.guards import Kept, cone_guards, guards
+from wholebody.methods.ccd.limbs import Limbs, rotated, seen_from
+from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.sweep import Aims
+from wholebody.scene.scene import Scene
+from wholebody.scene.workspace import Workspace
+
+MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next query finds no overlap
+SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
+PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
+SHORT = 0.02  # m: a link shorter than this has no meaningful direction
+
+
+class ChainResolver:
+    """A chain of the figure with its links, limits and cones.
+
+    Attributes:
+        limbs: its joints.
+        reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
+        translated: joints that hold the orientation of links that were moved out by translation, since it was cleared.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        workspace: Workspace,
+        joints: Sequence[int],
+        foreign: frozenset[int],
+        tip: int,
+        kept: Kept,
+        exact: bool,
+    ) -> None:
+        """Prepare a chain.
+
+        Args:
+            scene: figure and things.
+            workspace: of the run.
+            joints: Pinocchio's indices of its joints.
+            foreign: joints of the other chains.
+            tip: index of the frame at its end.
+            kept: cones and ranges.
+            exact: see `LinkFinder`.
+        """
+        self.translated: set[int] = set()
+        self.limbs = Limbs(scene.model, joints)
+        self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
+        self._guards = guards(scene.figure, self.limbs, kept)
+        self._cones = cone_guards(scene.figure, self.limbs, kept)
+        self._tip = _three(scene.model.frames[tip].placement.translation)
+        self._bearing = self._links_with_pieces(workspace)
+        self.reach = self._reaches(workspace)
+
+    def _links_with_pieces(self, workspace: Workspace) -> list[int]:
+        carriers = {self.limbs.carrier(int(joint)) for joint in workspace.table.joint}
+        return sorted(node for node in carriers if node >= 0)
+
+    def _reaches(self, workspace: Workspace) -> list[float]:
+        """Lengths of the bones from each joint outwards, and the size of the last link's pieces."""
+        last = self.limbs.joints[-1]
+        sizes = [
+            float(np.linalg.norm(piece.placement.translation)) + float(size)
+            for piece, size in zip(workspace.geometry.geometryObjects, workspace.table.reach, strict=True)
+            if piece.parentJoint == last
+        ]
+        reach = max([float(np.linalg.norm(self._tip)), *sizes])
+        reaches = []
+        for joint in reversed(self.limbs.joints):
+            reaches.append(reach)
+            reach += float(np.linalg.norm(workspace.model.jointPlacements[joint].translation))
+        return reaches[::-1]
+
+    def read(self, q: Array, data: Any) -> None:
+        """Read a posture q (nq,), with the joint placements in `data`."""
+        self.limbs.read(q, data)
+        self.limbs.forward()
+        for guard in self._guards:
+            guard.read(q, data)
+
+    def in_cones(self, data: Any) -> bool:
+        """Whether the limbs are in their reach cones at the joint placements in `data`; `read` is not needed."""
+        return all(cone.holds(data) for cone in self._cones)
+
+    def keep_ranges(self) -> None:
+        """Bring limbs that have left their reach cones, or joints their ranges of motion, back into them."""
+        for guard in self._guards:
+            guard.keep()
+
+    def nearest_root(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The overlapping link nearest to the root; see `LinkFinder.nearest_root`."""
+        return self._finder.nearest_root(overlaps)
+
+    def deepest(self, overlaps: Sequence[Overlap]) -> Link | None:
+        """The link that is deepest inside; see `LinkFinder.deepest`."""
+        return self._finder.deepest(overlaps)
+
+    def push(self, link: Link, margin: float = MARGIN, tracked: Any = None) -> tuple[int, ...]:
+        """Move the link out of the obstacle by `margin` metres; returns the nodes that moved. Call `read` first.
+
+        Args:
+            link: of the chain.
+            margin: metres.
+            tracked: joint placements whose orientation a link that is translated takes; None for its present one.
+        """
+        x, y, z = link.push
+        length = (x * x + y * y + z * z) ** 0.5
+        if length < 1e-9:
+            return ()
+        grow = 1.0 + margin / length
+        push = (grow * x, grow * y, grow * z)
+        inner = self._inner(link)
+        if inner and self._parallel(link, push):
+            self._translate(link, push, inner, tracked)
+            return link.nodes
+        self._reach_out(link.node, link.nodes, link.effector, push)
+        return link.nodes
+
+    def _reach_out(self, node: int, nodes: Sequence[int], effector: Vector, push: Vector) -> None:
+        """Cyclic coordinate descent that moves a point of a node by a vector."""
+        frame = self.limbs.frame(node)
+        goal = (effector[0] + push[0], effector[1] + push[1], effector[2] + push[2])
+        local = seen_from(frame, effector[0] - frame[9], effector[1] - frame[10], effector[2] - frame[11])
+        aims = Aims(self.limbs, [node], [local], [goal], [True])
+        plan, left = aims.plan(nodes), aims.distance
+        for _ in range(SWEEPS):
+            aims.sweep(plan)
+            self.limbs.forward()
+            self.keep_ranges()
+            aims.carry()
+            before, left = left, aims.distance
+            if left < 1e-4 or left > 0.9 * before:  # m: reached; or slow
+                return
+
+    def _translate(self, link: Link, push: Vector, inner: Sequence[int], tracked: Any) -> None:
+        """Move the link by pure translation: its joint's origin moves, and its orientation stays.
+
+        Its own joints keep its orientation, and inner ones whose axes pass through the origin: the rotation of an upper
+        arm about its long axis moves no elbow.
+        """
+        limbs = self.limbs
+        own = tuple(node for node in link.nodes if node not in inner)
+        first = limbs.frame(own[-1])
+        own += tuple(node for node in inner if self._passes(node, first[9:]))
+        there = _columns(limbs.frames[link.node]).copy()
+        if tracked is not None:
+            wanted = np.ascontiguousarray(tracked.oMi[limbs.joints[link.node]].rotation.T)
+            if np.abs(wanted - there).max() < PARALLEL:  # otherwise it is another way that the tracked limb takes
+                there = wanted
+                self.translated.update(limbs.joints[node] for node in link.nodes)
+        self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
+        aims = Aims(limbs, [link.node] * 3, np.eye(3), there, [False] * 3)
+        plan = aims.plan(own)
+        for _ in range(SWEEPS):
+            change = aims.sweep(plan)
+            limbs.forward()
+            if change < 1e-4:  # rad
+                break
+            aims.carry()
+        self.keep_ranges()
+
+    def _passes(self, node: int, point: Sequence[float]) -> bool:
+        """Whether the axis of a node passes through a point (3,)."""
+        ux, uy, uz, px, py, pz = self.limbs.lines[node].tolist()
+        x, y, z = point[0] - px, point[1] - py, point[2] - pz
+        along = ux * x + uy * y + uz * z
+        return not self.limbs.slides(node) and x * x + y * y + z * z - along * along < SHORT * SHORT
+
+    def _inner(self, link: Link) -> tuple[int, ...]:
+        """The nodes inwards of the link's own: those that move the previous link."""
+        before = [node for node in self._bearing if node < link.node and node in link.nodes]
+        return tuple(node for node in link.nodes if node <= before[-1]) if before else ()
+
+    def _parallel(self, link: Link, push: Vector) -> bool:
+        """Whether the link's bone is nearly parallel to the obstacle's surface."""
+        here = self.limbs.frame(link.node)
+        after = [node for node in self._bearing if node > link.node]
+        if after:
+            there = self.limbs.frame(after[0])
+            x, y, z = (there[k] - here[k] for k in (9, 10, 11))
+        else:
+            x, y, z = rotated(here, *self._tip)
+        bone = (x * x + y * y + z * z) ** 0.5
+        length = (push[0] ** 2 + push[1] ** 2 + push[2] ** 2) ** 0.5
+        along = abs(x * push[0] + y * push[1] + z * push[2])
+        return bool(bone > SHORT and along < PARALLEL * bone * length)
+
+
+def _columns(frame: Array) -> Array:
+    """(3, 3) axes of a row of `Limbs.frames`, one a row."""
+    return np.asarray(frame[:9].reshape(3, 3).T)
+
+
+def _three(vector: Any) -> Vector:
+    x, y, z = vector.tolist()
+    return x, y, z

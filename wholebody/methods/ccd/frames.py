@@ -1,0 +1,334 @@
+"""Overlap resolution from frame to frame: the posture shown is as near to the tracked one as contact allows.
+
+Each frame moves from the last posture without overlap towards the tracked one, in steps so short that overlaps are
+shallow, and the loop of `resolver` removes the overlap of every step. So joints are attracted to the tracked ones in
+every frame, also at rest (the coach and trainee of Boulic and others 1997), limbs slide along obstacles, and the global
+penetration depth is used only where it is a good estimate. A step whose overlap cannot be removed is shortened by
+interpolation with the last posture without overlap (algorithm 1, step 4, of Schmidl and Lin).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.geometry.continuous.moved_pairs import QueryResult
+from wholebody.geometry.continuous.passing_through import first_passed, last_free
+from wholebody.methods.ccd.chain import MARGIN
+from wholebody.methods.ccd.resolver import PERTURBATIONS, Counts, OverlapResolver
+from wholebody.scene.scene import Scene
+
+BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one continues: some 3 ms
+OVERRUN = 16  # further queries and goals after which no chain is processed any more
+LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
+ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
+
+
+@dataclass(frozen=True)
+class OverlapResult:
+    """A posture without overlap, and the work to find it.
+
+    Attributes:
+        q: (nq,) the posture to show.
+        iterations: number of goals of cyclic coordinate descent.
+        joints: number of joints that moved, counted once for each goal.
+        pairs: number of different pairs of pieces that overlapped during the search.
+        contact_seconds: time of contact queries.
+        ik_seconds: time of cyclic coordinate descent.
+        deepest: deepest remaining overlap, metres.
+        swept: whether the direct motion from the posture shown before was swept and is free.
+    """
+
+    q: Array
+    iterations: int
+    joints: int
+    pairs: int
+    contact_seconds: float
+    ik_seconds: float
+    deepest: float
+    swept: bool
+
+
+def resolve_overlap(
+    scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
+) -> OverlapResult:
+    """The posture nearest to the wanted one that this frame can reach without overlap.
+
+    Args:
+        scene: figure and things. Prepared data of the scene are cached between calls.
+        q_free: (nq,) the last posture without overlap: the one shown before.
+        q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
+        rng: of the order of the chains; the same seed gives the same answer.
+        largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
+            to the next frame. If things were moved into `q_free`, leaving them comes first.
+
+    Returns:
+        The posture, within limits and reach cones and never NaN. If things were moved into `q_free`, that overlap is
+        removed first; `deepest` is the remaining overlap.
+
+    Raises:
+        InputError: a posture of the wrong shape, or a value that is not finite.
+    """
+    checked = [_posture(scene, q, what) for q, what in ((q_free, "q_free"), (q_wanted, "q_wanted"))]
+    with scene.built.pool(FrameResolver, lambda: FrameResolver(scene)).borrow() as frames:
+        return frames.remove(checked[0], checked[1], rng, largest_motion)
+
+
+class Attraction:
+    """Moves parts of a figure towards the tracked posture: its chains, and root and trunk as one more part.
+
+    Displaced joints are attracted back in every frame, in short steps or joint by joint, as far as contact allows (the
+    coach and trainee of Boulic and others 1997).
+
+    Attributes:
+        parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
+        step_length: largest motion of a part's tip in one step, m.
+        free: whether the wanted posture overlaps nothing: then a part may move away from it for a while.
+        limit: of the work in the resolver's counts; beyond it joints are not tried one by one.
+    """
+
+    def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
+        """Find the degrees of freedom of each chain."""
+        self._model, self._resolver = scene.model, resolver
+        self.step_length, self.limit, self.free = 0.0, 0, False
+        self.parts: list[tuple[NDArray[np.intp], Array]] = []
+        rest = np.ones(scene.model.nv, dtype=bool)
+        for chain in resolver.chains.values():
+            joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
+            dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
+            fresh = rest[dofs]
+            rest[dofs] = False
+            reach = np.maximum(chain.reach, 1e-9)  # m: steps are divided by it, and a last link may have no shape
+            self.parts.append((dofs[fresh], reach[fresh]))
+        size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
+        others = np.flatnonzero(rest)
+        reach = np.full(len(others), 2.0 * size)
+        if scene.figure.root == "free":
+            reach[others < 3] = 1.0
+        self.parts.append((others, reach))
+
+    def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
+        """Move every part that is not settled a step towards the wanted posture; None if no part can move.
+
+        Returns:
+            The new posture, (nq,), and the share of its motion that each part made, (parts,).
+        """
+        way = np.asarray(pin.difference(self._model, q, wanted))
+        shares = np.zeros(len(self.parts))
+        for k, (dofs, reach) in enumerate(self.parts):
+            part = way[dofs]
+            length = float(np.abs(part) @ reach)
+            if not settled[k] and float(part @ part) >= 1e-12:  # rad^2: it has not arrived
+                shares[k] = min(1.0, self.step_length / length)
+            way[dofs] = part * shares[k]
+        if not shares.any():
+            return None
+        return np.asarray(pin.integrate(self._model, q, way)), shares
+
+    def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
+        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one.
+
+        If overlap resolution undoes the attraction, single joints may still be free: a shoulder can move the whole arm
+        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
+        """
+        before = np.asarray(pin.difference(self._model, q, wanted))
+        after = np.asarray(pin.difference(self._model, trial, wanted))
+        back = np.zeros(self._model.nv, dtype=bool)
+        slow = []
+        for k, (dofs, _) in enumerate(self.parts):
+            old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
+            if shares[k] and old - new < LEAST_GAIN and not self.free:
+                back[dofs] = True
+            if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
+                slow.append(k)
+        if back.any():
+            way = np.asarray(pin.difference(self._model, trial, q))
+            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+            if not self._resolver.query(kept):
+                trial = kept
+        for k in slow:
+            trial, gained = self._attract_joints(trial, wanted, k)
+            settled[k] = not gained
+        if len(slow) or back.any():
+            self._resolver.query(trial)
+        return trial
+
+    def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
+        """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
+        gained = False
+        chains = list(self._resolver.chains.values())
+        held = {self._model.joints[joint].idx_v for joint in (chains[part].translated if part < len(chains) else ())}
+        for dof, reach in zip(*self.parts[part], strict=True):
+            if dof in held:  # it would turn a link that was moved out by translation
+                continue
+            way = float(pin.difference(self._model, q, wanted)[dof])
+            if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
+                continue
+            step = np.zeros(self._model.nv)
+            step[dof] = min(max(way, -self.step_length / reach), self.step_length / reach)
+            trial = np.asarray(pin.integrate(self._model, q, step))
+            if not self._resolver.query(trial):
+                q, gained = trial, True
+        return q, gained
+
+
+class FrameResolver:
+    """Overlap resolution from frame to frame in one scene."""
+
+    def __init__(self, scene: Scene) -> None:
+        """Prepare the chains and their degrees of freedom."""
+        self._model, self._figure, self._workspace = scene.model, scene.figure, scene.workspace()
+        self._resolver = OverlapResolver(scene, self._workspace, exact=False)
+        self._tracked = scene.model.createData()
+        self._attraction = Attraction(scene, self._resolver)
+        self._parts = self._attraction.parts
+
+    def remove(
+        self, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
+    ) -> OverlapResult:
+        """See `resolve_overlap`."""
+        self._workspace.begin()
+        self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
+        resolver = self._resolver
+        resolver.counts, resolver.margin, resolver.tracked = Counts(), MARGIN, None
+        wanted = resolver.into_cones(self._figure.clamp(q_wanted))
+        self._swept = False
+        q, free = self._freed(q_free, rng)
+        if not free:
+            return self._result(q if resolver.query(wanted) else wanted)
+        pushed = resolver.counts.iterations > 0
+        shown = self._followed(q, wanted, rng)
+        self._swept = shown is not None and not pushed
+        return self._result(q if shown is None else shown)
+
+    def _freed(self, q: Array, rng: np.random.Generator) -> tuple[Array, bool]:
+        """A posture near q (nq,) out of what things were moved into it, and whether it is free."""
+        resolver = self._resolver
+        found, overlaps = resolver.resolve(q, rng, OVERRUN)
+        for size in PERTURBATIONS if overlaps else ():
+            perturbed, still = resolver.resolve(self._perturbed(q, size, rng), rng, resolver.counts.work + OVERRUN)
+            if not still:
+                return perturbed, True
+        return found, not overlaps
+
+    def _followed(self, q: Array, wanted: Array, rng: np.random.Generator) -> Array | None:
+        """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
+        resolver, attraction = self._resolver, self._attraction
+        before = resolver.placed
+        pin.forwardKinematics(self._model, self._tracked, wanted)
+        resolver.tracked = self._tracked
+        attraction.free = not resolver.query(wanted)
+        resolver.margin = (
+            5e-3 if attraction.free else MARGIN
+        )  # m: limbs that return to a free posture need room to turn
+        if attraction.free and not self._passes_through(before, q, wanted):
+            shown = self._toward(q, wanted)
+            if shown is not None:
+                return shown
+        attraction.limit = resolver.counts.work + BUDGET + OVERRUN
+        # m: of a chain's tip; half of a forearm's width, and less where the direct motion penetrates a bulge
+        for attraction.step_length in (0.03, 0.006):
+            attraction.limit = max(attraction.limit, resolver.counts.work + 15 + OVERRUN)
+            way = self._approach(q, wanted, before, rng)
+            chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
+            found = (self._toward(q, way[k]) for k in chosen)
+            shown = next((made for made in found if made is not None), None)
+            if shown is not None:
+                return shown
+        return None
+
+    def _approach(self, q: Array, wanted: Array, before: QueryResult, rng: np.random.Generator) -> list[Array]:
+        """Steps from a free posture towards the wanted one; returns the postures."""
+        resolver = self._resolver
+        settled = [False] * len(self._parts)
+        settled[-1] = later = (
+            self._attraction.free
+        )  # limbs that are pressed against something leave it before the root moves
+        way = []
+        for _ in range(8):
+            if resolver.counts.work > self._attraction.limit - OVERRUN:
+                break
+            moved = self._attraction.step(q, wanted, settled)
+            if moved is None and later:
+                settled[-1] = later = False
+                moved = self._attraction.step(q, wanted, settled)
+            if moved is None:
+                break
+            for chain in resolver.chains.values():
+                chain.translated.clear()
+            trial, overlaps = resolver.resolve(moved[0], rng, self._attraction.limit)
+            if overlaps:
+                trial = self._interpolate(q, trial)
+            if self._passes_through(before, q, trial):
+                trial = self._interpolate(q, self._hit)
+            q = self._attraction.keep_gains(q, trial, wanted, moved[1], settled)
+            way.append(q)
+            before = self._resolver.placed
+        return way
+
+    def _toward(self, q0: Array, q1: Array) -> Array | None:
+        """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
+
+        If the motion is too long, each part makes its own share of it, or, if that is not free, all make the least
+        share.
+        """
+        way = np.asarray(pin.difference(self._model, q0, q1))
+        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
+        for dofs, _ in self._parts:
+            shares[dofs] = shares[dofs].min(initial=1.0)
+        least = float(shares.min())
+        for share in (shares, least) if least < 1.0 else (1.0,):
+            q = self._figure.clamp(np.asarray(pin.integrate(self._model, q0, share * way)))
+            q = self._resolver.into_cones(q)
+            if not self._resolver.query(q) and self._clear(q0, q):
+                return q
+        return None
+
+    def _clear(self, q0: Array, q1: Array) -> bool:
+        """Whether the direct motion between two shown postures is free."""
+        return self._workspace.sweep.first_contact(q0, q1, None, 2.0 * ALLOWED_DEPTH) is None
+
+    def _perturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
+        """Copy of a posture q (nq,) with random changes of its joints, so that a straight arm can bend."""
+        step = size * rng.normal(size=self._model.nv)
+        step[self._parts[-1][0]] = 0.0
+        return self._resolver.into_cones(self._figure.clamp(np.asarray(pin.integrate(self._model, q, step))))
+
+    def _interpolate(self, free: Array, q: Array) -> Array:
+        """The last free posture between a free one and q, by bisection."""
+        result = last_free(self._model, free, q, self._resolver.query, 7)  # 3 cm to a quarter of a millimetre
+        self._resolver.query(result)
+        return result
+
+    def _passes_through(self, before: QueryResult, q0: Array, q1: Array) -> bool:
+        """Whether the motion passes through something; `_hit` is then the first contact."""
+        hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, 2e-3)  # m
+        if hit is not None:
+            self._hit = hit.q
+        return hit is not None
+
+    def _result(self, q: Array) -> OverlapResult:
+        counts = self._resolver.counts
+        self._resolver.query(q)
+        return OverlapResult(
+            q=q,
+            iterations=counts.iterations,
+            joints=counts.joints,
+            pairs=len(counts.pairs),
+            contact_seconds=counts.contact_seconds,
+            ik_seconds=counts.ik_seconds,
+            deepest=self._resolver.deepest,
+            swept=self._swept,
+        )
+
+
+def _posture(scene: Scene, q: Array, what: str) -> Array:
+    posture = np.asarray(q, dtype=float)
+    if posture.shape != (scene.model.nq,) or not np.isfinite(posture).all():
+        raise InputError(f"{what} is ({scene.model.nq},) finite numbers; got shape {posture.shape}")
+    return np.asarray(pin.normalize(scene.model, posture))

@@ -1,0 +1,324 @@
+"""Linear systems of Newton steps, by normal equations or the whole KKT matrix.
+
+Every factorisation solves, for the displacement d and the multipliers y,
+
+    D d - J' y = -g,        J d + M y = -c                                            (eqs. 8 to 10 of the paper)
+
+with a positive diagonal D, the sparse Jacobian J and a diagonal M >= 0, which is zero for equations that must hold.
+"""
+
+from __future__ import annotations
+
+import sys
+from functools import lru_cache
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.checks import known
+from wholebody.base.compiled import compiled
+from wholebody.base.errors import WholebodyError
+
+Places = NDArray[np.int32]
+NAMES = ("auto", "normal", "kkt", "schur")
+
+
+class SingularSystemError(WholebodyError, ArithmeticError):
+    """A linear system that the factorisation cannot solve; damp it more, or use a reference method."""
+
+
+class Pattern(NamedTuple):
+    """Structural non-zeros of a sparse Jacobian.
+
+    Attributes:
+        rows, columns: (nnz,) indices of the entries.
+        height, width: the Jacobian's shape.
+    """
+
+    rows: Indices
+    columns: Indices
+    height: int
+    width: int
+
+    def dense(self, values: Array) -> Array:
+        """The Jacobian as an array (height, width)."""
+        result = np.zeros((self.height, self.width))
+        np.add.at(result, (self.rows, self.columns), values)
+        return result
+
+    def times(self, values: Array, vector: Array) -> Array:
+        """J vector, (height,)."""
+        result = np.bincount(self.rows, values * vector[self.columns], self.height)
+        return result.astype(np.float64, copy=False)
+
+    def transpose_times(self, values: Array, vector: Array) -> Array:
+        """J' vector, (width,)."""
+        result = np.bincount(self.columns, values * vector[self.rows], self.width)
+        return result.astype(np.float64, copy=False)
+
+
+class LinearSystem(NamedTuple):
+    """One system: values (nnz,) of J, diagonals D (width,) and M (height,), right-hand sides g and c."""
+
+    values: Array
+    weight: Array
+    damping: Array
+    gradient: Array
+    residual: Array
+
+
+class LinearAlgebra(Protocol):
+    """A factorisation for one pattern."""
+
+    name: str
+
+    @property
+    def fill(self) -> int:
+        """Non-zeros of the last factor."""
+
+    def solve(self, system: LinearSystem) -> tuple[Array, Array]:
+        """Displacement (width,) and multipliers (height,).
+
+        Raises:
+            SingularSystemError: it has no unique solution to working accuracy.
+        """
+
+
+class NormalEquations:
+    """J D^-1 J' + M by Eigen's SimplicialLDLT with AMD ordering, with dense columns split off (eqs. 10 to 12).
+
+    With A_s the sparse and A_D the dense columns of J D^-1/2, A_s A_s' + M + F F' is factorised sparsely. Each column
+    of F has one non-zero, in a row that would be empty without it. A small dense system adds A_D and removes F: the
+    modified Schur complement (Andersen 1996, ACM Transactions on Mathematical Software 22). So a hub adds little to the
+    cost of its arms.
+    """
+
+    def __init__(self, pattern: Pattern, dense: Indices | None = None) -> None:
+        """Build and analyse; `dense` are the columns to split off."""
+        import eigenpy
+
+        self.name = "normal/ldlt" if dense is None else "normal/schur"
+        self.pattern = pattern
+        self._dense = np.zeros(0, dtype=np.intp) if dense is None else dense
+        is_dense = np.zeros(pattern.width, dtype=bool)
+        is_dense[self._dense] = True
+        self._split = np.flatnonzero(is_dense[pattern.columns])
+        self._rest = np.flatnonzero(~is_dense[pattern.columns])
+        place = np.cumsum(is_dense) - 1
+        self._dense_at = (pattern.rows[self._split], place[pattern.columns[self._split]])
+        sparse = Pattern(pattern.rows[self._rest], pattern.columns[self._rest], pattern.height, pattern.width)
+        self._gram = Gram(sparse)
+        self._bare = np.zeros(0, dtype=np.intp)
+        if len(self._dense):
+            self._bare = np.flatnonzero(np.bincount(sparse.rows, minlength=pattern.height) == 0)
+        self._success = eigenpy.ComputationInfo.Success
+        self._factor = eigenpy.SimplicialLDLT()
+        self._factor.analyzePattern(self._gram.matrix)
+
+    @property
+    def fill(self) -> int:
+        """Non-zeros of the last factor, with the dense columns."""
+        columns = len(self._dense) + len(self._bare)
+        return int(self._factor.matrixL().nnz) + columns * self.pattern.height
+
+    def solve(self, system: LinearSystem) -> tuple[Array, Array]:
+        """Refill, refactorise; eliminate d: (J D^-1 J' + M) y = -c + J D^-1 g, then d = D^-1 (J' y - g)."""
+        values, damping = system.values, system.damping
+        if len(self._dense):
+            values, damping = values[self._rest], damping.copy()
+            damping[self._bare] += 1.0
+        self._gram.refill(values, system.weight, damping)
+        self._factor.factorize(self._gram.matrix)
+        if self._factor.info() != self._success:
+            raise SingularSystemError("the equations depend on each other; damp them")
+        free = system.gradient / system.weight
+        y = self._factor.solve(self.pattern.times(system.values, free) - system.residual)
+        if len(self._dense):
+            y = self._with_dense(system, y)
+        if not np.isfinite(y).all():
+            raise SingularSystemError("the equations depend on each other; damp them")
+        return self.pattern.transpose_times(system.values, y) / system.weight - free, y
+
+    def _with_dense(self, system: LinearSystem, direct: Array) -> Array:
+        """The multipliers (height,) of the whole matrix, from those of its sparse part (eq. 11)."""
+        wide = len(self._dense)
+        border = np.zeros((self.pattern.height, wide + len(self._bare)))
+        border[self._dense_at] = system.values[self._split]
+        border[:, :wide] /= np.sqrt(system.weight[self._dense])
+        border[self._bare, wide + np.arange(len(self._bare))] = 1.0
+        through = self._factor.solve(border)
+        corner = np.diag(np.concatenate([-np.ones(wide), np.ones(len(self._bare))]))
+        try:
+            small = np.linalg.solve(corner - border.T @ through, border.T @ direct)
+        except np.linalg.LinAlgError:
+            raise SingularSystemError("the equations depend on each other; damp them") from None
+        result: Array = direct + through @ small
+        return result
+
+
+class Gram:
+    """Lower triangle of J D^-1 J' + M in compressed columns.
+
+    Attributes:
+        matrix: scipy's csc_matrix, whose data `refill` overwrites.
+    """
+
+    def __init__(self, pattern: Pattern) -> None:
+        """Pair the entries of J that share a column, and find the entries of their products."""
+        from scipy.sparse import csc_matrix
+
+        self.pattern = pattern
+        first, second = _pairs(pattern)
+        rows = np.concatenate([pattern.rows[first], np.arange(pattern.height)])
+        columns = np.concatenate([pattern.rows[second], np.arange(pattern.height)])
+        key = columns * pattern.height + rows
+        places, index = np.unique(key, return_inverse=True)
+        column = places // max(pattern.height, 1)
+        pointer = np.searchsorted(column, np.arange(pattern.height + 1)).astype(np.int32)
+        shape = (pattern.height, pattern.height)
+        inner = (places % max(pattern.height, 1)).astype(np.int32)
+        self.matrix = csc_matrix((np.zeros(len(places)), inner, pointer), shape=shape)
+        order = np.argsort(index[: len(first)], kind="stable")
+        target = index[: len(first)][order]
+        filled = np.unique(target)
+        starts = np.append(np.searchsorted(target, filled), len(first))
+        self._diagonal = index[len(first) :]
+        compiled_kernel()
+        self._first, self._second = first[order].astype(np.int32), second[order].astype(np.int32)
+        self._starts, self._filled = starts.astype(np.int32), filled.astype(np.int32)
+
+    def refill(self, values: Array, weight: Array, damping: Array) -> None:
+        """Compute the matrix for values (nnz,) of J, diagonals D and M."""
+        scaled = values / weight[self.pattern.columns]
+        data = self.matrix.data
+        data[:] = 0.0
+        _sum_products(scaled, values, self._first, self._second, self._starts, self._filled, data)
+        data[self._diagonal] += damping
+
+
+@compiled()
+def _sum_products(
+    scaled: Array, values: Array, first: Places, second: Places, starts: Places, filled: Places, data: Array
+) -> None:
+    """Write the sums of scaled[first] values[second] between starts into data, at the indices `filled`."""
+    for k in range(len(filled)):
+        total = 0.0
+        for p in range(starts[k], starts[k + 1]):
+            total += scaled[first[p]] * values[second[p]]
+        data[filled[k]] = total
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """This module, after its loop is compiled or loaded from the cache, before a solve."""
+    none, places = np.zeros(0), np.zeros(0, dtype=np.int32)
+    _sum_products(none, none, places, places, np.zeros(1, dtype=np.int32), places, none)
+    return sys.modules[__name__]
+
+
+def _pairs(pattern: Pattern) -> tuple[Indices, Indices]:
+    """Pairs of entries (row >= row of the other) in one column."""
+    order = np.lexsort((pattern.rows, pattern.columns))
+    columns = pattern.columns[order]
+    counts = np.bincount(columns, minlength=pattern.width)
+    place = np.arange(len(columns)) - np.repeat(np.cumsum(counts) - counts, counts)
+    after = counts[columns] - place  # partners of an entry: itself and all that follow in its column
+    first = np.repeat(np.arange(len(columns)), after)
+    offset = np.arange(len(first)) - np.repeat(np.cumsum(after) - after, after)
+    return order[first + offset], order[first]
+
+
+class QuasiDefinite:
+    """L D L' of [H, -J'; -J, -M] with AMD ordering (Vanderbei 1995, "Symmetric quasi-definite matrices").
+
+    H is the diagonal D, or D plus a sparse matrix of second derivatives.
+    """
+
+    name = "kkt/ldlt"
+
+    def __init__(self, pattern: Pattern, second: tuple[Indices, Indices] | None = None) -> None:
+        """Build and analyse.
+
+        Args:
+            pattern: of J.
+            second: rows and columns (k,) of the lower triangle of second derivatives, which may repeat.
+        """
+        import eigenpy
+        from scipy.sparse import csc_matrix
+
+        n, m = pattern.width, pattern.height
+        none = np.zeros(0, dtype=np.intp)
+        row, column = second if second is not None else (none, none)
+        size = n + m
+        self._seconds = len(row)
+        rows = np.concatenate([np.arange(size), n + pattern.rows, row])
+        columns = np.concatenate([np.arange(size), pattern.columns, column])
+        places, index = np.unique(columns * size + rows, return_inverse=True)
+        pointer = np.searchsorted(places // size, np.arange(size + 1)).astype(np.int32)
+        self.pattern, self._index = pattern, index
+        self._matrix = csc_matrix((np.zeros(len(places)), (places % size).astype(np.int32), pointer), (size, size))
+        self._success = eigenpy.ComputationInfo.Success
+        self._factor: Any = eigenpy.SimplicialLDLT()
+        self._factor.analyzePattern(self._matrix)
+
+    @property
+    def fill(self) -> int:
+        """Non-zeros of the last factor."""
+        return int(self._factor.matrixL().nnz)
+
+    def solve(self, system: LinearSystem, second: Array | None = None) -> tuple[Array, Array]:
+        """Refill, refactorise, solve; `second` (k,) are the values of the second derivatives."""
+        n, values = self.pattern.width, system.values
+        least = 1e-10 / system.weight.min(initial=1.0)  # makes the matrix quasi-definite; smaller = less stable
+        extra = np.zeros(self._seconds) if second is None else second
+        data = np.concatenate([system.weight, -np.maximum(system.damping, least), -values, extra])
+        self._matrix.data[:] = np.bincount(self._index, data, len(self._matrix.data))
+        self._factor.factorize(self._matrix)
+        if self._factor.info() != self._success:
+            raise SingularSystemError("the KKT matrix has no factor; damp it")
+        wanted = np.concatenate([-system.gradient, system.residual])
+        found = self._factor.solve(wanted)
+        slack = np.maximum(least - system.damping, 0.0)
+        for _ in range(
+            2
+        ):  # iterative refinement: residual of the matrix without the least damping: differs by -slack y
+            error = wanted - self._times(found)
+            error[n:] -= slack * found[n:]
+            found = found + self._factor.solve(error)
+        if not np.isfinite(found).all():
+            raise SingularSystemError("the equations depend on each other; damp them")
+        return found[:n], found[n:]
+
+    def convex(self) -> bool:
+        """Whether the last matrix is positive definite on the null space of J: its inertia is (n, m, 0)."""
+        pivots = self._factor.vectorD()
+        return int((pivots < 0.0).sum()) == self.pattern.height
+
+    def _times(self, x: Array) -> Array:
+        lower = self._matrix
+        result: Array = lower @ x + lower.T @ x - lower.diagonal() * x
+        return result
+
+
+def dense_columns(pattern: Pattern) -> Indices:
+    """Columns that would fill the normal equations, such as a hub's: of more than sixty rows; fewer = more splits."""
+    return np.flatnonzero(np.bincount(pattern.columns, minlength=pattern.width) > 60)
+
+
+def linear_algebra(pattern: Pattern, name: str = "auto") -> LinearAlgebra:
+    """The factorisation of this name for a pattern; "auto" splits off up to fifty dense columns.
+
+    With hundreds of them, as of a body near everything, the small dense systems of a step took 2 s.
+
+    Raises:
+        UnknownNameError: there is no such factorisation.
+    """
+    known(name, NAMES, "linear algebra")
+    dense = dense_columns(pattern)
+    if name == "schur" or (name == "auto" and 0 < len(dense) <= 50):
+        return NormalEquations(pattern, dense)
+    if name == "kkt" or (name == "auto" and len(dense)):
+        return QuasiDefinite(pattern)
+    return NormalEquations(pattern)

@@ -1,0 +1,249 @@
+"""The measures: rows of joint angles whose squares are minimised, and the descent of the measures themselves.
+
+A measure f with gradient g and diagonal second derivative h at angles theta is, to second order, a sum of squares of
+angles from theta - g / h, with the factors h / 2. For `Effort` and `Displacement` that is exact. This applies to every
+measure of the revolute joints, and of a free root that one of these measures counts. A measure that says of which
+squares it is the sum, `Rhythm` or `RotationEffort`, has a row for each of them: beside a diagonal that bounds their
+second derivative the steps are many times as many. A measure that depends on other joints is only reported, and the
+solution's message names it.
+
+From a state that satisfies the equations, each round of the descent makes one step in which the motion has little
+weight against the measures, and returns to the equations by Newton steps. It is kept if the measures decreased;
+otherwise the next round is half as long. With the Jacobians alone, convergence is linear, so the steps are accelerated;
+a round whose accelerated step does not lower the measures is repeated with the step itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.errors import UndefinedTermError
+from wholebody.figures.self_pairs import random_postures
+from wholebody.figures.state import State
+from wholebody.methods.acceleration import Anderson
+from wholebody.methods.newton.batches import OBJECTIVE, Batch
+from wholebody.methods.newton.figure_bodies import FigureBodies
+from wholebody.methods.newton.iteration import Iteration
+from wholebody.methods.newton.linear_algebra import SingularSystemError
+from wholebody.methods.newton.own_rows import TangentRows, square_rows
+from wholebody.methods.newton.settings import REFINEMENT
+from wholebody.methods.newton.system import ActiveSystem, System
+from wholebody.methods.newton.task_batches import RootMotion
+from wholebody.problem import Problem
+from wholebody.tasks import Discomfort, Displacement, Effort, Rhythm, RotationEffort
+from wholebody.tasks.base import Measure
+from wholebody.tasks.checks import defined
+
+MINIMISED = (Effort, RotationEffort, Displacement, Discomfort, Rhythm)
+"""Measures that are minimised over the revolute joints, and over a root that they count."""
+
+
+class Objective:
+    """Rows for the measures of a problem.
+
+    Attributes:
+        rows: the joints' angles, each relative to its minimiser.
+        root: the root's motion relative to its minimiser; None where it is fixed, or counts nothing.
+        squares: the rows of measures that are sums of squares.
+        minimised: the measures that are minimised.
+        reported: names of the others.
+    """
+
+    def __init__(self, problem: Problem, bodies: FigureBodies, state: State) -> None:
+        """Prepare the rows for the figure's revolute joints.
+
+        Args:
+            problem: the problem.
+            bodies: of its figure.
+            state: of the run; it is moved.
+        """
+        self._state, self._bodies = state, bodies
+        self.rows, tangent = bodies.distance(problem.start)
+        self.root = RootMotion(0, "the root") if bodies.floating and _counts_root(problem, state) else None
+        self._tangent = tangent if self.root is None else np.concatenate([tangent, np.arange(6)])
+        self.minimised: list[Measure] = []
+        self.reported: list[str] = []
+        self.squares: list[TangentRows] = []
+        self._curved: list[Measure] = []  # those without squares
+        for term in problem.measures:
+            if isinstance(term, MINIMISED) or _depends_on(term, self._tangent, problem.start, state):
+                self.minimised.append(term)
+                rows = None if bodies.uncharted else square_rows(bodies, term, type(term).__name__)
+                self._curved += [term] if rows is None else []
+                self.squares += [] if rows is None else [rows]
+            else:
+                self.reported.append(type(term).__name__)
+        self._follows = True
+        self.stiffness = np.full(len(self._tangent), REFINEMENT.stiffness * REFINEMENT.least_stiffness)
+
+    def batches(self) -> list[Batch]:
+        """All rows, in the order of their factors."""
+        found: list[Batch] = [self.rows, *([] if self.root is None else [self.root]), *self.squares]
+        for batch in found:
+            batch.role = OBJECTIVE
+        return found
+
+    def value(self, x: Array) -> float:
+        """The minimised measures at the bodies x (7 n,)."""
+        state = self._state.update(self._bodies.posture(x))
+        return sum(term.weight * term.value(state) for term in self.minimised)
+
+    def anchor(self, q: Array) -> None:
+        """Use displacements from q (nq,), the last state of a drag, with the measures' second derivatives."""
+        self._model_at(q)
+        self._aim(q, np.zeros(len(self._tangent)))
+        for rows in self.squares:
+            rows.count_from(q)
+        self._follows = False
+
+    def follow(self) -> None:
+        """Model the measures anew at every posture."""
+        for rows in self.squares:
+            rows.count_from(None)
+        self._follows = True
+
+    def renew(self, q: Array) -> None:
+        """Model the measures at the posture q (nq,), unless an anchor is set."""
+        if self._follows:
+            self._model_at(q)
+
+    def enter(self, system: System) -> None:
+        """Write the present factors into a system."""
+        squares = np.full(sum(rows.size for rows in self.squares), REFINEMENT.stiffness)
+        system.stiffness[system.objective] = np.concatenate([self.stiffness, squares])
+
+    def _model_at(self, q: Array) -> None:
+        state = self._state.update(q)
+        gradient, curvature = np.zeros(state.model.nv), np.zeros(state.model.nv)
+        for term in self._curved:
+            gradient += term.weight * term.gradient(state)
+            curvature += term.weight * term.curvature(state)
+        half = np.maximum(0.5 * curvature[self._tangent], REFINEMENT.least_stiffness)
+        self._aim(q, -0.5 * gradient[self._tangent] / half)
+        self.stiffness = REFINEMENT.stiffness * half
+
+    def _aim(self, q: Array, way: Array) -> None:
+        """Count from the posture q (nq,), towards displacements (k,) of the revolute joints and the root."""
+        joints = len(self.rows)
+        self.rows.bound = self._bodies.angles_at(q) + way[:joints]
+        if self.root is not None:
+            self.root.anchor(q[:7], way[joints:])
+
+
+def _counts_root(problem: Problem, state: State) -> bool:
+    """Whether the measures that are always minimised count the motion of a free root."""
+    curved = [
+        term.weight * term.curvature(state.update(problem.start))
+        for term in problem.measures
+        if type(term) in MINIMISED
+    ]
+    return bool(curved) and float(np.min(np.sum(curved, axis=0)[:6])) > 0.0
+
+
+def _depends_on(measure: Measure, tangent: Indices, start: Array, state: State) -> bool:
+    """Whether a measure depends on these degrees of freedom alone, at the start and some other postures."""
+    others = np.ones(state.model.nv, dtype=bool)
+    others[tangent] = False
+    postures = [start, *random_postures(state.model, 3, seed=1)] if others.any() else []
+    states = defined(measure, (state.update(q) for q in postures))
+    return not any(np.abs(measure.gradient(at)[others]).max() > 0.0 for at in states)
+
+
+def refine(
+    active_system: ActiveSystem, x: Array, measure: Callable[[Array], float], *, tolerance: float
+) -> tuple[Array, int]:
+    """Lower the measures from x (7 n,), where all equations hold.
+
+    Args:
+        active_system: the equations.
+        x: the start.
+        measure: the measures as a function of the variables (7 n,).
+        tolerance: of the equations; a round that moves nothing by more, metres and radians, is the last.
+
+    Returns:
+        The variables, and the number of iterations.
+    """
+    run = Iteration(active_system, x, REFINEMENT.finer * tolerance, REFINEMENT.finer * tolerance, "slack")
+    run.iterate(REFINEMENT.back, goals=True, measures="keep")
+    if not run.met:
+        return x, 0
+    descent = _Descent(run, measure, tolerance)
+    for _ in range(REFINEMENT.rounds):
+        if not descent.lower():
+            break
+    return descent.best, len(run.residuals) - 1
+
+
+class _Descent:
+    """A descent of measures along the equations.
+
+    Attributes:
+        best: (7 n,) the state with the least measures.
+    """
+
+    def __init__(self, run: Iteration, measure: Callable[[Array], float], tolerance: float) -> None:
+        self._run, self._measure, self._tolerance = run, measure, tolerance
+        self.best, self._least = run.x, measure(run.x)
+        self._share, self._memory, self._system = 1.0, Anderson(), run.system
+        self._step: Array | None = None  # of the model at the best state, once it is known
+
+    def lower(self) -> bool:
+        """Make one round; False where no further one would lower the measures."""
+        run, fast = self._run, None
+        if self._step is None:
+            try:
+                self._step = run.step(0.0, 1.0, 1.0, True, "lower", REFINEMENT.motion)
+            except SingularSystemError:
+                return False
+            fast = self._memory.propose(self._step)
+        way, share = (self._step, self._share) if fast is None else (fast, 1.0)
+        length = share * run.length(way)
+        trial = run.active_system.retract(run.x + length * way)
+        if run.active_system.runs_into():
+            run.begin(self.best)
+            self._step = None
+            self._memory.reset()
+            return True
+        trial, length, free = run.shorten(trial, way, length)
+        free = free and run.advance(trial, length)
+        if free:
+            run.iterate(REFINEMENT.back, goals=True, measures="keep")
+        value, rounding = self._measured(), 1e-13 * abs(self._least)
+        change = self._least - value
+        met = free and run.met
+        if met and change > rounding:
+            return self._keep(value, fast is None)
+        self._memory.reset()
+        run.begin(self.best)
+        if run.system is not self._system:
+            self._system, self._step = run.system, None
+        if fast is not None:
+            return True
+        if self._share < REFINEMENT.shortest or (met and change > -rounding):
+            return False
+        self._share *= REFINEMENT.shorter
+        return True
+
+    def _keep(self, value: float, plain: bool) -> bool:
+        """Take the state of the iteration, with the measures `value`; `plain` steps may become longer."""
+        run = self._run
+        self._memory.record(run.x - self.best)
+        moved = float(np.abs(run.x - self.best).max())
+        self.best, self._least, self._step = run.x, value, None
+        if run.system is not self._system:  # other contacts: what was remembered is of other equations
+            self._system = run.system
+            self._memory.reset()
+        if plain:
+            self._share = min(1.0, REFINEMENT.longer * self._share)
+        return moved >= self._tolerance
+
+    def _measured(self) -> float:
+        """The measures at the iteration's state; infinite where one of one's own is not finite there."""
+        try:
+            return self._measure(self._run.x)
+        except UndefinedTermError as error:
+            self._run.active_system.control.step_back(error)
+            return np.inf

@@ -1,0 +1,251 @@
+"""Inverse kinematics of a chain of plain joints from many seeds, before anything else is tried.
+
+Where all goals are places and rotations and the joints that carry their frames have one degree of freedom each, damped
+least squares from the start and from random seeds meets the goals in tens of microseconds, and a projection leads to
+the least effort (TRAC-IK: P. Beeson, B. Ames, "TRAC-IK: An open-source library for improved solving of generic inverse
+kinematics", Humanoids 2015). An end that keeps every clearance is an answer; the others are rejected.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from wholebody import tasks
+from wholebody.base.arrays import Array
+from wholebody.figures.description import Limits
+from wholebody.methods.control import Control
+from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
+from wholebody.methods.qp.multistart import Budget
+from wholebody.methods.qp.settings import SEEDS
+from wholebody.problem import Problem
+from wholebody.scene.workspace import Workspace
+from wholebody.solution import TraceEntry
+from wholebody.tasks.distance import SquaredDistance
+from wholebody.terms.entries import RESIDUAL, Entry, entries_of
+
+
+class Met(NamedTuple):
+    """A posture that meets the goals with everything held.
+
+    Attributes:
+        q: (nq,) posture.
+        trace: one entry a descent, but for one that ends where it begins.
+        stationary: whether the measures are stationary too.
+        blocked: (nq,) an end of far less effort that does not keep its clearances; None where there is none.
+    """
+
+    q: Array
+    trace: tuple[TraceEntry, ...]
+    stationary: bool
+    blocked: Array | None = None
+
+
+class PlainChain:
+    """The joints of a model that carry some frames, as arrays, with room for one descent.
+
+    Attributes:
+        chain: the arrays.
+        idx_v: (n,) place of each joint in the tangent.
+    """
+
+    def __init__(self, model: pin.Model, limits: Limits, joints: tuple[int, ...]) -> None:
+        """Read joints, ordered, with all that carry them; each has one degree of freedom."""
+        kinds, number = [model.joints[joint] for joint in joints], {0: 0}
+        number |= {joint: k + 1 for k, joint in enumerate(joints)}
+        subspaces = np.array([np.asarray(kind.createData().S).ravel() for kind in kinds], dtype=float)
+        placements = [model.jointPlacements[joint] for joint in joints]
+        self._number = number
+        self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
+        self._round = np.array([kind.nq == 2 for kind in kinds])
+        self.idx_v = np.array([kind.idx_v for kind in kinds], dtype=np.intp)
+        lower, upper = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
+        lower[limits.idx_v], upper[limits.idx_v] = limits.lower, limits.upper
+        self.chain = Chain(
+            parents=np.array([number[model.parents[joint]] for joint in joints], dtype=np.intp),
+            places=np.array([[*place.rotation.T, place.translation] for place in placements], dtype=float),
+            turns=subspaces[:, 3:].copy(),
+            slides=subspaces[:, :3].copy(),
+            support=_support([number[model.parents[joint]] for joint in joints]),
+            lower=lower[self.idx_v],
+            upper=upper[self.idx_v],
+        )
+        self._joints = np.zeros((len(joints) + 1, 4, 3))
+        self._joints[0, :3] = np.eye(3)
+
+    def angles(self, q: Array) -> Array:
+        """Values (n,) of the joints at a posture (nq,)."""
+        turned, values = self._round, np.empty(len(self._idx_q))
+        values[:] = q[self._idx_q]
+        values[turned] = np.arctan2(q[self._idx_q[turned] + 1], values[turned])
+        return values
+
+    def posture(self, values: Array, at: Array) -> Array:
+        """A posture (nq,) with values (n,) of the joints."""
+        q: Array = at.copy()
+        turned = self._round
+        q[self._idx_q] = np.where(turned, np.cos(values), values)
+        q[self._idx_q[turned] + 1] = np.sin(values[turned])
+        return q
+
+    def goals(self, entries: list[Entry]) -> Goals:
+        """Entries of goals with the numbers of these joints."""
+        integers, row = [], 0
+        for entry in entries:
+            joint, base, *kinds = entry.integers
+            integers.append((row, self._number[joint], self._number[base], *kinds))
+            row += entry.rows
+        return Goals(np.array([entry.floats for entry in entries]), np.array(integers, dtype=np.int64))
+
+    def room(self, rows: int) -> Room:
+        """Room for a descent with so many rows."""
+        size = len(self.idx_v)
+        return Room(
+            self._joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
+            np.empty(size, dtype=np.bool_),
+        )  # fmt: skip
+
+    def seeds(self, start: Array, rng: np.random.Generator, count: int) -> Array:
+        """Values (count, n) all over the limits, but not farther from a start (n,) than half a turn."""
+        half = np.where(self.chain.turns.any(axis=1), np.pi, np.inf)
+        lower, upper = np.maximum(self.chain.lower, start - half), np.minimum(self.chain.upper, start + half)
+        values: Array = rng.uniform(lower, upper, (count, len(start)))
+        return values
+
+
+class Chains:
+    """The chains of a model that were asked for; one run uses it at a time."""
+
+    def __init__(self, model: pin.Model, limits: Limits) -> None:
+        self._model, self._limits = model, limits
+        self._chains: dict[tuple[int, ...], PlainChain | None] = {}
+
+    def of(self, joints: frozenset[int]) -> PlainChain | None:
+        """The chain that carries joints; None where one of it has several degrees of freedom or follows another."""
+        model = self._model
+        path = tuple(sorted({above for joint in joints for above in list(model.supports[joint])} - {0}))
+        if path not in self._chains:
+            plain = bool(path) and all(_is_plain(model.joints[joint]) for joint in path)
+            self._chains[path] = PlainChain(model, self._limits, path) if plain else None
+        return self._chains[path]
+
+
+def goal_entries(problem: Problem) -> list[Entry] | None:
+    """Entries of the goals, where they are places and rotations and nothing else must hold; None otherwise."""
+    if problem.constraints or problem.bounds or not problem.goals:
+        return None
+    found: list[Entry] = []
+    for goal in problem.goals:
+        entries = entries_of(goal, problem.scene.model)
+        if entries is None or any(entry.table != RESIDUAL for entry in entries):
+            return None
+        found += entries
+    return found
+
+
+def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: Control) -> Met | None:
+    """A posture that meets the goals with everything held: the first that is found, or of the first few the best.
+
+    Args:
+        problem: what is asked.
+        workspace: of the run.
+        budget: of the method.
+        control: is told of every descent.
+
+    Returns:
+        None where the figure or the terms are others than those of the module's head, or nothing was found.
+    """
+    entries, built = goal_entries(problem), problem.scene.built
+    if entries is None:
+        return None
+    limits = problem.scene.figure.limits
+    with built.pool(Chains, lambda: Chains(built.model, limits)).borrow() as chains:
+        chain = chains.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
+        return None if chain is None else _from_seeds(problem, chain, entries, workspace, budget, control)
+
+
+def _from_seeds(
+    problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, budget: Budget,
+    control: Control,
+) -> Met | None:  # fmt: skip
+    at = problem.scene.figure.clamp(problem.start)
+    start, rng = chain.angles(at), np.random.default_rng(budget.seed)
+    distance = _distance(problem, chain, at) if budget.measures else None
+    nearest = np.array([start, np.zeros(len(start))])
+    if distance is not None:
+        nearest = np.array([chain.angles(distance.reference), distance.weights[chain.idx_v]])
+    more = 1 + budget.restarts_for_measure
+    enough = 1 if distance is None else SEEDS.compared * more
+    asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
+    goals, room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
+    found, trace, begun, least, blocked = np.empty((SEEDS.together, 4)), [], 0, np.inf, None
+    seeds = (
+        np.concatenate([[start], chain.seeds(start, rng, SEEDS.together - 1)])
+        if budget.restarts
+        else start[None].copy()
+    )
+    while begun < (SEEDS.most * more if budget.restarts else 1) and not control.over:
+        taken = compiled_kernel().reach(chain.chain, goals, room, seeds, nearest, asked, found)
+        begun += taken
+        for left, _, _, steps in found[:taken].tolist():
+            if steps and not control.over:
+                trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
+                control.tell(trace[-1])
+        for k in np.argsort(found[:taken, 1])[: np.isfinite(found[:taken, 1]).sum()].tolist():
+            q, effort = chain.posture(seeds[k], at), float(found[k, 1])
+            if _is_free(problem, workspace, q):
+                known = bool(found[k, 2]) and (distance is not None or not budget.measures)
+                return Met(q, tuple(trace), known, blocked if least < SEEDS.worth * effort else None)
+            least, blocked = (effort, q) if effort < least else (least, blocked)
+        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS.together)
+    return None
+
+
+def _is_free(problem: Problem, workspace: Workspace, q: Array) -> bool:
+    """Whether every pair keeps its clearance at a posture (nq,)."""
+    near = workspace.near(q, float(problem.clearances.max(initial=0.0)))
+    return not (near.distance < problem.clearances[near.number]).any()
+
+
+def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
+    """The measure, where it is one squared distance that the other joints cannot lessen; else None."""
+    measures = problem.measures
+    if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
+        return None
+    distance: SquaredDistance = measures[0].distance  # type: ignore[attr-defined]
+    weights = distance.weights.copy()
+    weights[chain.idx_v] = 0.0
+    rest = weights * pin.difference(problem.scene.model, distance.reference, at)
+    return distance if (distance.weights[chain.idx_v] > 0.0).all() and not rest.any() else None
+
+
+def _support(parents: list[int]) -> NDArray[np.int8]:
+    """(n + 1, n) 1 where a column moves a joint; the first row is the world's."""
+    support = np.zeros((len(parents) + 1, len(parents)), dtype=np.int8)
+    for k, parent in enumerate(parents):
+        support[k + 1] = support[parent]
+        support[k + 1, k] = 1
+    return support
+
+
+def _is_plain(joint: pin.JointModel) -> bool:
+    return bool(joint.nv == 1) and str(joint.shortname()).startswith(("JointModelR", "JointModelP"))
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
+    from wholebody.methods.qp import chain_kernel
+
+    joint, one, axis = np.zeros(1, dtype=np.intp), np.zeros(1), np.zeros((1, 3))
+    chain = Chain(joint, np.zeros((1, 4, 3)), axis, axis, np.zeros((2, 1), dtype=np.int8), one, one)
+    room = Room(
+        np.zeros((2, 4, 3)), np.zeros((1, 6)), np.zeros((0, 6)), np.zeros(0), np.zeros((0, 1)), np.zeros(1, np.bool_)
+    )
+    goals = Goals(np.zeros((0, 36)), np.zeros((0, 6), dtype=np.int64))
+    chain_kernel.reach(chain, goals, room, np.zeros((1, 1)), np.zeros((2, 1)), np.zeros(4), np.zeros((1, 4)))
+    return chain_kernel

@@ -1,0 +1,333 @@
+"""Inverse kinematics of a chain of plain joints from many seeds, as compiled loops: see `chain`."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.compiled import compiled
+from wholebody.methods.qp.dense_kernel import solve
+from wholebody.terms.entries import Integers
+from wholebody.terms.residual_kernel import residuals
+
+TURN = 2.0 * np.pi
+
+
+class Chain(NamedTuple):
+    """Joints of one degree of freedom each that carry the frames of some goals.
+
+    Attributes:
+        parents: (n,) joint that each joint hangs on, 0 being the world; joint k is number k + 1.
+        places: (n, 4, 3) its placement in its parent at zero: columns of the rotation, then the translation.
+        turns: (n, 3) axis that it turns about, in its own frame; zero for one that slides.
+        slides: (n, 3) axis that it slides along; zero for one that turns.
+        support: (n + 1, n) 1 where a column moves a joint.
+        lower: (n,) least values of the joints.
+        upper: (n,) greatest values.
+    """
+
+    parents: Indices
+    places: Array
+    turns: Array
+    slides: Array
+    support: NDArray[np.int8]
+    lower: Array
+    upper: Array
+
+
+class Goals(NamedTuple):
+    """Goals of places and rotations, as in `terms.entries.RESIDUAL`, with the numbers of the chain's joints.
+
+    Attributes:
+        tables: (e, 36) their floats.
+        entries: (e, 6) their integers.
+    """
+
+    tables: Array
+    entries: Integers
+
+
+class Room(NamedTuple):
+    """Room for a descent.
+
+    Attributes:
+        joints: (n + 1, 4, 3) placements of the joints; the first is the world's.
+        columns: (n, 6) columns of the joint Jacobian.
+        wrench: (m, 6) of the errors.
+        value: (m,) the errors.
+        jacobian: (m, n) their derivatives.
+        free: (n,) whether a joint moves in the present step.
+    """
+
+    joints: Array
+    columns: Array
+    wrench: Array
+    value: Array
+    jacobian: Array
+    free: Mask
+
+
+@compiled(error_model="numpy")
+def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, asked: Array, found: Array) -> int:
+    """Descend from seeds, one after the other, and minimise the effort where the goals are met.
+
+    Args:
+        chain: the joints.
+        goals: what they are to reach.
+        room: written.
+        seeds: (k, n) where descents begin; each becomes where one ends.
+        nearest: (2, n) posture of least effort, and weights of the effort ``sum w (q - nearest)^2``, or zeros.
+        asked: (4,) norm of all errors at which the goals are met, metres and radians; damping of a step at the goals,
+            squared; most steps; how many ends that meet the goals are enough.
+        found: (k, 4) written: norm of the errors at an end; its effort, inf where goals are not met; 1 if the effort is
+            stationary there or not asked for; steps.
+
+    Returns:
+        How many seeds were taken.
+    """
+    tolerance, most, enough = asked[0], int(asked[2]), asked[3]
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
+    for k in range(len(seeds)):
+        q = seeds[k]
+        steps = _descend(chain, goals, room, q, tolerance, asked[1], most)
+        left = _norm(room.value)
+        found[k, 0], found[k, 1], found[k, 2], found[k, 3] = left, np.inf, 1.0, steps
+        if not left <= tolerance:
+            continue
+        _unwind(chain, q, nearest[0])
+        if weighed:
+            before = q.copy()
+            found[k, 3] += _least_effort(chain, goals, room, q, nearest, tolerance, found[k])
+            if found[k, 2] == 0.0:
+                q[:] = before
+        effort = 0.0
+        for i in range(len(q)):
+            effort += nearest[1, i] * (q[i] - nearest[0, i]) ** 2
+        found[k, 1] = effort
+        enough -= 1.0
+        if enough <= 0.0:
+            return k + 1
+    return len(seeds)
+
+
+@compiled(inner=True, error_model="numpy")
+def _descend(
+    chain: Chain, goals: Goals, room: Room, q: Array, tolerance: float, damping: float, most: int
+) -> int:  # fmt: skip
+    """Step by damped least squares until the errors of the goals are as small as they get, or hardly fall.
+
+    Sugihara 2011, "Solvability-Unconcerned Inverse Kinematics by the Levenberg-Marquardt Method", IEEE Transactions on
+    Robotics 27(5): the damping is half of the squared error. Joints stop at their limits.
+
+    Returns:
+        Steps taken; `room.value` has the errors at the end.
+    """
+    size, rows = len(q), len(room.value)
+    right, system, dq = np.empty(rows), np.empty((rows, rows)), np.empty(size)
+    before, marked = np.inf, np.inf
+    for count in range(most + 1):
+        evaluate(chain, goals, room, q)
+        left = _norm(room.value)
+        if count == most or left == 0.0 or (left <= tolerance and count and left > 0.5 * before):
+            return count
+        before = left
+        if count % 4 == 0:
+            if left > 0.6 * marked:  # given up: another seed gets there sooner
+                return count
+            marked = left
+        rows_of(chain, goals, room)
+        for i in range(size):
+            room.free[i], dq[i] = True, 0.0
+        held = True
+        while held:  # every round holds one more joint, so the loop ends
+            damped = damping
+            for r in range(rows):
+                right[r] = -room.value[r]
+                for i in range(size):
+                    if not room.free[i]:
+                        right[r] -= room.jacobian[r, i] * dq[i]
+                damped += 0.5 * right[r] * right[r]
+            for r in range(rows):
+                for s in range(r + 1):
+                    total = 0.0
+                    for i in range(size):
+                        if room.free[i]:
+                            total += room.jacobian[r, i] * room.jacobian[s, i]
+                    system[r, s] = total
+                system[r, r] += damped
+            if not solve(system, right):
+                return count
+            held = False
+            for i in range(size):
+                if room.free[i]:
+                    dq[i] = 0.0
+                    for r in range(rows):
+                        dq[i] += room.jacobian[r, i] * right[r]
+            held = _hold(chain, room.free, q, dq)
+        _move(chain, q, dq, 1.0)
+    return most
+
+
+@compiled(inner=True, error_model="numpy")
+def _least_effort(
+    chain: Chain, goals: Goals, room: Room, q: Array, nearest: Array, tolerance: float, found: Array
+) -> int:  # fmt: skip
+    """Step to the least effort among postures that meet the goals, by programs whose constraints are linear.
+
+    Each step is exact for ``min sum w (q + d - nearest)^2`` with ``J d + e = 0`` and joints within limits, whose
+    solution is ``d = p - W^-1 J' y`` with ``p = nearest - q`` and ``J W^-1 J' y = J p + e``. How far it goes along d
+    is J. Barzilai and J. M. Borwein's step length ("Two-Point Step Size Gradient Methods", IMA Journal of Numerical
+    Analysis 8, 1988), since the curvature of the constraints is left out of the programs. Sets ``found[0]`` to the
+    norm of the errors, and ``found[2]`` to 1 where it converged, else to 0.
+
+    Returns:
+        Steps taken.
+    """
+    size, rows = len(q), len(room.value)
+    right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
+    moved, before, share = np.zeros(size), np.zeros(size), 1.0
+    found[2] = 0.0
+    for count in range(40):
+        evaluate(chain, goals, room, q)
+        rows_of(chain, goals, room)
+        for i in range(size):
+            room.free[i], shift[i] = True, nearest[0, i] - q[i]
+            dq[i] = 0.0
+        held = True
+        while held:
+            for r in range(rows):
+                right[r] = room.value[r]
+                for i in range(size):
+                    right[r] += room.jacobian[r, i] * (shift[i] if room.free[i] else dq[i])
+                for s in range(r + 1):
+                    total = 0.0
+                    for i in range(size):
+                        if room.free[i]:
+                            total += room.jacobian[r, i] * room.jacobian[s, i] / nearest[1, i]
+                    system[r, s] = total
+                system[r, r] += 1e-12
+            if not solve(system, right):
+                return count
+            for i in range(size):
+                if room.free[i]:
+                    dq[i] = shift[i]
+                    for r in range(rows):
+                        dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
+            held = _hold(chain, room.free, q, dq)
+        longest = 0.0
+        for i in range(size):
+            longest = max(longest, abs(dq[i]))
+        left = _norm(room.value)
+        if longest < 1e-5 and left <= tolerance:
+            found[0] = left
+            for i in range(size):  # a joint that is held must be pushed against its limit
+                if not room.free[i]:
+                    slope = nearest[1, i] * (q[i] - nearest[0, i])
+                    for r in range(rows):
+                        slope += room.jacobian[r, i] * right[r]
+                    if (slope < -1e-6 and q[i] < chain.upper[i]) or (slope > 1e-6 and q[i] > chain.lower[i]):
+                        return count
+            found[2] = 1.0
+            return count
+        if count:
+            square, bent = 0.0, 0.0
+            for i in range(size):
+                square += moved[i] * moved[i]
+                bent += moved[i] * (before[i] - dq[i])
+            share = min(max(square / bent, 0.2), 3.0) if bent > 0.0 else 1.0
+        share = min(share, 0.3 / longest) if longest > 0.0 else share
+        for i in range(size):
+            moved[i], before[i] = share * dq[i], dq[i]
+        _move(chain, q, dq, share)
+    return 40
+
+
+@compiled(inner=True)
+def _hold(chain: Chain, free: Mask, q: Array, dq: Array) -> bool:
+    """Stop joints that would leave their limits there; whether there were any."""
+    held = False
+    for i in range(len(q)):
+        if free[i] and not chain.lower[i] <= q[i] + dq[i] <= chain.upper[i]:
+            dq[i] = min(max(dq[i], chain.lower[i] - q[i]), chain.upper[i] - q[i])
+            free[i], held = False, True
+    return held
+
+
+@compiled(inner=True)
+def _move(chain: Chain, q: Array, dq: Array, share: float) -> None:
+    for i in range(len(q)):
+        q[i] = min(max(q[i] + share * dq[i], chain.lower[i]), chain.upper[i])
+
+
+@compiled(inner=True)
+def _unwind(chain: Chain, q: Array, nearest: Array) -> None:
+    """Turn joints by whole turns to where they are nearest to a posture."""
+    for i in range(len(q)):
+        if chain.turns[i, 0] != 0.0 or chain.turns[i, 1] != 0.0 or chain.turns[i, 2] != 0.0:
+            while q[i] - nearest[i] > np.pi and q[i] - TURN >= chain.lower[i]:
+                q[i] -= TURN
+            while nearest[i] - q[i] > np.pi and q[i] + TURN <= chain.upper[i]:
+                q[i] += TURN
+
+
+@compiled(inner=True)
+def _norm(value: Array) -> float:
+    square = 0.0
+    for r in range(len(value)):
+        square += value[r] * value[r]
+    return float(np.sqrt(square))
+
+
+@compiled(error_model="numpy")
+def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
+    """Placements of the joints, columns of their Jacobian in the world, and the errors of the goals with wrenches."""
+    joints, columns, axis = room.joints, room.columns, np.empty(3)
+    for k in range(len(chain.parents)):
+        base, place, joint, column = joints[chain.parents[k]], chain.places[k], joints[k + 1], columns[k]
+        turn, slide = chain.turns[k], chain.slides[k]
+        for i in range(3):
+            joint[3, i] = base[3, i]
+            for m in range(3):
+                joint[3, i] += base[m, i] * place[3, m]
+        for j in range(3):
+            for i in range(3):
+                joint[j, i] = base[0, i] * place[j, 0] + base[1, i] * place[j, 1] + base[2, i] * place[j, 2]
+        for i in range(3):
+            column[i] = joint[0, i] * slide[0] + joint[1, i] * slide[1] + joint[2, i] * slide[2]
+            axis[i] = joint[0, i] * turn[0] + joint[1, i] * turn[1] + joint[2, i] * turn[2]
+        for i in range(3):
+            joint[3, i] += q[k] * column[i]
+        x, y, z = axis[0], axis[1], axis[2]
+        column[3], column[4], column[5] = x, y, z
+        if x != 0.0 or y != 0.0 or z != 0.0:
+            column[0] += joint[3, 1] * z - joint[3, 2] * y
+            column[1] += joint[3, 2] * x - joint[3, 0] * z
+            column[2] += joint[3, 0] * y - joint[3, 1] * x
+            cosine, sine = np.cos(q[k]), np.sin(q[k])
+            for j in range(3):  # Rodrigues
+                a, b, c = joint[j, 0], joint[j, 1], joint[j, 2]
+                along = (1.0 - cosine) * (x * a + y * b + z * c)
+                joint[j, 0] = cosine * a + sine * (y * c - z * b) + along * x
+                joint[j, 1] = cosine * b + sine * (z * a - x * c) + along * y
+                joint[j, 2] = cosine * c + sine * (x * b - y * a) + along * z
+    room.wrench[:] = 0.0
+    residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
+
+
+@compiled(error_model="numpy")
+def rows_of(chain: Chain, goals: Goals, room: Room) -> None:
+    """Rows of the goals: the rates at which their wrenches work on the motion of a joint relative to another."""
+    entries, support = goals.entries, chain.support
+    for e in range(len(entries)):
+        for r in range(entries[e, 0], entries[e, 0] + 3 * (entries[e, 3] + entries[e, 4])):
+            for k in range(len(room.columns)):
+                moved = support[entries[e, 1], k] - support[entries[e, 2], k]
+                room.jacobian[r, k] = 0.0
+                if moved != 0:
+                    for i in range(6):
+                        room.jacobian[r, k] += moved * room.wrench[r, i] * room.columns[k, i]
