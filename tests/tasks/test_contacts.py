@@ -41,7 +41,6 @@ TERMS = {
     "palm": wb.Grasp("left", "box"),
     "palm_side": wb.Grasp("right_hand", "box", side=(0, 0, 1)),
     "power": wb.Grasp("right", "bar", "power"),
-    "pinch": wb.Grasp("right", "bar", "pinch"),
 }
 HALF = 2e-6  # m, rad: half of a difference; coal's distances are good to 1e-9
 
@@ -250,6 +249,7 @@ def test_other_methods_refuse_by_name(scene: wb.Scene, method: str) -> None:
         (lambda: wb.Grasp("middle", "box"), "'left' or 'right'"),
         (lambda: wb.Grasp("left", "floor", "power"), "no end"),
         (lambda: wb.Grasp("left", "box", "claw"), "palm"),
+        (lambda: wb.Grasp("left", "bar", "pinch"), "one piece; load the person with hands='fingers'"),
         (lambda: wb.Lean("backrest", side=(0, 0, 0)), "no direction"),
     ],
 )
