@@ -33,10 +33,7 @@ CASES: tuple[Case, ...] = (
     ("sword cut", "nothing", "frames", 1),
 )
 USED: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(
-        (f"trajectory.{name}" for name in ("window_run", "sqp", "program", "nodes")),
-        ("trajectory",),
-    ),
+    **dict.fromkeys((f"trajectory.{name}" for name in ("window_run", "sqp", "program", "nodes")), ("trajectory",)),
     **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),
     "repair": ("bisection", "frames"),
     **dict.fromkeys(("one_side", "faults"), ("trajectory", "bisection", "frames")),

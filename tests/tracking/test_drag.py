@@ -9,6 +9,8 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.needs import each
+from wholebody.methods import control
 
 
 @pytest.fixture(scope="module")
@@ -60,6 +62,26 @@ def test_a_hand_is_not_dragged_through_a_plate(method: str, before_plate: Callab
     assert tip.oMi[frame.parentJoint].act(frame.placement.translation)[1] < 0.0
 
 
+@pytest.mark.parametrize("method", each(["qp", "newton", "ccd", "placo", "dls"]))
+def test_frames_whose_time_is_spent_are_free_and_arrive(
+    scene: wb.Scene, method: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The goal goes into a block, then before it. The clock is read ten times a frame, a hundred times by sweeps."""
+    problem = _problem(wb.Scene(scene.figure).add(wb.Box((0.3, 0.4, 0.2)), name="block", at=(0.5, -0.25, 0.9)))
+    drag = wb.Drag(problem, method, budget=0.01)
+    ticks = itertools.count()
+    monkeypatch.setattr(control.time, "thread_time", lambda: (0.0001 if method == "ccd" else 0.001) * next(ticks))
+    inside = [drag.to((0.5, -0.25, 0.9)) for _ in range(40)]
+    assert min(frame.error for frame in inside) > 0.05
+    for frame in inside:
+        judged = wb.assess(problem, frame.q)
+        assert judged.penetration < 1e-3
+        assert judged.constraint_violation < 1e-3
+    # to the end, a search of the goal inside takes 7 Newton steps, 60 programs of placo, or 143 sweeps
+    assert max(frame.iterations for frame in inside) <= {"ccd": 110, "newton": 4}.get(method, 11)
+    assert min(drag.to((0.3, -0.25, 1.0)).error for _ in range(60)) < 2e-3
+
+
 def test_newton_needs_few_iterations_a_frame_and_does_not_drift(scene: wb.Scene) -> None:
     problem = _problem(scene)
     drag = wb.Drag(problem, "newton")
@@ -77,6 +99,8 @@ def test_what_cannot_be_moved_is_named(scene: wb.Scene) -> None:
     problem = _problem(scene)
     with pytest.raises(wb.InputError, match="the number of the goal is 3; give a whole number between 0 and 0"):
         wb.Drag(problem, goal=3)
+    with pytest.raises(wb.InputError, match="budget"):
+        wb.Drag(problem, budget=0.0)
     with pytest.raises(wb.UnknownNameError, match="method"):
         wb.Drag(problem, "jacobi")
     with pytest.raises(wb.InputError, match="finite"):

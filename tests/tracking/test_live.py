@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.tracking import live
 from wholebody.tracking.live import LiveDrag
 
 SETTLING = 60
@@ -169,21 +168,3 @@ def test_an_assembly_without_bodies_is_refused_and_one_without_shapes_is_dragged
 def test_what_cannot_be_dragged_is_refused() -> None:
     with pytest.raises(wb.InputError, match="is not what can be dragged"):
         LiveDrag("human")  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("method", ["qp", "newton"])
-def test_slow_frames_go_a_part_of_the_way_and_arrive(
-    drag: LiveDrag, method: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """By a clock of which every frame takes ten."""
-    drag.choose(method)
-    start = drag.place("right_palm")
-    drag.take("right_palm")
-    now = iter(np.arange(1000) * 10.0 * live.FRAME)
-    monkeypatch.setattr(live.time, "thread_time", lambda: next(now))
-    goal, lefts = start + (0.05, 0.0, 0.05), []
-    for _ in range(60):
-        before = drag.place("right_palm")
-        lefts.append(drag.move(goal).error)
-        assert np.linalg.norm(drag.place("right_palm") - before) < max(0.5 * lefts[-1], 0.0025) or len(lefts) == 1
-    assert lefts[-1] < 1e-3

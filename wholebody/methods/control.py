@@ -22,6 +22,34 @@ LONGEST = 4.0
 """Default time limit of a solve, seconds of processor time. Few solves come near it, and the load of the machine does
 not change their answers."""
 
+
+class _Budget(threading.local):
+    """The processor's time that this thread has for a frame, see `within_budget`."""
+
+    seconds, until = np.inf, np.inf
+
+    @property
+    def spent(self) -> float:
+        """The share of it that has passed; 0 without a bound."""
+        if self.seconds == np.inf:
+            return 0.0
+        return 1.0 - (self.until - time.thread_time() + compile_seconds()) / self.seconds
+
+
+BUDGET = _Budget()
+
+
+@contextmanager
+def within_budget(seconds: float) -> Iterator[None]:
+    """Inside it searches of this thread end after so many seconds of the processor, with the best posture so far."""
+    before = BUDGET.seconds, BUDGET.until
+    BUDGET.seconds, BUDGET.until = seconds, time.thread_time() - compile_seconds() + seconds
+    try:
+        yield
+    finally:
+        BUDGET.seconds, BUDGET.until = before
+
+
 Progress = Callable[[TraceEntry], Any]
 """Called after every iteration with its entry of the trace; if it returns True, the solve ends."""
 
@@ -61,10 +89,10 @@ class Control:
     @property
     def over(self) -> bool:
         """Whether the solve has to end now."""
-        if not self.reason and self._may_be_over and self.spent > 1.0:
+        if not self.reason and self._may_be_over and self._passed > 1.0:
             limit, kind = (LONGEST, " of processor time") if self._time_limit is None else (self._time_limit, "")
             self.reason = f"the time limit of {limit:g} s{kind} ended it"
-        return bool(self.reason)
+        return bool(self.reason) or BUDGET.spent > 1.0
 
     @property
     def _may_be_over(self) -> bool:
@@ -73,7 +101,11 @@ class Control:
 
     @property
     def spent(self) -> float:
-        """Share of the time limit that has passed."""
+        """Share of the time limit, or of a budget, that has passed."""
+        return max(self._passed, BUDGET.spent)
+
+    @property
+    def _passed(self) -> float:
         return (self._now() - self._began) / (LONGEST if self._time_limit is None else self._time_limit)
 
     def _now(self) -> float:

@@ -121,7 +121,7 @@ class _Descent:
                 return True
             if self.steps and step <= REST * method.tolerance:
                 return True
-            if self.steps == method.iterations or self._control.over:
+            if self.steps == method.iterations or (self.steps and self._control.over):  # a frame gets on in any case
                 break
             moved = self._moved(q, self._step(held, wanted))
             if moved is None:

@@ -148,7 +148,7 @@ class Iteration:
             if self.steps and not early and length <= REST * settings.tolerance:
                 self.converged = True
                 return
-            if self.steps == settings.iterations or self._control.over:
+            if self.steps == settings.iterations or (self.steps and self._control.over):  # a frame gets on in any case
                 return
             try:
                 move = self._move()

@@ -35,27 +35,10 @@ from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
 from wholebody.tasks.base import Bound
 
-METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
-        "frames": ("wholebody.motion.per_frame", "PerFrame"),
-        "bisection": ("wholebody.motion.bisection.method", "Bisection"),
-    }
+METHODS: Mapping[str, str] = MappingProxyType(
+    {"trajectory": "Trajectory", "frames": "PerFrame", "bisection": "Bisection"}
 )
-"""Methods by name: module and class of the settings."""
-
-
-def avoider_named(name: str) -> Avoider:
-    """A method with its default settings.
-
-    Raises:
-        UnknownNameError: there is no such method.
-    """
-    if name not in METHODS:
-        raise UnknownNameError("method of avoidance", name, METHODS)
-    module, kind = METHODS[name]
-    made: Avoider = getattr(import_module(module), kind)()
-    return made
+"""Methods by name: the classes of their settings in `wholebody.motion`."""
 
 
 def as_avoider(given: object) -> Avoider:
@@ -66,7 +49,10 @@ def as_avoider(given: object) -> Avoider:
         InputError: it is neither.
     """
     if isinstance(given, str):
-        return avoider_named(given)
+        if given not in METHODS:
+            raise UnknownNameError("method of avoidance", given, METHODS)
+        made: Avoider = getattr(import_module("wholebody.motion"), METHODS[given])()
+        return made
     if isinstance(given, type) or not callable(getattr(given, "avoid", None)):
         raise InputError(
             f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.motion.Trajectory()"

@@ -31,16 +31,15 @@ SIDES = (
 )
 """How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
 
-_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
-_OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
-
 
 def other_side(name: str) -> str:
     """The name of the same part on the other side; the name itself if it names no side."""
+    words = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+    words |= {right: left for left, right in words.items()}
     for left, right in SIDES:
         both = re.compile(f"{left}|{right}")
         if both.search(name):
-            return both.sub(lambda found: _OTHER[found.group()], name, count=1)
+            return both.sub(lambda found: words[found.group()], name, count=1)
     return name
 
 
@@ -308,16 +307,6 @@ class Clip:
             a[-1] = 2.0 * a[-2] - a[-1 - last]
         a /= self.dt**2
         return a
-
-    def jerk(self) -> Array:
-        """Jerk (n, nv), rad/s³ and m/s³: differences of the accelerations, exact for cubic polynomials of time.
-
-        It is zero for a clip of less than four frames.
-        """
-        if len(self) < 4:
-            return np.zeros((len(self), self.figure.model.nv))
-        found: Array = np.gradient(self.accelerations(), self.dt, axis=0)
-        return found
 
     def _differences(self) -> tuple[Array, Array]:
         """Displacements (n, nv) from each frame to the next one and to the one before; zero where there is none."""

@@ -16,6 +16,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
+from wholebody.motion.stance import pieces_on
 from wholebody.tasks.balance import convex_polygon, edges, low_points
 
 ROOT = 6  # degrees of freedom of a free root
@@ -40,9 +41,7 @@ class Soles:
         self._pieces: list[list[Any]] = []
         for foot in feet:
             joint = figure.model.frames[figure.frame_id(foot)].parentJoint
-            pieces = [
-                piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
-            ]
+            pieces = pieces_on(figure, joint)
             if joint == 0 or not pieces:
                 raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
             self.joints.append(joint)

@@ -14,11 +14,10 @@ import numpy as np
 
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
-from wholebody.motion.avoider import MethodResult
+from wholebody.motion.avoider import MethodResult, Work
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import LoadChange
-from wholebody.motion.following import Work
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.measures import MotionBounds, excess
 from wholebody.tasks.base import filled

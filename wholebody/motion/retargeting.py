@@ -21,13 +21,6 @@ from wholebody.motion.skeleton import SkeletonMotion, checked_motion
 from wholebody.motion.stance import paths
 from wholebody.tracking.tracks import check_figure
 
-POINTS = {"hip": 1.0, "knee": 1.0, "ankle": 2.0, "toe": 1.0, "shoulder": 1.0, "elbow": 1.0, "wrist": 1.5, "hand": 0.5,
-          "neck": 0.5, "head": 0.7}  # fmt: skip
-"""Weight of the distance of each part."""
-
-TURNS = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}
-"""Weight of the angle of each part, metres per radian."""
-
 ALONE, TOGETHER = 25, 4  # most iterations of a frame alone, and of all frames at once
 
 
@@ -166,11 +159,13 @@ class _Retargeting:
             else np.zeros((len(motion), 0, 3, 3))
         )
         self.root = wanted.root
-        self.point_weights = np.tile([POINTS[role.split("_")[-1]] for role in self.points], (len(motion), 1))
+        far = {"ankle": 2.0, "wrist": 1.5, "hand": 0.5, "neck": 0.5, "head": 0.7}  # weights of distances
+        self.point_weights = np.tile([far.get(role.split("_")[-1], 1.0) for role in self.points], (len(motion), 1))
         for column, role in enumerate(self.points):
             if role in steps.stands:
                 self.point_weights[steps.stands[role], column] = 30.0
-        self.turn_weights = np.array([TURNS[role.split("_")[-1]] for role in self.turns])
+        turned = {"pelvis": 0.3, "head": 0.15, "ankle": 0.15, "hand": 0.08}  # m/rad, weights of angles
+        self.turn_weights = np.array([turned[role.split("_")[-1]] for role in self.turns])
         self.count = len(motion)
         self.neutral = figure.neutral
         # metres per radian from the neutral posture, for what no goal determines

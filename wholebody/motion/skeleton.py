@@ -21,8 +21,7 @@ UNITS = {
 }
 """Units of length of motion files, metres; CMU's converted files keep the scale 0.45 of its skeletons."""
 
-RIGID = 1e-6
-"""By how much the product of a rotation and its transpose may differ from the identity."""
+RIGID = 1e-6  # by which the product of a rotation and its transpose may differ from the identity
 
 
 @dataclass(frozen=True, eq=False)

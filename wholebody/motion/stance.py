@@ -114,6 +114,11 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     return found
 
 
+def pieces_on(figure: Figure, joint: int) -> list[Any]:
+    """Pieces of a figure that a joint, or one after it, carries."""
+    return [piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]]
+
+
 def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]:
     """The segments on which a figure with a free root stands, or else the frames that `StanceFeet` among terms name."""
     if figure.root != "free":
@@ -174,9 +179,7 @@ class _Foot:
 
     def __init__(self, figure: Figure, joint: int, names: set[str], stands: Sequence[Sequence[str]]) -> None:
         self.names = names
-        self.pieces = [
-            piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
-        ]
+        self.pieces = pieces_on(figure, joint)
         self.stands: list[Window] = runs(np.array([any(name in names for name in each) for each in stands], dtype=bool))
         self.shifts = [np.zeros(3) for _ in self.stands]
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.methods.control import BUDGET, within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.scene.moving_obstacles import Collision
-
-GOAL_MOVES = (np.inf, 0.01, 0.002)  # m, rad: moves of the goal in a frame, tried until the motion is free
 
 
 class DragFrame(NamedTuple):
@@ -40,6 +40,33 @@ class DragFrame(NamedTuple):
         return f"DragFrame: error {self.error:.3g}, {self.iterations} iterations, {1e3 * self.seconds:.3g} ms{hit}"
 
 
+class GoalMoves:
+    """How far the goal moves in a frame: all the way, or as far as its budget was enough for lately."""
+
+    def __init__(self) -> None:
+        """Begin with the whole way."""
+        self._most, self._error = np.inf, 0.0
+
+    def shares(self, error: float) -> Iterator[float]:
+        """Shares of the way to a goal, which is `error` metres or radians away; to be tried until a motion is free.
+
+        None is tried after the budget is spent.
+        """
+        self._error = error
+        moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
+        for number, move in enumerate(moves):
+            if number == 0 or (move < error and BUDGET.spent < 1.0):
+                yield min(1.0, move / error) if error else 1.0
+
+    def end(self, error: float) -> None:
+        """End a frame that left an error: the next goes twice as far, or half as far if the budget was not enough."""
+        asked = min(self._most, self._error)
+        if BUDGET.spent < 0.5 or self._error - error > 0.5 * asked:
+            self._most *= 2.0
+        elif BUDGET.spent > 1.0:
+            self._most = max(0.5 * asked, 0.002)  # m, rad
+
+
 class AssemblyDrag:
     """Follows a goal of an assembly that is moved from frame to frame; it moves the assembly's bodies.
 
@@ -47,13 +74,13 @@ class AssemblyDrag:
     bodies go back to where they were and the goal moves by a shorter distance, or not in that frame.
     """
 
-    def __init__(self, assembly: Assembly, goal: int) -> None:
+    def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:
         """Begin a drag at the assembly's present placements.
 
         Raises:
             InputError: there is no such goal.
         """
-        self._goal = assembly.goal_index(goal)
+        self._goal, self._seconds, self._moves = assembly.goal_index(goal), seconds, GoalMoves()
         self.assembly = assembly.prepare()
 
     @property
@@ -73,16 +100,16 @@ class AssemblyDrag:
         made.retarget(goal, target)
         error = made.goal_error(goal)
         try:
-            for move in GOAL_MOVES:
-                if move < error:
-                    made.interpolate_goal(goal, move / error, target)
-                elif np.isfinite(move):
-                    continue  # the goal is nearer than that, and was tried already
-                step = made.step()
-                spent, collisions = spent + step.iterations, collisions or step.collisions
-                path = step.path or path
-                if step.taken:
-                    break
+            with within_budget(self._seconds):
+                for share in self._moves.shares(error):
+                    if share < 1.0:
+                        made.interpolate_goal(goal, share, target)
+                    step = made.step()
+                    spent, collisions = spent + step.iterations, collisions or step.collisions
+                    path = step.path or path
+                    if step.taken:
+                        break
+                self._moves.end(made.goal_error(goal))
         finally:
             made.retarget(goal, target)
         left = max(made.goal_error(number) for number in range(len(made.goals)))

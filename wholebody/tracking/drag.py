@@ -7,16 +7,18 @@ high.
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
 from typing import Any, Generic, TypeVar, overload
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import posture, shown, time_step
+from wholebody.base.checks import number, posture, shown, time_step
 from wholebody.base.errors import InputError
 from wholebody.base.pool import OneAtATime
 from wholebody.geometry.continuous.passing_through import GRAZE, is_free
-from wholebody.methods.base import Method, Tracker, goal_error, judged
+from wholebody.methods.base import Method, Step, Tracker, goal_error, judged
+from wholebody.methods.control import within_budget
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.methods.newton.assembly_solution import AssemblySolution
 from wholebody.methods.solve import method_for_motions
@@ -24,8 +26,7 @@ from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.workspace import NotCopyable, Workspace
 from wholebody.solution import Solution
-from wholebody.tasks import Frame, Point
-from wholebody.tracking.assembly_drag import GOAL_MOVES, AssemblyDrag, DragFrame
+from wholebody.tracking.assembly_drag import AssemblyDrag, DragFrame, GoalMoves
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.moving_goals import copied, interpolated_target, moving_goal, retarget
 from wholebody.tracking.warm_start import warm_started
@@ -42,7 +43,7 @@ class ProblemDrag:
         tracker: the method's tracker of these goals.
     """
 
-    def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float) -> None:
+    def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
         """Begin a drag at the problem's start.
 
         Raises:
@@ -55,7 +56,7 @@ class ProblemDrag:
         self._workspace = self.tracker.workspace
         self._alone = OneAtATime("drag")
         moving_goal(problem, goal)
-        self._number = goal
+        self._number, self._seconds, self._moves = goal, budget, GoalMoves()
         self._motion: FrameMotion | None = None
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
@@ -66,12 +67,12 @@ class ProblemDrag:
             InputError: the target is not one.
         """
         began = time.perf_counter()
-        with self._alone:
+        with self._alone, within_budget(self._seconds):
             retarget(self.problem, self._number, target)
             self._workspace.refresh()
             collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
-                step = self.tracker.frame(self.q)
+                step = next(self._frames())
                 self.q, iterations = step.q, step.iterations
                 collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
@@ -80,6 +81,7 @@ class ProblemDrag:
                 if self._motion is not None:
                     collisions = judged(self._workspace, self._motion, before, self.q)
                     path = ((0.0, before), (1.0, self.q))
+            self._moves.end(self._left()[1])
             error = goal_error(self.problem, self._workspace, self.q)
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
@@ -91,26 +93,12 @@ class ProblemDrag:
             return solution
 
     def _followed(self) -> int:
-        """Move by the longest of `GOAL_MOVES` towards the goal for which the motion is free; returns the iterations.
+        """Move by the longest of `GoalMoves` towards the goal for which the motion is free; returns the iterations.
 
         If a thing was moved into the figure, move out of it.
         """
-        goal, deep = moving_goal(self.problem, self._number), self._came_in()
-        try:
-            return self._follow(goal, deep)
-        finally:
-            retarget(self.problem, self._number, goal.target)
-
-    def _follow(self, goal: Point | Frame, deep: float) -> int:
-        spent, tried = 0, list[Array]()
-        left = goal.error(self._workspace.state.update(self.q))
-        error = max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
-        for move in GOAL_MOVES:
-            if move < error:
-                retarget(self.problem, self._number, interpolated_target(goal, left, move / error))
-            elif np.isfinite(move):
-                continue  # the goal is nearer than that, and was tried already
-            step = self.tracker.frame(self.q)
+        spent, tried, deep = 0, list[Array](), self._came_in()
+        for step in self._frames():
             spent, q = spent + step.iterations, step.q
             if self._is_free(q, self.tracker.unswept) and (not deep or _depth(self._workspace, q) <= GRAZE):
                 self.q = q
@@ -120,6 +108,22 @@ class ProblemDrag:
             if deep:
                 self._leave(tried, deep)
         return spent
+
+    def _frames(self) -> Iterator[Step]:
+        """The tracker's frames from the present posture, by one of `GoalMoves` after the other."""
+        goal = moving_goal(self.problem, self._number)
+        left, error = self._left()
+        for share in self._moves.shares(error):
+            if share < 1.0:
+                retarget(self.problem, self._number, interpolated_target(goal, left, share))
+            step = self.tracker.frame(self.q)
+            retarget(self.problem, self._number, goal.target)
+            yield step
+
+    def _left(self) -> tuple[Array, float]:
+        """The error of the moving goal at the present posture, and its length, metres or radians."""
+        left = moving_goal(self.problem, self._number).error(self._workspace.state.update(self.q))
+        return left, max(float(np.linalg.norm(left[:3])), float(np.linalg.norm(left[3:])))
 
     def _is_free(self, q: Array, unswept: float) -> bool:
         """Whether the motion to the posture q (nq,) is free, with things that move meanwhile; see `is_free`."""
@@ -165,16 +169,31 @@ class Drag(NotCopyable, Generic[Answer]):
     named in the answer.
 
     A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
+
+    With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
+    to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
     """
 
     @overload
     def __init__(
-        self: Drag[Solution], problem: Problem, method: str | Method = ..., *, goal: int = ..., dt: float = ...
+        self: Drag[Solution],
+        problem: Problem,
+        method: str | Method = ...,
+        *,
+        goal: int = ...,
+        dt: float = ...,
+        budget: float = ...,
     ) -> None: ...
     @overload
-    def __init__(self: Drag[AssemblySolution], problem: Assembly, *, goal: int = ...) -> None: ...
+    def __init__(self: Drag[AssemblySolution], problem: Assembly, *, goal: int = ..., budget: float = ...) -> None: ...
     def __init__(
-        self, problem: Problem | Assembly, method: str | Method = "qp", *, goal: int = 0, dt: float = FRAME
+        self,
+        problem: Problem | Assembly,
+        method: str | Method = "qp",
+        *,
+        goal: int = 0,
+        dt: float = FRAME,
+        budget: float = np.inf,
     ) -> None:
         """Begin a drag at the problem's start, or where the assembly's bodies are.
 
@@ -184,21 +203,23 @@ class Drag(NotCopyable, Generic[Answer]):
                 configured method, which is used as it is. An assembly has one method only.
             goal: index of the goal that moves.
             dt: seconds a frame, for methods that bound velocities.
+            budget: seconds of the processor after which the search of a frame ends; the next goes on from there.
 
         Raises:
-            InputError: there is no such goal, or it is of another kind.
+            InputError: there is no such goal, it is of another kind, or the budget is not positive.
             UnknownNameError: there is no such method.
         """
         self._run: ProblemDrag | AssemblyDrag
+        budget = np.inf if budget == np.inf else number(budget, "Drag: budget", 1e-9, 3600.0, "s")
         if isinstance(problem, Assembly):
             dt = time_step(dt, "dt")
             if method not in ("qp", "newton"):
                 raise InputError(
                     f"Drag: an assembly is solved by Newton steps, not by {shown(method)}; leave method out"
                 )
-            self._run = AssemblyDrag(problem, goal)
+            self._run = AssemblyDrag(problem, goal, budget)
         else:
-            self._run = ProblemDrag(problem, method, goal=goal, dt=dt)
+            self._run = ProblemDrag(problem, method, goal=goal, dt=dt, budget=budget)
 
     @property
     def q(self) -> Array:

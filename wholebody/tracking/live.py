@@ -24,8 +24,6 @@ from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live_subjects import LiveSubject, live_subject, things_of
 
 FARTHEST_STEP = 0.5  # m: a thing does not jump farther than this in a frame
-SLOW, QUICK = 1.5 * FRAME, 0.75 * FRAME  # s of the processor: after such a frame the goal may go half, or twice as far
-LEAST_MOVE = 0.002  # m: a goal may always go so far in a frame
 
 
 class LiveFrame(NamedTuple):
@@ -91,7 +89,6 @@ class LiveDrag:
         self.choose(method)
         self._drag: Drag[Any] | None = None
         self._trouble = ""
-        self._most, self._asked = np.inf, 0.0  # m: how far a goal may go in a frame, and was asked to go
         self._state = self.scene.state(self.q)
 
     # ---- what the mouse and the buttons do
@@ -110,14 +107,13 @@ class LiveDrag:
 
     def let_go(self) -> None:
         """Let the handle go; the figure stays."""
-        self.taken, self._drag, self._trouble, self._most = "", None, "", np.inf
+        self.taken, self._drag, self._trouble = "", None, ""
 
     def move(self, place: Array) -> LiveFrame:
         """Move the handle that was taken to a place (3,), and make one frame.
 
-        A goal inside of a thing takes the longer the deeper it is. So after a slow frame the goal goes a part of the
-        way; moved to the same place again, it goes on. A figure that cannot follow keeps its posture, and the status
-        says why.
+        A frame has a budget of the processor's time, see `Drag`; moved to the same place again, the figure goes on. A
+        figure that cannot follow keeps its posture, and the status says why.
 
         Raises:
             InputError: no handle was taken, or the place is not three finite numbers.
@@ -125,21 +121,19 @@ class LiveDrag:
         if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (3,), "the place of a handle")
-        began, spent = time.perf_counter(), time.thread_time()
-        error = 0.0
+        began, error = time.perf_counter(), 0.0
         if self._drag is not None:
             try:
                 if self.taken in self.things:
                     self._push(place)
                     frame = self._drag.to(self.place(next(iter(self.handles))))
                 else:
-                    frame = self._drag.to(self._goal(place))
+                    frame = self._drag.to(place)
                     error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
                 self.q = np.array(frame.q)
                 self._subject.arrived()
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
-            self._pace(time.thread_time() - spent)
         return self._report(error, time.perf_counter() - began)
 
     def toggle(self, name: str) -> bool:
@@ -205,26 +199,13 @@ class LiveDrag:
 
     def _restart(self) -> None:
         """Begin to follow anew: holds, handle or method are others."""
-        self._trouble, self._most, self._asked = "", np.inf, 0.0
+        self._trouble = ""
         followed = self.taken if self.taken in self.handles else next(iter(self.handles))
         held = self.held - {self.taken}
         try:
             self._drag = self._subject.drag(self.q, followed, self.place(followed), held, self.method)
         except WholebodyError as trouble:
             self._drag, self._trouble = None, str(trouble)
-
-    def _goal(self, place: Array) -> Array:
-        """Where the goal goes in this frame towards a place (3,)."""
-        here = self.place(self.taken)
-        self._asked = float(np.linalg.norm(place - here))
-        return here + (place - here) * min(1.0, self._most / max(self._asked, LEAST_MOVE))
-
-    def _pace(self, spent: float) -> None:
-        """How far a goal may go in the next frame, after one that took so many seconds of the processor."""
-        if spent > SLOW:
-            self._most = max(0.5 * min(self._most, self._asked), LEAST_MOVE)
-        elif spent < QUICK:
-            self._most *= 2.0
 
     def _push(self, place: Array) -> None:
         at = self.scene.objects[self.taken].placement

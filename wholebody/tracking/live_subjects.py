@@ -18,6 +18,9 @@ from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold, Point
 from wholebody.tracking.drag import Drag
+from wholebody.tracking.frame import FRAME
+
+BUDGET = 0.5 * FRAME  # s of the processor for a frame's search; a last iteration, sweeps and drawing take as much
 
 HANDLES = ("left_palm", "right_palm", "left_sole", "right_sole", "pelvis", "head_top")
 """Frames of people with handles: hands, feet, pelvis, head."""
@@ -125,7 +128,7 @@ class LiveProblem:
 
     def drag(self, q: Array, followed: str, place: Array, held: Collection[str], method: Method) -> Drag[Any]:
         """See `LiveSubject.drag`."""
-        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method)
+        return Drag(self.stated(q, [Point(followed, place), *self.problem.goals], held), method, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """See `LiveSubject.move`."""
@@ -173,7 +176,7 @@ class LiveAssembly:
         for name in held:
             made.fixed("world", name)
         made.point_goal(followed, place)
-        return Drag(made, goal=len(made.goals) - 1)
+        return Drag(made, goal=len(made.goals) - 1, budget=BUDGET)
 
     def move(self, name: str, at: pin.SE3, over: float | None = None) -> None:
         """See `LiveSubject.move`."""

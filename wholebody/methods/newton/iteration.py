@@ -127,8 +127,11 @@ class Iteration:
         least, stagnant = sum(norms), 0
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
+        begun, most = self.x, FRAMES.time_share if early_exit else 1.0
         for _ in range(iterations):
-            if self._holds(goals) or active.control.over:
+            over = active.control.over or active.control.spent > most
+            # a frame gets on in any case: its budget ends it after a step
+            if self._holds(goals) or active.control.reason or (over and self.x is not begun):
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
@@ -176,7 +179,7 @@ class Iteration:
             most = STEPS.amplified * (violation + min(trust.clamp, self.goal))
         try:
             step = self.step(trust.damping, trust.share, share, goals, measures)
-            while self._motion(step) > most and trust.damping < 1.0:
+            while self._motion(step) > most and trust.damping < 1.0 and not self.active_system.control.over:
                 trust.raise_damping()
                 step = self.step(trust.damping, trust.share, share, goals, measures)
         except SingularSystemError:
@@ -267,7 +270,7 @@ class Iteration:
             change = self.system.pattern.times(self.values, step)[rows]
             share, again = self.state.correct(phi + change, y[rows])
             at = at + share * (step - at)
-            if not again:
+            if not again or self.active_system.control.over:
                 break
         return at
 

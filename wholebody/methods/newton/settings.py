@@ -63,6 +63,7 @@ class Frames(NamedTuple):
         hard_tolerance: m, rad: of joints and contacts of assemblies.
         least_progress: relative reduction below which a step counts as no progress.
         patience: steps without progress in a row after which a frame ends.
+        time_share: of a frame's processor time, where that is bounded, for steps towards the goals; the others restore.
     """
 
     iterations: int = 12
@@ -70,6 +71,7 @@ class Frames(NamedTuple):
     hard_tolerance: float = 1e-6
     least_progress: float = 0.1
     patience: int = 2
+    time_share: float = 0.5
 
 
 class Endings(NamedTuple):

@@ -14,6 +14,7 @@ from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
 from wholebody.methods.base import begun, judged, nearest_to
+from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
@@ -126,7 +127,10 @@ class NewtonTracker(NotCopyable):
             if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
-            return NewtonStep(active_system.posture(found.x), spent, found.systems, active_system.structures)
+            # where the time of a frame was not enough to restore what must hold, the next goes on from here
+            cut = BUDGET.spent > 1.0 and not found.hard <= FRAMES.tolerance
+            end = q if cut else active_system.posture(found.x)
+            return NewtonStep(end, spent, found.systems, active_system.structures)
 
     def _satisfied(self, active_system: FigureSystem, q: Array, enough: float, even: bool) -> FeasibilityResult:
         """The end of the iteration from the posture q (nq,); goals count alike if `even`."""

@@ -23,7 +23,6 @@ from wholebody.motion.bisection.prediction import Prediction, Predictor, path_pl
 from wholebody.tasks import Freeze, Plane
 from wholebody.tracking.tracks import MOST_FRAMES
 
-SWINGING = ("left_elbow", "right_elbow", "left_ankle", "right_ankle")  # have planes where the figure has them
 FAR = 0.3  # rad, m: a prediction that goes farther may be a poor local answer, and others are tried
 
 
@@ -153,7 +152,8 @@ class Recursion:
         run = predictor.run
         self._run, self._predictor, self._settings = run, predictor, settings
         figure = run.scene.figure
-        usual = tuple(name for name in SWINGING if name in figure.frames)
+        swinging = (f"{side}_{part}" for part in ("elbow", "ankle") for side in ("left", "right"))
+        usual = tuple(name for name in swinging if name in figure.frames)
         self._planes = usual if settings.planes is None else settings.planes
         # nine in ten predictions take at most 20 programs
         self._short = settings.short if settings.method == "qp" else None

@@ -19,7 +19,6 @@ from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
-RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""
 
@@ -61,9 +60,10 @@ def read_motion(path: Path) -> SkeletonMotion:
 
 def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, float]:
     """Poses (n, 3 x joints) and places (n, 3) of an archive, and its frame rate, checked; see `read_motion`."""
-    rate = next((arrays[key] for key in RATES if key in arrays), None)
+    rates = ("mocap_framerate", "mocap_frame_rate", "fps")
+    rate = next((arrays[key] for key in rates if key in arrays), None)
     if not is_amass(arrays) or rate is None:
-        missing = [key for key in ("poses", "trans") if key not in arrays] or [RATES[0]]
+        missing = [key for key in ("poses", "trans") if key not in arrays] or [rates[0]]
         raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
     if "poses" in arrays:
         poses = _numbers(arrays["poses"], f"{name}: poses")

@@ -20,9 +20,6 @@ from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, spee
 from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
 
-CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
-# rows, as filters change less of it
-
 
 @dataclass(frozen=True)
 class Trajectory:
@@ -36,7 +33,6 @@ class Trajectory:
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
             brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s.
         margin: seconds before and after a collision in which frames may be changed.
-        iterations: most steps of one run of a window; a step takes one to three quadratic programs.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
             timing; joints that the clip moves faster than their limits then stay as fast.
@@ -52,7 +48,6 @@ class Trajectory:
     clearance: float = 0.0
     time: float | None = None
     margin: float = 0.5
-    iterations: int = 40
     stretch: float = 1.0
     dynamics: Strength | None = None
 
@@ -62,7 +57,6 @@ class Trajectory:
         if self.time is not None:
             checks.settle(self, "time", checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s"))
         checks.settle(self, "margin", checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s"))
-        checks.settle(self, "iterations", checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000))
         checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
@@ -93,13 +87,15 @@ class Trajectory:
         """
         if loads is None:
             return q
-        faults, corrected, times = run.faults(reference), loads.corrected(q), list(CORRECTING)
+        # s: smoothness of the answers, the next where one gets no farther; filters change less of what is smoother
+        times = [0.2, 0.1]
+        faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
             beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
             if not beyond.any() or not times or run.ended:
                 break
-            windows = ClipRun(run, reference, times[0], self.iterations, rate, corrected)
+            windows = ClipRun(run, reference, times[0], rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in run.windows(changed, self.margin):
@@ -122,7 +118,7 @@ class Trajectory:
 
         Frames (n,) that are beyond something else are changed too.
         """
-        windows = ClipRun(run, reference, self.time, self.iterations, rate, loads)
+        windows = ClipRun(run, reference, self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)

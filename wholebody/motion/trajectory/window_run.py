@@ -41,6 +41,7 @@ class WindowSettings:
         jerk: parts of the original's; an answer with more is made smoother.
         share: of the squared deviation; acceleration that costs less leaves little to gain.
         rounds: of sweeping and adding places between frames.
+        iterations: most steps of one run; a step takes one to three programs.
     """
 
     first: float = 0.1
@@ -49,6 +50,7 @@ class WindowSettings:
     jerk: float = 1.2
     share: float = 0.1
     rounds: int = 12
+    iterations: int = 40
 
 
 SETTINGS = WindowSettings()
@@ -120,7 +122,7 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, reference: Array, time: float | None, iterations: int = 40, rate: float = 1.0,
+        self, run: Run, reference: Array, time: float | None, rate: float = 1.0,
         loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
@@ -129,12 +131,11 @@ class ClipRun:
             run: of the clip.
             reference: (n, nq) postures that the deviations are from.
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            iterations: most steps of one run.
             rate: factor of the speed limits, for a clip that will be slowed by as much.
             loads: of the reference postures, if they are to keep to their bounds.
         """
         self._run, self._reference = run, reference
-        self._time, self._iterations, self._rate, self._loads = time, iterations, rate, loads
+        self._time, self._rate, self._loads = time, rate, loads
 
     def kept_back(
         self,
@@ -268,12 +269,12 @@ class ClipRun:
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
         work = self._run.work
-        program = WindowProgram(own.evaluator, objective, own.limits, self._iterations)
+        program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
         program.add(begun.between)
         x, radius, dipped, near = begun.x, way.radius, set[int](), list[Node]()
 
         def told(count: int, worst: float) -> bool:
-            return own.cancel(count / self._iterations)
+            return own.cancel(count / SETTINGS.iterations)
 
         for number in range(SETTINGS.rounds):
             # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
