@@ -19,7 +19,7 @@ from wholebody.bench.suite.adapters.base import Budget
 DEFAULT: Budget = (1e-4, None)
 """The budget at which all cases are solved: a tenth of a millimetre and of a milliradian, iterations as they come."""
 
-COARSE, FINE = 1e-3, 1e-4  # m, rad: to which an answer is called a success
+COARSE = 1e-3  # m, rad: to which an answer is called a success
 FLOOR = 1e-9  # m, rad: errors below this are not told apart
 
 ANSWERED, REFUSED, FAILED, OVERTIME = "answered", "refused", "failed", "overtime"

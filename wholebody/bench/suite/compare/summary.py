@@ -11,7 +11,6 @@ from wholebody.bench.statistics import Interval, median, share, shifted_geometri
 from wholebody.bench.suite.compare.results import (
     COARSE,
     FAILED,
-    FINE,
     OVERTIME,
     REFUSED,
     Chunk,
@@ -92,7 +91,7 @@ class Summary:
     overtime: int = field(metadata=of(lambda cell: cell.count(OVERTIME)))
     said: str = field(metadata=of(lambda cell: cell.silent[0].said if cell.silent else ""))
     success: Interval = field(metadata=of(lambda cell: share([one.success(COARSE) for one in cell.taken])))
-    success_fine: float = field(metadata=of(lambda cell: share([one.success(FINE) for one in cell.taken]).value))
+    success_fine: float = field(metadata=of(lambda cell: share([one.success(1e-4) for one in cell.taken]).value))
     false_claims: int = field(metadata=of(lambda cell: sum(one.false_claim for one in cell.mine)))
     median_ms: Interval = field(metadata=of(lambda cell: median([one.seconds for one in cell.answered]).scaled(1e3)))
     mean_ms: Interval = field(metadata=of(lambda cell: cell.mean().scaled(1e3)))
