@@ -129,6 +129,6 @@ if __name__ == "__main__":
     parser.add_argument("--no-pictures", action="store_true", help="only solve and report")
     parser.add_argument("--clip", type=Path, help="a BVH or clip file")
     parser.add_argument("--equipment", default="pack", help="side_sphere, pouches, vest_plate, pack or torus")
-    parser.add_argument("--method", default="bisection", help="bisection, trajectory, frames or fade")
+    parser.add_argument("--method", default="bisection", help="bisection, trajectory or frames")
     options = parser.parse_args()
     main(options.out, not options.no_pictures, options.clip, options.equipment, options.method)

@@ -19,6 +19,7 @@ CRATE = (0.30, 0.30, 0.30)  # m
 BEAM = 1.60  # m: underside of the beam
 STRONGEST = 2500.0  # N: of the cylinder, which pushes the lowest bar's sliding end along the floor
 GRAVITY = 9.81
+FRAMES = 60  # of a drag
 Y = (0.0, 1.0, 0.0)
 SIDE = 0.04  # m: the crossed bars are this far in front of and behind the middle
 FLAT = (0.0, 0.5**0.5, 0.0, 0.5**0.5)  # a capsule's z along a bar's x
@@ -98,10 +99,10 @@ def build(load: float) -> wb.Assembly:
     return made.point_goal("platform", (0.0, 0.0, top))
 
 
-def drive(made: wb.Assembly, height: float, frames: int = 60) -> list[Array]:
+def drive(made: wb.Assembly, height: float) -> list[Array]:
     """Drag the platform to a height, or as far as it goes; the states."""
     begin, drag = made.placement("platform").translation[2], wb.Drag(made)
-    states = [drag.to((0.0, 0.0, z)).q for z in np.linspace(begin, height, frames + 1)[1:]]
+    states = [drag.to((0.0, 0.0, z)).q for z in np.linspace(begin, height, FRAMES + 1)[1:]]
     drag.finish()
     return [*states, drag.q]
 

@@ -601,14 +601,14 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     done = tracking.drag_along(ask, places, "qp")
     yield "judge_drag", Call(tracking.judge_drag, {"problem": ask, "dragged": done, "goal": 0})
     clip = wb.Clip(arm, [q, q + 0.1], 0.1)  # type: ignore[arg-type]
-    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.jerk())
+    yield "Clip", Call(wb.Clip, {"figure": arm, "q": [q, q], "dt": 0.1, "name": "it"}, lambda made: made.velocities())
     yield "Clip.at", Call(clip.at, {"t": 0.05})
     yield "Clip.resampled", Call(clip.resampled, {"dt": 0.05})
     yield "Clip.joined", Call(clip.joined, {"other": clip})
     yield "Clip.with_q", Call(clip.with_q, {"q": [q], "name": "other"})
     yield "Clip.from_track", Call(wb.Clip.from_track, {"track": track, "figure": arm})
     yield "Clip.write", Call(clip.write, {"path": path / "clip.npz"})
-    for method in ("mirrored", "velocities", "accelerations", "jerk"):
+    for method in ("mirrored", "velocities", "accelerations"):
         yield f"Clip.{method}", Call(getattr(wb.Clip(hand, [hand.neutral], 0.1), method), {})  # type: ignore[arg-type]
     yield "Strength", Call(wb.motion.Strength, {"percentile": 50.0, "sex": "female"}, lambda made: made.limits(arm))
     yield "Strength.limits", Call(wb.motion.Strength().limits, {"figure": arm})
@@ -749,11 +749,10 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
         "Records",
         Call(wb.studies.Records, {"records": [record]}, lambda made: (repr(made), made.counts(), made.rows())),
     )
-    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5, "solver": "osqp", "iterations": 10}
+    settings: dict[str, Any] = {"clearance": 0.01, "time": 0.1, "margin": 0.5}
     settings |= {"stretch": 1.5, "dynamics": wb.motion.Strength()}
     yield "Trajectory", Call(wb.motion.Trajectory, settings)
-    yield "PerFrame", Call(wb.motion.PerFrame, {"clearance": 0.01, "backward": True})
-    yield "Fade", Call(wb.motion.Fade, {"clearance": 0.01, "fade": 0.2, "rounds": 2, "solves": 20})
+    yield "PerFrame", Call(wb.motion.PerFrame, {"clearance": 0.01})
     bisection = {
         "evaluation": (0,), "buffer": 20.0, "least": 2, "interpolation": "linear", "planes": ("tool",), "frozen": (),
         "room": 0.01, "method": "qp", "character": 0.2, "short": 5,
@@ -779,10 +778,6 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     pair = {"before": clip, "after": clip}
     for measure in (measures.deviation, measures.jerk_ratio, measures.foot_sliding):
         yield measure.__name__, Call(measure, pair)
-    still = wb.Clip(hand, [hand.neutral], 0.1)  # type: ignore[arg-type]
-    held = {"before": still, "after": still, "hand": "right_palm", "other": "left_palm"}
-    yield "hand_error", Call(measures.hand_error, held)
-    yield "hand_off_weapon", Call(measures.hand_off_weapon, held)
     yield "ClipCheck.as_dict", Call(wb.check(clip).as_dict, {})
     yield "spread", Call(tracking.spread, {"corners": places, "frames": 3, "dt": 0.1})
     yield "circle", Call(tracking.circle, {"center": at, "radius": 0.1, "normal": at})
@@ -846,7 +841,7 @@ ANSWERS = (
 OF_METHODS = ("QPTracker", "NewtonTracker", "SolvingTracker")
 """What `tracker` of a method builds; and workspaces, which a run has to itself, are for methods of one's own."""
 
-AVOIDERS = ("Trajectory.avoid", "PerFrame.avoid", "Fade.avoid", "Bisection.avoid")
+AVOIDERS = ("Trajectory.avoid", "PerFrame.avoid", "Bisection.avoid")
 """Called by `avoid` alone, with a run that it set up."""
 
 DERIVATIVES = (

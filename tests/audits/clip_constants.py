@@ -33,13 +33,10 @@ CASES: tuple[Case, ...] = (
     ("sword cut", "nothing", "frames", 1),
 )
 USED: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(
-        ("trajectory.window_run", "trajectory.sqp", "trajectory.program", "trajectory.nodes", "trajectory.banded_qp"),
-        ("trajectory",),
-    ),
-    "bisection.prediction": ("bisection",),
+    **dict.fromkeys((f"trajectory.{name}" for name in ("window_run", "sqp", "program", "nodes")), ("trajectory",)),
+    **dict.fromkeys(("bisection.method", "bisection.prediction"), ("bisection",)),
     "repair": ("bisection", "frames"),
-    **dict.fromkeys(("one_side", "faults", "stance"), ("trajectory", "bisection", "frames")),
+    **dict.fromkeys(("one_side", "faults"), ("trajectory", "bisection", "frames")),
 }
 """Modules of `wholebody.motion`, and the methods on whose cases their constants are changed."""
 

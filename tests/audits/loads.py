@@ -16,7 +16,7 @@ from wholebody.motion.checking import ClipCheck
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import PLACE, LoadChange, load_change, torques
 from wholebody.motion.measures import deviation, foot_sliding
-from wholebody.motion.soles import usual_feet
+from wholebody.motion.stance import usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.motion.worn_equipment import dressed
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import runpy
 import sys
-from dataclasses import fields, replace
 from pathlib import Path
 from types import ModuleType
 
@@ -16,6 +15,7 @@ from tests.audits.qp_programs import files
 from tests.audits.qp_programs.measuring import measure, residuals, summaries
 from tests.audits.qp_programs.recording import Recorded, record
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
+from wholebody.base.records import with_values
 from wholebody.bench.tables import read_rows
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
@@ -27,7 +27,7 @@ def recorded() -> list[Recorded]:
 
 
 def same(one: QuadraticProgram, other: QuadraticProgram) -> bool:
-    return all(np.array_equal(getattr(one, field.name), getattr(other, field.name)) for field in fields(one))
+    return all(map(np.array_equal, one, other))
 
 
 def test_a_seed_has_the_same_programs(recorded: list[Recorded]) -> None:
@@ -115,7 +115,7 @@ def test_residuals_of_a_program_that_is_solved_by_hand() -> None:
     short = residuals(program, held._replace(x=np.array([0.4])))
     assert short.dual == pytest.approx(0.1)  # as far as the bound allows
     assert short.gap > 0.01
-    free = replace(program, upper=np.ones(1))
+    free = with_values(program, upper=np.ones(1))
     assert residuals(free, held._replace(x=np.array([5.0 / 6.0]))) == pytest.approx((0.0, 0.0, 0.0), abs=1e-15)
 
 

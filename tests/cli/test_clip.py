@@ -71,7 +71,6 @@ def test_a_robot_goes_about_where_that_is_asked(walk: Path, tmp_path: Path) -> N
     clip = wb.read_clip(walk, human)
     gone = clip.q.copy()
     gone[:, 0] += np.linspace(0.0, 0.5, len(gone))
-    pytest.importorskip("pybvh")
     clip.with_q(gone).write(tmp_path / "walk.bvh")
     out = tmp_path / "legs.npz"
     given = ["clip", "retarget", str(tmp_path / "walk.bvh"), str(out), "--figure", str(tmp_path / "legs.urdf")]

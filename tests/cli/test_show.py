@@ -11,6 +11,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -57,25 +58,14 @@ def status(url: str, host: str | None = None) -> int:
         return error.code
 
 
-@pytest.mark.browser
-def test_it_waits_for_the_first_tab_however_late_and_ends_with_the_last(tmp_path: Path) -> None:
-    if find_chromium() is None:
-        (pytest.fail if os.environ.get("WHOLEBODY_REQUIRE_BROWSER") else pytest.skip)("there is no Chromium")
+@pytest.fixture(scope="module", autouse=True)
+def waiting() -> Iterator[tuple[subprocess.Popen[str], str, int, float]]:
+    """Begin to show while the other tests of this file run; yield the process, its address, the port and when."""
     port = free_port()
     process, url = showing("--port", str(port))
-    try:
-        assert url == f"http://127.0.0.1:{port}/"
-        time.sleep(5.0)  # longer than a tab may be away while it loads again
-        assert process.poll() is None
-        with screenshot.Browser() as browser:
-            browser.open(url)
-            assert browser.evaluate("document.title") == "hand"
-            assert process.poll() is None
-        process.communicate(timeout=30)
-        assert process.returncode == 0
-    finally:
-        process.kill()
-        process.wait()
+    yield process, url, port, time.monotonic()
+    process.kill()
+    process.communicate()
 
 
 def test_every_address_of_this_machine_can_be_served_and_no_foreign_name() -> None:
@@ -136,3 +126,21 @@ def test_a_person_of_given_size_is_shown_and_a_file_keeps_its_own(
     capsys.readouterr()
     assert main(["show", str(tmp_path / "task.toml"), "--sex", "female", "--save", str(small)]) == 2
     assert "leave out --sex" in capsys.readouterr().err
+
+
+@pytest.mark.browser
+def test_it_waits_for_the_first_tab_however_late_and_ends_with_the_last(
+    waiting: tuple[subprocess.Popen[str], str, int, float],
+) -> None:
+    if find_chromium() is None:
+        (pytest.fail if os.environ.get("WHOLEBODY_REQUIRE_BROWSER") else pytest.skip)("there is no Chromium")
+    process, url, port, began = waiting
+    assert url == f"http://127.0.0.1:{port}/"
+    time.sleep(max(0.0, began + 5.0 - time.monotonic()))  # longer than a tab may be away while it loads again
+    assert process.poll() is None
+    with screenshot.Browser() as browser:
+        browser.open(url)
+        assert browser.evaluate("document.title") == "hand"
+        assert process.poll() is None
+    process.communicate(timeout=30)
+    assert process.returncode == 0

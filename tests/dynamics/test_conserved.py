@@ -12,7 +12,7 @@ import wholebody as wb
 from wholebody.bench.measure.closed_forms import colliding
 from wholebody.bench.measure.drops import ENGINES, Judge, drops
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import SKIN
+from wholebody.dynamics.step_program import SKIN
 
 G = 9.81
 AWAY = 5.0

@@ -8,8 +8,8 @@ import pytest
 
 from wholebody.base.arrays import Array
 from wholebody.dynamics import rows_kernel, solve_kernel
-from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.motion_kernel import Bodies
+from wholebody.dynamics.pieces import ContactPoints
 from wholebody.dynamics.rows_kernel import Rows
 from wholebody.dynamics.solve_kernel import Laws, Limits
 

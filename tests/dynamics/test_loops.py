@@ -9,9 +9,8 @@ import pytest
 from tests.reference import contact_program as clear
 from wholebody.base.records import with_values
 from wholebody.dynamics import energy_kernel, impact_kernel, motion_kernel, passing, rows_kernel, solve_kernel
-from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.motion_kernel import Bodies
-from wholebody.dynamics.pieces import SweptPoints
+from wholebody.dynamics.pieces import ContactPoints, SweptPoints
 from wholebody.dynamics.rows_kernel import JointPoints, Rows
 from wholebody.dynamics.solve_kernel import Laws, Limits
 

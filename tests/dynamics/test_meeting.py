@@ -8,9 +8,8 @@ import pinocchio as pin
 
 import wholebody as wb
 from wholebody.dynamics.bodies_state import BodiesState
-from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.passing import PassingCheck, StepStart, check_passing
-from wholebody.dynamics.pieces import Pieces
+from wholebody.dynamics.pieces import ContactFinder, Pieces
 from wholebody.dynamics.rigid_bodies import RigidBodies
 
 SIZE = (0.4, 0.15, 0.1)

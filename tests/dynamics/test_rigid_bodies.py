@@ -9,7 +9,7 @@ import pytest
 import wholebody as wb
 from wholebody.base.errors import InputError
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import SKIN
+from wholebody.dynamics.step_program import SKIN
 
 G = 9.81
 

@@ -8,7 +8,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import SKIN
+from wholebody.dynamics.step_program import SKIN
 
 MOVED = 1e-4  # m: by which what touches a sleeper may have moved before it wakes
 HALF = 0.1  # m: of the box

@@ -110,7 +110,7 @@ def test_the_trajectory_is_the_least_of_its_objective(planar_arm: Callable[..., 
 def test_a_free_clip_stays_as_it_is(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 40)
     scene.move("ball", at=(3.0, 0.0, 0.0))
-    for method in ("trajectory", "frames", "fade"):
+    for method in ("trajectory", "frames"):
         found = wb.avoid(clip, scene, method=method)
         np.testing.assert_array_equal(found.clip.q, clip.q)
         assert found.report.solved
@@ -168,7 +168,7 @@ def test_a_thin_thing_passed_for_good_is_not_passed(planar_arm: Callable[..., Fi
 
 def test_what_cannot_be_freed_is_said(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 30)
-    for method in ("trajectory", "frames", "fade"):
+    for method in ("trajectory", "frames"):
         found = wb.avoid(clip, scene, method=method, constraints=[wb.Freeze("all")])
         assert not found.report.solved
         assert "collide" in found.report.message
@@ -302,17 +302,9 @@ def test_a_free_clip_that_misses_what_is_held_is_not_solved(
     assert kept.report.missed < 1e-9
 
 
-def test_another_solver_gives_the_same_clip(planar_arm: Callable[..., Figure]) -> None:
-    name = "piqp"
-    pytest.importorskip(name)
-    clip, scene = arm_and_ball(planar_arm, 30)
-    one, other = (freed_by(wb.motion.Trajectory(solver=each), clip, scene).q for each in (None, name))
-    np.testing.assert_allclose(one, other, atol=2e-3)
-
-
 def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
     clip, scene = arm_and_ball(planar_arm, 5)
-    assert set(METHODS) >= {"trajectory", "frames", "fade"}
+    assert set(METHODS) >= {"trajectory", "frames", "bisection"}
     with pytest.raises(wb.UnknownNameError, match="trajectory"):
         wb.avoid(clip, scene, method="trajectry")
     with pytest.raises(wb.InputError, match="other joints"):
@@ -321,14 +313,14 @@ def test_names_of_methods(planar_arm: Callable[..., Figure]) -> None:
 
 def test_the_command_frees_a_file(tmp_path: Path, human: Figure, capsys: pytest.CaptureFixture[str]) -> None:
     arm_into_trunk(human, 20).write(tmp_path / "arm.npz")
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade"]) == 0
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames"]) == 0
     told = capsys.readouterr().out
     assert "nothing collides" in told
     free = wb.read_clip(tmp_path / "arm-free.npz", human)
     assert wb.check(free).free
     assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "none"]) == 2
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--stretch", "2"]) == 2
-    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "fade", "--dynamics"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames", "--stretch", "2"]) == 2
+    assert main(["clip", "avoid", str(tmp_path / "arm.npz"), "--method", "frames", "--dynamics"]) == 2
     told = capsys.readouterr()
     assert "does not slow" in told.err + told.out
     assert "does not take dynamics" in told.err + told.out
@@ -352,12 +344,12 @@ def test_an_answer_is_told_in_three_lines() -> None:
     human = wb.load("human")
     standing = human.posture("standing")
     inside = human.with_joints(standing, {"right_shoulder_abduction": -0.3})
-    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="fade")  # type: ignore[arg-type]
+    freed = wb.avoid(wb.Clip(human, [standing, inside, standing], 0.5, "an arm"), method="frames")  # type: ignore[arg-type]
     lines = str(freed).splitlines()
     assert len(lines) == 3
     assert lines[0].startswith("an arm, free: nothing collides")
     assert "frames in collision 1 before, 0 after" in lines[1]
-    assert lines[2].startswith("fade: ")
+    assert lines[2].startswith("frames: ")
     assert str(freed.report) == str(freed).removeprefix("an arm, ")
     assert len(repr(freed)) < 200
 

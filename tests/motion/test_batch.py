@@ -38,10 +38,10 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
     told: list[wb.motion.BatchProgress] = []
 
     def run(*equipment: str) -> tuple[wb.motion.AvoidedCase, ...]:
-        return wb.motion.avoid_many([clip], tmp_path, equipment=equipment, methods=["fade"], progress=told.append)
+        return wb.motion.avoid_many([clip], tmp_path, equipment=equipment, methods=["frames"], progress=told.append)
 
     (first,) = run("nothing")
-    alone = wb.avoid(clip, method="fade")
+    alone = wb.avoid(clip, method="frames")
     assert (first.outcome, first.colliding_before, first.colliding) == ("free", alone.report.before.colliding, 0)
     made = wb.read_clip(tmp_path / first.file, clip.figure)
     assert np.array_equal(made.q, alone.clip.q)
@@ -49,7 +49,7 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
     assert [(now.done, now.total) for now in told] == [(0, 1), (1, 1)]
     again, packed = run("nothing", "pack")
     assert again == first  # its seconds too
-    assert (packed.equipment, packed.file) == ("pack", "an_arm-pack-fade.npz")
+    assert (packed.equipment, packed.file) == ("pack", "an_arm-pack-frames.npz")
     assert [row["file"] for row in csv.DictReader((tmp_path / SHEET).open())] == [first.file, packed.file]
     assert [row["frames"] for row in json.loads((tmp_path / TABLE).read_text())["cases"]] == [len(clip)] * 2
     (tmp_path / first.file).unlink()
@@ -59,11 +59,13 @@ def test_each_case_is_as_avoid_makes_it_and_is_done_once(clip: wb.Clip, tmp_path
 
 
 def test_another_clip_of_the_name_or_other_settings_are_done_anew(clip: wb.Clip, tmp_path: Path) -> None:
-    (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["fade"])
-    (other,) = wb.motion.avoid_many([clip[1:]], tmp_path, methods=["fade"])
+    (first,) = wb.motion.avoid_many([clip], tmp_path, methods=["frames"])
+    (other,) = wb.motion.avoid_many([clip[1:]], tmp_path, methods=["frames"])
     assert other.frames == first.frames - 1
-    kept = wb.motion.avoid_many([clip[1:]], tmp_path, methods=[wb.motion.Fade(), wb.motion.Fade(clearance=0.01)])
-    assert [row.method for row in kept] == ["fade", "fade 2"]
+    kept = wb.motion.avoid_many(
+        [clip[1:]], tmp_path, methods=[wb.motion.PerFrame(), wb.motion.PerFrame(clearance=0.01)]
+    )
+    assert [row.method for row in kept] == ["frames", "frames 2"]
     assert kept[0] == other
     assert kept[1].angle > other.angle
 
@@ -74,7 +76,7 @@ def test_what_is_wrong_with_one_file_is_told_and_the_others_are_made(
     (tmp_path / "broken.csv").write_text("time\n")
     good = clip.write(tmp_path / "good.npz")
     rows = wb.motion.avoid_many(
-        [tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["fade"], jobs=2
+        [tmp_path / "broken.csv", good], tmp_path / "out", figure=human, methods=["frames"], jobs=2
     )
     assert [row.outcome for row in rows] == ["refused", "free"]
     assert "broken.csv" in rows[0].message
@@ -90,7 +92,7 @@ def test_input_is_refused_before_anything_is_written(clip: wb.Clip, tmp_path: Pa
         ({"clips": ["walk.bvh"]}, "say of which figure"),
         ({"equipment": ["pak"]}, "pack"),
         ({"equipment": ["pack", "pack"]}, "two pieces of equipment are named 'pack'"),
-        ({"methods": ["fede"]}, "fade"),
+        ({"methods": ["framse"]}, "frames"),
         ({"jobs": 0}, "jobs is 0"),
     ):
         with pytest.raises(wb.WholebodyError, match=sentence):
@@ -110,7 +112,7 @@ def told_to(command: list[str], said: Path) -> None:
 def test_a_batch_that_is_ended_goes_on(how: signal.Signals, clip: wb.Clip, tmp_path: Path) -> None:
     """No half file is left, and the case that was made before is not made again."""
     files = [str(clip[k:].write(tmp_path / f"part{k}.npz")) for k in range(2)]
-    command = ["clip", "avoid", *files, "--method", "fade", "--out", str(tmp_path / "out")]
+    command = ["clip", "avoid", *files, "--method", "frames", "--out", str(tmp_path / "out")]
     run = multiprocessing.get_context("fork").Process(target=told_to, args=(command, tmp_path / "said"))
     run.start()
     table, ends = tmp_path / "out" / SHEET, time.monotonic() + 120.0
@@ -139,9 +141,9 @@ def test_a_dask_cluster_gives_the_same(clip: wb.Clip, tmp_path: Path) -> None:
         n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None
     ) as cluster:
         (row,) = wb.motion.avoid_many(
-            [clip], tmp_path / "a", methods=["fade"], jobs=2, cluster=cluster.scheduler_address
+            [clip], tmp_path / "a", methods=["frames"], jobs=2, cluster=cluster.scheduler_address
         )  # fmt: skip
-    (here,) = wb.motion.avoid_many([clip], tmp_path / "b", methods=["fade"])
+    (here,) = wb.motion.avoid_many([clip], tmp_path / "b", methods=["frames"])
     made = [wb.read_clip(folder / row.file, clip.figure).q for folder in (tmp_path / "a", tmp_path / "b")]
     assert np.array_equal(*made)
     assert (row.outcome, row.asked) == (here.outcome, here.asked)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
-from wholebody.motion.bones import said_of
+from wholebody.motion.retargeting import said_of
 from wholebody.motion.skeleton import SkeletonMotion
 
 NAMES = {"skeleton": {"left_shoulder": "a", "left_elbow": "b", "left_wrist": "c"}}

@@ -104,7 +104,6 @@ def test_a_clip_of_one_frame(human: Figure) -> None:
     assert clip.at(0.0) == pytest.approx(human.neutral)
     assert not clip.velocities().any()
     assert not clip.accelerations().any()
-    assert not clip.jerk().any()
     assert len(clip.resampled(0.01)) == 1
 
 
@@ -140,7 +139,6 @@ def test_derivatives_of_polynomials_are_exact(human: Figure) -> None:
     q[:, joint.idx_q] = 0.3 + 0.5 * t - 2.0 * t**2 + 4.0 * t**3
     clip = wb.Clip(human, q, dt)
     assert clip.accelerations()[:, joint.idx_v] == pytest.approx(-4.0 + 24.0 * t, abs=1e-9)
-    assert clip.jerk()[:, joint.idx_v] == pytest.approx(24.0, abs=1e-6)
     q[:, joint.idx_q] = 0.3 + 0.5 * t - 2.0 * t**2
     assert wb.Clip(human, q, dt).velocities()[:, joint.idx_v] == pytest.approx(0.5 - 4.0 * t, abs=1e-9)
 

@@ -56,7 +56,7 @@ def test_a_strong_motor_keeps_its_timing(tmp_path: Path) -> None:
 def test_other_methods_do_not_take_dynamics(tmp_path: Path) -> None:
     clip = wheel(tmp_path, 2.0)
     with pytest.raises(wb.InputError, match="trajectory"):
-        wb.avoid(clip, dynamics=True, method="fade")
+        wb.avoid(clip, dynamics=True, method="frames")
     with pytest.raises(wb.InputError, match="dynamics"):
         wb.avoid(clip, dynamics="strong")  # type: ignore[arg-type]
     with pytest.raises(wb.InputError, match="dynamics"):

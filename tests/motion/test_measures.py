@@ -6,17 +6,10 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.motion.measures import (
-    deviation,
-    foot_sliding,
-    hand_error,
-    hand_off_weapon,
-    jerk_ratio,
-)
+from wholebody.motion.measures import deviation, foot_sliding, jerk_ratio
 from wholebody.motion.stance import foot_points, slid, sliding
 
 
@@ -86,29 +79,6 @@ def test_sliding_is_what_was_not_there_before() -> None:
     assert foot_sliding(before, before.with_q(aside)) == pytest.approx(0.0, abs=1e-12)
     back[20:, 1] += 0.02
     assert foot_sliding(before, before.with_q(back)) == pytest.approx(0.02)
-
-
-def test_hands_on_a_weapon() -> None:
-    figure = wb.load("human")
-    q = figure.posture("arms_forward")
-    before = wb.Clip(figure, [q, q, q], 0.1)  # type: ignore[arg-type]
-    turned = pin.integrate(figure.model, q, np.array([0.1, 0.2, 0.0, 0.3, 0.0, 0.5, *np.zeros(figure.model.nv - 6)]))
-    angles = figure.joint_values(q)
-    changed = {name: angles[name] + 0.1 for name in ("left_elbow_flexion", "left_shoulder_abduction")}
-    opened = figure.with_joints(turned, changed)
-    assert hand_error(before, before.with_q([q, turned, q]), "right_palm", "left_palm") == pytest.approx(0.0, abs=1e-12)
-    data, palms = figure.model.createData(), []
-    for posture in (q, opened):
-        pin.framesForwardKinematics(figure.model, data, posture)
-        left, right = (data.oMf[figure.frame_id(f"{side}_palm")].homogeneous for side in ("left", "right"))
-        palms.append((np.linalg.inv(right) @ left)[:3, 3])
-    error = hand_error(before, before.with_q([q, q, opened]), "right_palm", "left_palm")
-    assert error == pytest.approx(float(np.linalg.norm(palms[0] - palms[1])))
-    assert error > 0.01
-    across = hand_off_weapon(before, before.with_q([q, q, opened]), "right_palm", "left_palm")
-    shaft = palms[0] / np.linalg.norm(palms[0])
-    assert across == pytest.approx(float(np.linalg.norm(np.cross(palms[1], shaft))))
-    assert 0.01 < across < 0.9 * error
 
 
 def test_clips_of_different_lengths_are_refused(planar_arm: Callable[..., Any]) -> None:

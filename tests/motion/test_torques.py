@@ -10,7 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.motion.clip_torques import smoothed, torques
-from wholebody.motion.soles import ground_forces
+from wholebody.motion.inverse_dynamics import ground_forces
 from wholebody.motion.strength import Strength
 
 GRAVITY = 9.81

@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
-from wholebody.methods.qp.active_set import BOUND_TOLERANCE, FULL_CORRECTIONS, ROW_TOLERANCE
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import CORRECTIONS
 
 
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
@@ -21,17 +21,17 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
         following = _corrected(program, active, point)
         if following.same(active):
             return QPSolution(np.clip(point.x, program.lower, program.upper), active, True, 0)
-        active = following if attempt < FULL_CORRECTIONS else _worst_corrected(program, active, following, point)
+        active = following if attempt < CORRECTIONS.at_once else _worst_corrected(program, active, following, point)
     return None
 
 
 def _corrected(program: QuadraticProgram, active: ActiveSet, point: FacePoint) -> ActiveSet:
     """The set with wrong signs put right."""
     x, gradient = point.x, point.gradient
-    elastic = program.elastic @ x < program.least - ROW_TOLERANCE
+    elastic = program.elastic @ x < program.least - CORRECTIONS.tolerance
     elastic[active.elastic] = point.push >= 0.0
-    lower = np.where(active.lower, gradient >= 0.0, x < program.lower - BOUND_TOLERANCE)
-    upper = np.where(active.upper, gradient <= 0.0, x > program.upper + BOUND_TOLERANCE)
+    lower = np.where(active.lower, gradient >= 0.0, x < program.lower - CORRECTIONS.tolerance)
+    upper = np.where(active.upper, gradient <= 0.0, x > program.upper + CORRECTIONS.tolerance)
     return ActiveSet(lower, upper, elastic)
 
 
@@ -79,7 +79,7 @@ def minimise_on_face(program: QuadraticProgram, active: ActiveSet) -> FacePoint 
         _, multiplier, info = dposv(system, rows @ x - scaled @ program.linear - target)
         trial = x - inverse * (program.linear + multiplier @ rows)
         # rows that repeat each other to rounding leave multipliers that do not belong to their residuals
-        in_columns = info != 0 or not np.abs(rows @ trial - target - multiplier / weight).max() <= ROW_TOLERANCE
+        in_columns = info != 0 or not np.abs(rows @ trial - target - multiplier / weight).max() <= CORRECTIONS.tolerance
     if in_columns:
         x[free] = _in_columns(program, rows[:, free], target - rows @ x, weight, free)
         multiplier = weight * (rows @ x - target)

@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 from math import atan2, ceil, cos, floor, hypot, inf, pi, sin
 from typing import Any
 
-from wholebody.methods.ccd.limbs import Limbs
-from wholebody.methods.ccd.limbs_kernel import SLIDE, X, Y, Z
+from wholebody.methods.ccd.limbs import SLIDE, Limbs, X, Y, Z
 
 TURN = 2.0 * pi
 FLAT = 1e-12  # m^2

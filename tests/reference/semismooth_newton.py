@@ -1,4 +1,4 @@
-"""Semismooth Newton steps in array code: what `wholebody.methods.qp.semismooth_newton` must do."""
+"""Semismooth Newton steps in array code: what `wholebody.methods.qp.active_set.minimise` must do."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 from tests.reference.active_set import minimise_on_face
 from wholebody.base.arrays import Array, Mask
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
-from wholebody.methods.qp.semismooth_newton import STILL, WHOLE
+from wholebody.methods.qp.semismooth_kernel import STILL, WHOLE
 
 
 def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.studies.sending import Sender
 
 ARM = Path(__file__).resolve().parents[2] / "examples" / "tasks" / "arm.urdf"
 PLACES = [(0.4, 0.1 * k, 0.5) for k in range(-2, 3)]
@@ -166,3 +167,19 @@ def test_the_nearest_answer_is_tried_first_and_kept(arm: wb.Figure, tmp_path: Pa
 def test_a_place_that_no_neighbour_reaches_stays_out_of_reach(arm: wb.Figure) -> None:
     reached, far = wb.solve_many([problem(arm, PLACES[0]), problem(arm, (5.0, 0.0, 0.5))])
     assert (reached.solved, far.outcome, far.neighbour) == (True, "unreachable", "")
+
+
+def test_a_scene_is_sent_once_and_again_when_something_moved():
+    """Problems that another process reads share the scene that it has seen; a thing that moved is where it is now."""
+    scene = wb.Scene(wb.load("human")).add(wb.Box((0.2, 0.2, 0.2)), name="box", at=(0.6, 0.0, 0.5))
+    first, second = (wb.Problem(scene, goals=[wb.Point("head", (0.1, 0.0, z))]) for z in (1.5, 1.6))
+    known = Sender()
+    one, two = known.sent(first), known.sent(second)
+    assert len(one.value) < 0.2 * sum(map(len, one.scenes.values()))
+    read = one.read()
+    assert read.scene is two.read().scene is not scene
+    scene.move("box", at=(0.7, 0.0, 0.5))
+    moved = known.sent(first).read()
+    assert moved.scene is not read.scene
+    assert moved.scene.objects["box"].placement.translation[0] == 0.7
+    np.testing.assert_allclose(wb.solve(moved).q, wb.solve(first).q, atol=1e-12)

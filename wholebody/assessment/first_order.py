@@ -27,7 +27,6 @@ from wholebody.tasks.checks import values_and_rows
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
 MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
-WORTH = 0.05  # share of the largest push from which on something counts as being in the way
 
 
 @dataclass(frozen=True)
@@ -184,8 +183,9 @@ def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -
         for name, term in zip(asked.names, asked.constraints, strict=True)
     }
     first = [Blocker(*label, size / deepest, True, frames.get(label)) for label, size in violated.items()]
+    # share of the largest push from which on something counts as being in the way
     second = [
-        Blocker(*label, size / most, False, frames.get(label)) for label, size in found.items() if size > WORTH * most
+        Blocker(*label, size / most, False, frames.get(label)) for label, size in found.items() if size > 0.05 * most
     ]
     return tuple(part for group in (first, second) for part in sorted(group, key=lambda blocker: -blocker.share))
 

@@ -16,8 +16,6 @@ from typing import Any
 from wholebody.base.errors import MissingPackageError, WholebodyError
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with
 
-ANSWERS = 10.0  # s: for which a scheduler is waited for
-
 _local = threading.local()
 
 _Sent = tuple[int, Callable[..., Any], tuple[Any, ...], float]
@@ -141,7 +139,8 @@ def _client(address: str) -> AbstractContextManager[Any]:
         raise MissingPackageError("--cluster needs dask; install it with: pip install 'wholebody[cluster]'") from None
     try:
         connect: Callable[..., AbstractContextManager[Any]] = Client
-        client = connect(address, timeout=ANSWERS)
+        # s: for which a scheduler is waited for
+        client = connect(address, timeout=10.0)
     except (OSError, ValueError) as error:
         raise WholebodyError(f"no dask scheduler answers at {address} ({error}); start one: dask scheduler") from None
     return client

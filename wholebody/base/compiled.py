@@ -19,11 +19,10 @@ from typing import Any, TypeVar
 TOGETHER = (
     (
         "wholebody.methods.qp.active_set",
-        "wholebody.methods.qp.semismooth_newton",
         "wholebody.methods.qp.step_program",
         "wholebody.methods.qp.subproblem",
     ),
-    ("wholebody.dynamics.loops",),
+    ("wholebody.dynamics.step_program",),
     ("wholebody.terms.linearisation", "wholebody.methods.qp.chain"),
     (
         "wholebody.geometry.contact_rows",
@@ -31,14 +30,13 @@ TOGETHER = (
         "wholebody.geometry.continuous.moved_pairs",
         "wholebody.geometry.continuous.swept_depth",
         "wholebody.methods.ccd.limbs",
+        "wholebody.methods.ccd.sweep",
         "wholebody.methods.newton.linear_algebra",
         "wholebody.motion.trajectory.banded_kernel",
     ),
     (
-        "wholebody.methods.qp.curved_reach",
         "wholebody.methods.qp.escaping",
         "wholebody.methods.qp.turning",
-        "wholebody.methods.qp.solvers.osqp_solver",
         "wholebody.methods.qp.solvers.split_form",
     ),
 )

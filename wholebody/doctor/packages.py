@@ -40,7 +40,6 @@ EXTRAS = {
     "distributed": "cluster",
     "viser": "drag",
     "shtab": "completion",
-    "pybvh": "motion",
     "mujoco-core": "mjcf",
     "pin-pink": "compare",
     "mink": "compare",

@@ -2,7 +2,7 @@
 
 A frame of `RigidBodies` is made in steps. Each step:
 
-1. finds near pairs and their contact points (`contact_points`), and the rows of contacts and joints (`rows_kernel`);
+1. finds near pairs and their contact points (`pieces`), and the rows of contacts and joints (`rows_kernel`);
 2. resolves the impacts of points that touch, the fastest first (`impact_kernel`), and ends at the next impact;
 3. adds gravity to the velocities and solves one program for the impulses of all points (`solve_kernel`): projected
    Gauss-Seidel sweeps with conjugate directions, island by island, from the impulses of the step before;

@@ -24,21 +24,14 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import TIME_STEP, number, posture, time_step
 from wholebody.base.fields import Checked, Range
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import PUSH
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import Contacts, PairTable
 from wholebody.scene.matter.materials import Surface
 
-LIGHTEST, HEAVIEST = 1e-9, 1e6  # kg
-SOFTEST, GREATEST = 1e-9, 1e12  # N/m; the greatest is that of the damping too, N s/m
-STIFFNESS, DAMPING = 1000.0, 40.0  # N/m, N s/m: K and R of Schmidl and Lin
-MASS = DAMPING**2 / (4.0 * STIFFNESS)  # kg: a hand's 0.4, with which the spring is critically damped
-NEAR_CRITICAL = 1e-6  # share of the squared rate within which the two roots count as one
-
 
 @dataclass(frozen=True)
 class Spring(Checked):
-    """Constants of equation 6.
+    """Constants of equation 6; those of Schmidl and Lin, and the mass of a hand, with which it is critically damped.
 
     Attributes:
         stiffness: K [N/m].
@@ -49,9 +42,9 @@ class Spring(Checked):
         InputError: K is not within 1e-9 and 1e12 N/m, R not within 0 and 1e12 N s/m, or m not within 1e-9 and 1e6 kg.
     """
 
-    stiffness: Annotated[float, Range(SOFTEST, GREATEST, "N/m")] = STIFFNESS
-    damping: Annotated[float, Range(0.0, GREATEST, "N s/m")] = DAMPING
-    mass: Annotated[float, Range(LIGHTEST, HEAVIEST, "kg")] = MASS
+    stiffness: Annotated[float, Range(1e-9, 1e12, "N/m")] = 1000.0
+    damping: Annotated[float, Range(0.0, 1e12, "N s/m")] = 40.0
+    mass: Annotated[float, Range(1e-9, 1e6, "kg")] = 0.4
 
     def transition(self, time: float) -> Array:
         """The matrix (2, 2) that takes x and x' over a time of so many seconds.
@@ -65,7 +58,7 @@ class Spring(Checked):
         time = number(time, "time", *TIME_STEP, "s")
         rate, stiff = 0.5 * self.damping / self.mass, self.stiffness / self.mass
         square = rate * rate - stiff
-        if abs(square) <= NEAR_CRITICAL * rate * rate:
+        if abs(square) <= 1e-6 * rate * rate:  # the two roots count as one
             c = exp(-rate * time)
             s = c * time
         elif square < 0.0:
@@ -126,7 +119,8 @@ class Coupling:
         model = self._model
         missed = np.abs(pin.difference(model, wanted, shown))
         done = pin.difference(model, self._shown, shown) / dt
-        self.velocity = np.where(missed > PUSH.blocked, done, self.velocity)
+        # rad, m: less is the accuracy with which overlap is removed
+        self.velocity = np.where(missed > 1e-3, done, self.velocity)
         self._shown = np.array(shown)
 
 
@@ -142,7 +136,7 @@ class PushedContacts:
             engine: with the things.
             state: of the figure where it was stopped.
             table: pieces and pairs of the scene.
-            near: pairs nearer than `PUSH.touch` there.
+            near: pairs that touch there.
             bodies: piece to the thing it is part of, of things that move by themselves.
         """
         self._engine, self._state = engine, state
@@ -172,7 +166,7 @@ class PushedContacts:
             engine.mobility(thing, point) + self._mobility(joint, point) for joint, thing, _, point, _ in self.rows
         ]
         given: dict[str, Array] = {}
-        for _ in range(PUSH.rounds):
+        for _ in range(10):  # of several contacts one undoes a part of another
             moved = False
             for (_, thing, piece, point, normal), hand, mobility in zip(self.rows, hands, mobilities, strict=True):
                 relative = engine.velocity_at(thing, point) - hand
@@ -204,16 +198,16 @@ def contact_impulse(relative: Array, normal: Array, mobility: Array, surface: Su
         mobility: (3, 3) change of that velocity by an impulse on B, and its opposite on A.
         surface: restitution and friction.
     """
-    approach = -float(normal @ relative)
-    if approach <= PUSH.least:
+    approach, least = -float(normal @ relative), 1e-6  # m/s
+    if approach <= least:
         return None
-    bounce = surface.restitution if approach > PUSH.slow else 0.0
+    bounce = surface.restitution if approach > 0.05 else 0.0  # m/s: what is held lies still
     size = (1.0 + bounce) * approach / float(normal @ mobility @ normal)
     impulse = size * normal
     sliding = relative + mobility @ impulse
     sliding = sliding - (normal @ sliding) * normal
     speed = float(np.linalg.norm(sliding))
-    if speed > PUSH.least:
+    if speed > least:
         along = sliding / speed
         impulse = impulse - min(surface.friction * size, speed / float(along @ mobility @ along)) * along
     return np.asarray(impulse)

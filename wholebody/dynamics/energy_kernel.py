@@ -28,7 +28,6 @@ from wholebody.base.compiled import compiled
 from wholebody.dynamics.motion_kernel import Bodies, angular_momentum, invert
 from wholebody.dynamics.solve_kernel import join
 
-LARGEST = 1.05  # of s: an island with joints that hardly moves is not made to move by what rounding left
 FREE, FIXED, DRIVEN = 0, 1, 2  # islands that touch nothing else, something fixed, something that is moved
 
 
@@ -158,7 +157,8 @@ def settle(
         keeps = linked[island] and not touched[island]
         if keeps or (gain[island] > 0.0 and (linked[island] or kind[island] == DRIVEN)):
             _choose(moving, root, island, inside)
-            _take(inside, kind[island] == FREE, gain[island], LARGEST if keeps else 1.0, bodies, still)
+            # an island with joints that hardly moves is not made to move by what rounding left
+            _take(inside, kind[island] == FREE, gain[island], 1.05 if keeps else 1.0, bodies, still)
 
 
 @compiled(inner=True)

@@ -21,9 +21,6 @@ from wholebody.dynamics.rows_kernel import Rows, coupling, push, relative
 from wholebody.dynamics.solve_kernel import Laws, Limits, solve
 
 SLOW = 0.02  # m/s: slower approaches are no impacts; 20 um of fall
-EXACT = 1e-10  # m/s: to which the program of one pair is solved
-SWEEPS = 200  # of it
-JOINTED = 50  # times as many with joints: one that is near the contact converges slowly
 
 
 @compiled()
@@ -64,16 +61,16 @@ def resolve(
                     before[count, row] = relative(c, row, rows, twist)
                 laws.target[c] = -restitution[c] * before[count, 0]
                 count += 1
-        points, sweeps = count, SWEEPS
+        points, sweeps = count, 200
         if jointed[rows.bodies[worst, 0]] or jointed[rows.bodies[worst, 1]]:
             for c in range(len(pair), len(rows.bodies)):
                 chosen[count], impulse[c], before[count] = c, 0.0, 0.0
                 count += 1
-            sweeps = JOINTED * SWEEPS
+            sweeps = 10_000  # a joint near the contact converges slowly
         if count == 1:
             _single(worst, rows, restitution[worst], laws.friction[worst], twist, before[0], impulse[worst])
         else:
-            solve(chosen[:count], rows, laws, twist, impulse, Limits(EXACT, sweeps))
+            solve(chosen[:count], rows, laws, twist, impulse, Limits(1e-10, sweeps))
             _remove_gain(chosen[:count], rows, twist, before, impulse)
         events[event, 0], events[event, 1] = worst, -speed
         for c in chosen[:points]:

@@ -18,9 +18,6 @@ from wholebody.dynamics.solve_kernel import Laws, Limits
 from wholebody.scene.matter.body import BallJoint, Hinge
 from wholebody.scene.scene import Scene
 
-KEPT = 1e-9  # m/s: to which velocities keep joints
-SHORTEST_AXIS = 1e-3  # m: between the two points of a hinge
-
 
 class Joints:
     """All joints of a scene.
@@ -60,7 +57,7 @@ class Joints:
             return [at]
         axis, inertia = np.array(joint.axis), self._pieces.inertia[number]
         across = 0.5 * (float(np.trace(inertia)) - float(axis @ inertia @ axis))
-        far = max(float(np.sqrt(across / self._pieces.mass[number])), SHORTEST_AXIS)
+        far = max(float(np.sqrt(across / self._pieces.mass[number])), 1e-3)  # m
         return [at - far * axis, at + far * axis]
 
     def __len__(self) -> int:
@@ -95,5 +92,5 @@ class Joints:
             rows = Rows.room(self.points.bodies, count, movable)
             rows_kernel.joint_rows(self.points, state.bodies, rows)
             laws = Laws(np.zeros(0), np.zeros(0), np.zeros((count, 3)))
-            limits = Limits(KEPT * solve_kernel.JOINT_PRECISION, 2000)
+            limits = Limits(1e-9 * solve_kernel.JOINT_PRECISION, 2000)  # m/s
             solve_kernel.solve(np.arange(count), rows, laws, twist, np.zeros((count, 3)), limits)

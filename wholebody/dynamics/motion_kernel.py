@@ -14,8 +14,6 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 
-LARGEST_TURN = 0.1  # rad: of one midpoint step; smaller is more accurate and slower
-
 
 class Bodies(NamedTuple):
     """The bodies of a scene.
@@ -109,7 +107,7 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
     pull = np.empty(3)
     angular_momentum(rotation, inertia, spin, momentum)
     energy = momentum[0] * spin[0] + momentum[1] * spin[1] + momentum[2] * spin[2]
-    steps = int(speed * time / LARGEST_TURN) + 1
+    steps = int(speed * time / 0.1) + 1  # rad of one midpoint step; smaller is more accurate and slower
     h = time / steps
     for _ in range(steps):
         for k in range(3):

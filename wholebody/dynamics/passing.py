@@ -17,9 +17,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
 from wholebody.dynamics.bodies_state import BodiesState
-from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.dynamics.pieces import SweptPoints
-from wholebody.dynamics.settings import PASSING_PAIRS
+from wholebody.dynamics.pieces import ContactFinder, SweptPoints
 from wholebody.geometry.proximity import Contacts
 
 PASSING = 1e-4  # m: depth up to which pieces may dip into each other on the way
@@ -51,8 +49,8 @@ class PassingCheck(NamedTuple):
 
     Attributes:
         free: whether no pieces can have been deeper than `PASSING` in each other.
-        meetings: shares of the step at which pieces meet or may meet, at least `PASSING_PAIRS.earliest`; none where
-            there are too many doubts.
+        meetings: shares of the step at which pieces meet or may meet, at least 0.1, before which points
+            are taken there; none where there are too many doubts.
     """
 
     free: bool
@@ -113,10 +111,10 @@ def check_passing(
         np.linalg.norm(state.spin, axis=1) * time, pieces.lever, gravity * time**2 / 8.0,
     )  # fmt: skip
     doubts = np.zeros(len(near.pair), dtype=bool)
-    if doubtful(way, pieces.swept, doubts) > PASSING_PAIRS.doubts:
+    if doubtful(way, pieces.swept, doubts) > 50:  # more are not followed
         return PassingCheck(False)
     met = [_meeting(state, before, pair, way) for pair in near.pair[doubts].tolist()]
-    shares = tuple(sorted({max(share, PASSING_PAIRS.earliest) for share in met if share is not None}))
+    shares = tuple(sorted({max(share, 0.1) for share in met if share is not None}))
     return PassingCheck(not shares, shares)
 
 
@@ -154,7 +152,7 @@ def _meeting(state: BodiesState, before: StepStart, pair: list[int], way: Way) -
         while True:
             place(at + part)
             looks += 1
-            if looks > PASSING_PAIRS.places:
+            if looks > 64:  # what would need more is doubtful
                 return at
             if any(
                 min(distance, float(apart(first, second, along, placed, pieces.swept))) - part * part * bend > -PASSING

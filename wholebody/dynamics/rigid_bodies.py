@@ -1,6 +1,6 @@
 """Rigid bodies that move by themselves among things and a figure that do not.
 
-A frame is advanced in steps of at most `STEP.longest`. A step ends early at the next impact; there the impacts are
+A frame is advanced in steps of at most `STEP`. A step ends early at the next impact; there the impacts are
 resolved one by one (`impact_kernel`), and the motion goes on. In a step all contacts together have one program
 (`step_program`) that keeps every gap at `SKIN` or more at its end; then the bodies move (`motion_kernel`). A step after
 which pieces are in each other is made again with the points where they are; if that does not help, or pieces may have
@@ -22,24 +22,19 @@ from wholebody.base.checks import TIME_STEP
 from wholebody.base.errors import InputError
 from wholebody.dynamics import motion_kernel
 from wholebody.dynamics.bodies_state import BodiesState
-from wholebody.dynamics.contact_points import ContactFinder
 from wholebody.dynamics.frame import EngineFrame, Event, FrameRecord, given_placements
 from wholebody.dynamics.joints import Joints
-from wholebody.dynamics.loops import compiled_kernel
 from wholebody.dynamics.passing import StepStart, check_passing
-from wholebody.dynamics.pieces import Pieces
-from wholebody.dynamics.settings import SKIN, STEP
+from wholebody.dynamics.pieces import ContactFinder, Pieces
 from wholebody.dynamics.sleeping import Sleepers
-from wholebody.dynamics.step_program import Impulses, StepProgram
+from wholebody.dynamics.step_program import SKIN, Impulses, StepProgram, compiled_kernel
 from wholebody.geometry.placement import FARTHEST
 from wholebody.geometry.proximity import Contacts
 from wholebody.scene.scene import Scene
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s2
-LONGEST = 10.0  # s: of a frame, which is 2,400 steps
-DEEPEST_START = 1e-4  # m: things that overlap by more at the start are refused
-STRONGEST_GRAVITY = 1e3  # m/s2
-STRONGEST_PUSH = 1e6  # N s
+STEP = 1.0 / 240.0  # s, at most; smaller: more accurate and slower
+LEAST_GAP = 2e-6  # m: pieces nearer than this are parted before the next step
 
 
 class RigidBodies:
@@ -66,7 +61,7 @@ class RigidBodies:
             UnknownNameError: a joint names a thing that is not there.
         """
         checks.instance(scene, Scene, "scene", "give a wb.Scene")
-        self.gravity = _bounded(gravity, STRONGEST_GRAVITY, "gravity")
+        self.gravity = _bounded(gravity, 1e3, "gravity")
         first = scene.figure.posture(scene.figure.postures[0]) if start is None else start
         pieces = Pieces(scene, checks.posture(first, scene.model.nq, "start"))
         if not pieces.dynamic.any():
@@ -80,13 +75,13 @@ class RigidBodies:
         self._sleepers = Sleepers(self.state, self._joints.together())
         self._falling = pieces.dynamic.copy()
         self._near: Contacts
-        self._find_near(STEP.longest)
+        self._find_near(STEP)
         self._check_start()
         # given velocities may part joints
         self._joints.project_velocities(self.state, self.state.bodies.twist, self.state.bodies.moving)
 
     def _check_start(self) -> None:
-        if len(self._near.distance) and self._near.distance.min() < -DEEPEST_START:
+        if len(self._near.distance) and self._near.distance.min() < -1e-4:
             worst = int(self._near.distance.argmin())
             first, second = (self.names[self._pieces.body[piece]] for piece in self._near.pair[worst])
             raise InputError(
@@ -154,7 +149,7 @@ class RigidBodies:
                 does not move by itself.
         """
         number, point = self._number(name), _bounded(point, FARTHEST, "point")
-        impulse = _bounded(impulse, STRONGEST_PUSH, "impulse")
+        impulse = _bounded(impulse, 1e6, "impulse")
         if not self._pieces.dynamic[number]:
             raise InputError(f"{name!r} does not move by itself; push one that has a wb.Body")
         lever, jointed = point - self.state.bodies.position[number], self.state.bodies.jointed[number]
@@ -195,7 +190,7 @@ class RigidBodies:
             InputError: dt is no time step of at most 10 s, or a thing that moves by itself is named.
             UnknownNameError: there is no such segment or thing.
         """
-        dt = checks.number(dt, "dt", TIME_STEP[0], LONGEST, "s, such as 1/60")
+        dt = checks.number(dt, "dt", TIME_STEP[0], 10.0, "s, such as 1/60")
         state, given = self.state, {self._number(name): ways for name, ways in given_placements(kinematic).items()}
         ended = state.copies()
         for number, (before, after) in given.items():
@@ -203,7 +198,7 @@ class RigidBodies:
                 raise InputError(f"{self.names[number]!r} moves by itself; leave it out of kinematic")
             state.give(number, before, after, dt)
         self._sleepers.wake_where_put(self._finder, ended)
-        count = int(np.ceil(dt / STEP.longest - 1e-9))
+        count = int(np.ceil(dt / STEP - 1e-9))
         record = FrameRecord(self._stops(), np.zeros((len(self.names), 3)), work=self._pushed)
         self._pushed = 0.0
         self._find_near(dt / count)
@@ -222,14 +217,14 @@ class RigidBodies:
     # ---- a step
 
     def _stops(self) -> int:
-        """Early ends of steps that a frame may have."""
-        return STEP.stops * STEP.few // max(STEP.few, int(self.state.bodies.moving.sum()))
+        """Early ends of steps that a frame may have: eight for a dozen bodies, as each costs a step of all of them."""
+        return 96 // max(12, int(self.state.bodies.moving.sum()))
 
     def _step(self, time: float, record: FrameRecord) -> None:
         """Advance by at most a time: to its end, to the next impact, or to where a shorter step leads."""
         state = self.state
         if self._sleepers.wake(self._near):
-            self._find_near(STEP.longest)  # what bears the woken ones was not looked at while all of it was still
+            self._find_near(STEP)  # what bears the woken ones was not looked at while all of it was still
         program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
         events, ended = program.resolve_impacts()
         self._record(events, program, record)
@@ -244,18 +239,18 @@ class RigidBodies:
             self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
             record.steps += 1
-            least = self._find_near(STEP.longest)
-            if record.given_up >= STEP.given_up:
+            least = self._find_near(STEP)
+            if record.given_up >= 3:  # then nothing helps, as where bodies are pushed together
                 break
-            if halvings == STEP.halvings:
+            if halvings == 6:
                 record.given_up += 1
                 break
             shares: tuple[float, ...] = (1.0,)
-            if least >= -(STEP.inside if foreseen else STEP.shallow):
+            if least >= -(1e-4 if foreseen else 2e-5):  # m: less is made again more often, and parted less often
                 free, shares = check_passing(state, before, self._near, self._margin, self._travel(time), time, weight)
                 if free:
                     break
-            start, met = program.remembered(time), bool(shares) and foreseen < STEP.foreseen
+            start, met = program.remembered(time), bool(shares) and foreseen < 2
             if met:
                 self._add_foreseen(program, before, time, shares)
                 foreseen += 1
@@ -278,7 +273,7 @@ class RigidBodies:
         record.contacts = int((impulse != 0.0).any(axis=1).sum())
         record.signorini = max(record.signorini, program.residuals[0])
         record.coulomb = max(record.coulomb, program.residuals[1])
-        if least < STEP.least_gap:
+        if least < LEAST_GAP:
             least, lifted = self._separate(least)
             record.work += lifted
         record.deepest = max(record.deepest, -least)
@@ -287,7 +282,7 @@ class RigidBodies:
     def _until_impact(program: StepProgram, time: float, together: bool) -> tuple[float, bool]:
         """The time to the first impact if that comes before a time and is not part of the program, and whether so."""
         first = float(program.hits.min(initial=np.inf))
-        return (time, False) if together or first >= time else (max(first, STEP.shortest), True)
+        return (time, False) if together or first >= time else (max(first, 1e-6), True)
 
     def _move(
         self, program: StepProgram, time: float, together: bool, start: Impulses, kept: tuple[Array, Array, Array]
@@ -295,15 +290,16 @@ class RigidBodies:
         """Solve the program of a step and move the bodies, again until joints are closed at its end."""
         joints, state = self._joints, self.state
         hold = np.zeros((len(joints), 3))
-        for closing in range(STEP.closings):
+        for closing in range(6):  # each closes what the one before left by bodies' turning
             program.solve(time, together, start, hold)
             pushed = program.pushed()
             motion_kernel.drift(state.bodies, pushed, self.gravity, time)
             self._falling = ~pushed
-            if not len(joints) or time < STEP.fine or closing == STEP.closings - 1:
+            # s: in shorter steps joints only keep their velocities; rounding over such a time is no velocity
+            if not len(joints) or time < 1e-5 or closing == 5:
                 return
             off = joints.gaps(state)
-            if np.abs(off).max() <= STEP.closed:
+            if np.abs(off).max() <= 1e-9:  # m
                 return
             hold -= off / time
             start = program.remembered(time)
@@ -315,8 +311,8 @@ class RigidBodies:
         for share in shares:
             if share < 1.0:
                 state.between(before.kept, share)
-                self._find_near(STEP.longest)
-            program.add_points(self._finder.points(self._near.nearer(STEP.least_gap)), time, share)
+                self._find_near(STEP)
+            program.add_points(self._finder.points(self._near.nearer(LEAST_GAP)), time, share)
             state.restore(end)
 
     def _record(self, events: Array, program: StepProgram, record: FrameRecord) -> None:
@@ -340,7 +336,7 @@ class RigidBodies:
         """Find the pairs that can meet within a time; the least distance of any."""
         state = self.state
         way = self._travel(time)
-        self._margin = 1.5 * way + STEP.margin
+        self._margin = 1.5 * way + 2e-3  # m
         self._near = self._finder.near(state.bodies.position, state.bodies.rotation, self._margin, state.active)
         return float(self._near.distance.min(initial=np.inf))
 
@@ -351,17 +347,17 @@ class RigidBodies:
         return np.asarray((speed + np.where(state.bodies.moving, np.linalg.norm(self.gravity) * time, 0.0)) * time)
 
     def _separate(self, least: float) -> tuple[float, float]:
-        """Part pieces that are nearer than `STEP.least_gap`, by the least displacements; the least distance then.
+        """Part pieces that are nearer than `LEAST_GAP`, by the least displacements; the least distance then.
 
         Bodies that are lifted pay with their kinetic energy; what they cannot pay [J] is returned too.
         """
         state = self.state
         before, position = self.energy(), state.bodies.position.copy()
-        for _ in range(STEP.separations):
+        for _ in range(4):
             program = StepProgram(state, self._finder.points(self._near), self.gravity, self._joints)
             motion_kernel.displace(state.bodies, program.separation(0.5 * SKIN))
-            least = self._find_near(STEP.longest)
-            if least >= STEP.least_gap:
+            least = self._find_near(STEP)
+            if least >= LEAST_GAP:
                 break
         gain = self.energy() - before
         if gain > 0.0:

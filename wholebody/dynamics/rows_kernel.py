@@ -13,8 +13,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.compiled import compiled
-from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.motion_kernel import Bodies, invert
+from wholebody.dynamics.pieces import ContactPoints
 
 
 class Rows(NamedTuple):

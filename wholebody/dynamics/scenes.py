@@ -23,16 +23,7 @@ from wholebody.tracking.scripts import Keys, Place, ScenePlan, standing_at
 from wholebody.tracking.tracks import MOST_FRAMES, Track
 
 TOP = 0.75  # m: of the table
-TABLE = (0.8, 0.6, 0.04)  # m: sizes of its top; its middle is at x = y = 0
 GAP = 2e-4  # m: that things stand above what bears them at the start, so that they do not begin inside it
-BALL = 0.02  # m: radius of the balls
-DOMINO = (0.008, 0.024, 0.048)  # m
-DOMINOES = 12
-SLAB = (0.05, 0.20, 0.60)  # m: of the dominoes that an avatar walks among
-STEP = (0.25, 1.0, 0.17)  # m: tread, width and rise of a stair
-STEPS = 6
-DOOR = (0.04, 0.90, 2.00)  # m: thickness, width and height of the door
-BAG = (0.17, 0.55)  # m: radius and length of the hanging bag
 WRIST = 0.105  # m: of the wrist above the table, so that bent fingers just clear it
 INDEX = 0.018  # m: of the index to the left of the wrist
 BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 0.36, 1.0)
@@ -111,19 +102,20 @@ def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float 
 
 
 def _table(scene: Scene) -> None:
-    scene.add(Box(TABLE), name="table", at=(0.0, 0.0, TOP - 0.5 * TABLE[2]), color=OAK)
-    leg = TOP - TABLE[2]
+    thickness = 0.04
+    scene.add(Box((0.8, 0.6, thickness)), name="table", at=(0.0, 0.0, TOP - 0.5 * thickness), color=OAK)
+    leg = TOP - thickness
     for number, (x, y) in enumerate(((-0.35, -0.25), (-0.35, 0.25), (0.35, -0.25), (0.35, 0.25))):
         scene.add(Box((0.05, 0.05, leg)), name=f"leg {number + 1}", at=(x, y, 0.5 * leg), color=OAK)
 
 
-def _ball(scene: Scene, x: float, y: float, radius: float = BALL) -> None:
+def _ball(scene: Scene, x: float, y: float, radius: float) -> None:
     scene.add(Sphere(radius), name="ball", at=(x, y, TOP + radius + GAP), color=RED, body=Body(density=700.0))
 
 
 def _ball_to_flick(scene: Scene) -> None:
     _table(scene)
-    _ball(scene, 0.30, 0.0)
+    _ball(scene, 0.30, 0.0, 0.02)
 
 
 def _ball_to_push(scene: Scene) -> None:
@@ -140,18 +132,19 @@ def _box_to_push(scene: Scene) -> None:
 
 def _dominoes(scene: Scene) -> None:
     _table(scene)
-    for number in range(DOMINOES):
-        at = (-0.05 + 0.028 * number, 0.0, TOP + 0.5 * DOMINO[2] + GAP)
-        scene.add(Box(DOMINO), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=700.0))
+    size = (0.008, 0.024, 0.048)
+    for number in range(12):
+        at = (-0.05 + 0.028 * number, 0.0, TOP + 0.5 * size[2] + GAP)
+        scene.add(Box(size), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=700.0))
 
 
 def _stairs(scene: Scene) -> None:
-    tread, width, rise = STEP
-    for number in range(STEPS):
-        height = rise * (STEPS - number)
+    tread, width, rise, count = 0.25, 1.0, 0.17, 6
+    for number in range(count):
+        height = rise * (count - number)
         scene.add(Box((tread, width, height)), name=f"stair {number + 1}", at=(tread * number, 0.0, 0.5 * height))
     body = Body(density=700.0, velocity=(0.6, 0.0, 0.0))
-    scene.add(Sphere(0.06), name="ball", at=(0.0, 0.0, rise * STEPS + 0.06 + GAP), color=RED, body=body)
+    scene.add(Sphere(0.06), name="ball", at=(0.0, 0.0, rise * count + 0.06 + GAP), color=RED, body=body)
 
 
 def _things_to_walk_into(scene: Scene) -> None:
@@ -163,18 +156,20 @@ def _things_to_walk_into(scene: Scene) -> None:
 
 
 def _door(scene: Scene) -> None:
-    width, height = DOOR[1:]
+    width, height = 0.90, 2.00
     x, middle = 0.75, 0.5 * height + 0.01
     hinge = Hinge((0.0, -0.5 * width, 0.0), axis=(0.0, 0.0, 1.0))
     for side in (-1.0, 1.0):
         at = (x, side * (0.5 * width + 0.03 + 0.25), 0.5 * (height + 0.1))
         name = "left wall" if side > 0.0 else "right wall"
         scene.add(Box((0.10, 0.50, height + 0.1)), name=name, at=at, color=OAK)
-    scene.add(Box(DOOR), name="door", at=(x, 0.0, middle), color=BLUE, body=Body(mass=12.0, joints=[hinge]))
+    scene.add(
+        Box((0.04, width, height)), name="door", at=(x, 0.0, middle), color=BLUE, body=Body(mass=12.0, joints=[hinge])
+    )
 
 
 def _bag(scene: Scene) -> None:
-    radius, length = BAG
+    radius, length = 0.17, 0.55
     x, beam, low = 0.75, 2.30, 1.15
     top = low + 0.5 * length + radius
     rope = beam - 0.05 - top
@@ -190,9 +185,10 @@ def _bag(scene: Scene) -> None:
 
 
 def _twenty_things(scene: Scene) -> None:
+    slab = (0.05, 0.20, 0.60)
     for number in range(8):
-        at = (0.65 + 0.22 * number, -0.15, 0.5 * SLAB[2] + GAP)
-        scene.add(Box(SLAB), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=100.0))
+        at = (0.65 + 0.22 * number, -0.15, 0.5 * slab[2] + GAP)
+        scene.add(Box(slab), name=f"domino {number + 1}", at=at, color=BLUE, body=Body(density=100.0))
     for number in range(6):
         at = (0.75 + 0.25 * number, 0.035, 0.08 + GAP)
         scene.add(Sphere(0.08), name=f"ball {number + 1}", at=at, color=RED, body=Body(density=60.0))

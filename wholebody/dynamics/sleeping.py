@@ -7,15 +7,18 @@ import numpy as np
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.dynamics import solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
-from wholebody.dynamics.contact_points import ContactFinder
-from wholebody.dynamics.settings import SLEEP
+from wholebody.dynamics.pieces import ContactFinder
 from wholebody.geometry.proximity import Contacts
+
+STILL, AFTER = 5e-3, 0.5  # m/s of every point of a body, and s that an island is so slow before it sleeps
+TOUCHING = 1e-3  # m: nearer bodies wake each other
+MOVED = 3e-5  # m: by which what touches a sleeper wakes it; less than the gap at which bodies rest
 
 
 class Sleepers:
     """Which bodies sleep. A body sleeps and wakes together with all that touch each other.
 
-    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `SLEEP.moved`, however
+    Of what touches a sleeper and does not sleep, the placement is kept. When it is elsewhere by `MOVED`, however
     slowly or suddenly it came there, the sleeper wakes. What comes to touch a sleeper later has moved, and wakes it.
     """
 
@@ -37,16 +40,16 @@ class Sleepers:
 
     def _touching(self, near: Contacts) -> Indices:
         """Bodies (k, 2) that touch, or that a joint holds together."""
-        touching: Indices = self._state.pieces.body[near.pair[near.distance < SLEEP.touching]]
+        touching: Indices = self._state.pieces.body[near.pair[near.distance < TOUCHING]]
         return np.concatenate([touching, self._together])
 
     def update(self, near: Contacts, dt: float) -> None:
         """Let islands sleep that have been slow for long; `near` are the pairs at the end of a frame of `dt` s."""
         state = self._state
         speed = np.linalg.norm(state.velocity, axis=1) + np.linalg.norm(state.spin, axis=1) * state.pieces.lever
-        slow = speed < SLEEP.still
+        slow = speed < STILL
         self._slow_for = np.where(slow, self._slow_for + dt, 0.0)
-        if not (self._slow_for[state.bodies.moving] >= SLEEP.after).any():
+        if not (self._slow_for[state.bodies.moving] >= AFTER).any():
             return
         body = self._touching(near)
         island = np.empty(len(state.bodies.position), dtype=np.intp)
@@ -54,7 +57,7 @@ class Sleepers:
         least = np.full(len(island), np.inf)
         waiting = np.where(state.pieces.dynamic, np.where(state.bodies.moving, self._slow_for, np.inf), np.inf)
         np.minimum.at(least, island, waiting)
-        falling_asleep = state.bodies.moving & (least[island] >= SLEEP.after)
+        falling_asleep = state.bodies.moving & (least[island] >= AFTER)
         state.bodies.moving[falling_asleep] = False
         state.velocity[falling_asleep] = state.spin[falling_asleep] = 0.0
         self._island[falling_asleep] = island[falling_asleep]
@@ -84,7 +87,7 @@ class Sleepers:
         both = np.concatenate([both, both[:, ::-1]])
         both = both[asleep[both[:, 0]] & active[both[:, 1]]]
         known = np.isin(self._keys(both), self._keys(self._touched))
-        woken = [both[~known | (self._speeds(both) > SLEEP.still), 0], self._touched[self._moved() > SLEEP.moved, 0]]
+        woken = [both[~known | (self._speeds(both) > STILL), 0], self._touched[self._moved() > MOVED, 0]]
         touched = np.concatenate(woken)
         if not len(touched):
             return False
@@ -99,7 +102,7 @@ class Sleepers:
         state = self._state
         put = (state.bodies.position != before[0]).any(axis=1) | (state.bodies.rotation != before[1]).any(axis=(1, 2))
         if put.any() and self.count:
-            margin = np.full(len(put), 0.5 * SLEEP.touching)
+            margin = np.full(len(put), 0.5 * TOUCHING)
             self.wake(finder.near(state.bodies.position, state.bodies.rotation, margin, put), put)
 
     def _forget(self) -> None:

@@ -21,11 +21,6 @@ from wholebody.base.compiled import compiled
 from wholebody.dynamics.rows_kernel import Rows, push
 
 JOINT_PRECISION = 1e4  # joints are solved to the tolerance over this: they close in every step, contacts only may open
-NEAR_TARGET = 0.01  # m/s: points without impulse that are nearer to their target than this belong to their island
-ISLAND_SWEEPS = 16  # sweeps over an island between sweeps over all; more = islands that met are found later
-ROUGH = 30.0  # tolerances: an island whose last sweep changes more has EXTRA_SWEEPS times as many sweeps
-EXTRA_SWEEPS = 6
-SAME_POINT = 0.01  # m: contact points nearer than this, in the body, are the same from step to step
 FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the same in each run
 
 
@@ -107,7 +102,7 @@ def _visit(c: int, rows: Rows, laws: Laws, twist: Array, impulse: Array) -> tupl
     open_by, before, first, second = normal - laws.target[c], impulse[c, 0], impulse[c, 1], impulse[c, 2]
     now = max(0.0, before - open_by / each)
     if now == 0.0 and before == 0.0 and first == 0.0 and second == 0.0:
-        return 0.0, 0.0, open_by < NEAR_TARGET
+        return 0.0, 0.0, open_by < 0.01  # m/s
     step = now - before
     one = first - (one + rows.mobility[c, 2] * step) / side
     two = second - (two + rows.mobility[c, 3] * step) / side
@@ -178,12 +173,12 @@ def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: 
         laws: of all points.
         twist: (n, 6) as in `solve`, and so `impulse`.
         impulse: (m, 3).
-        limits: of each island, see `ROUGH`.
+        limits: of each island; one whose last sweep changes more than 30 tolerances has six times as many sweeps.
     """
     count, bodies = len(rows.bodies), len(twist)
     listed, changes = np.empty(count, dtype=np.intp), np.zeros(count)
     root, swept, sweeps = np.empty(bodies, dtype=np.intp), np.zeros(bodies, dtype=np.intp), 0
-    part = Limits(0.5 * limits.tolerance, ISLAND_SWEEPS)
+    part = Limits(0.5 * limits.tolerance, 16)  # with more sweeps islands that met are found later
     while True:
         change, bearing = 0.0, 0
         for c in range(count):
@@ -199,8 +194,8 @@ def solve_islands(rows: Rows, laws: Laws, twist: Array, impulse: Array, limits: 
         points, first, worst = _by_island(listed[:bearing], rows, root, changes)
         solved = True
         for island in range(bodies):
-            rough = worst[island] >= ROUGH * limits.tolerance
-            most = EXTRA_SWEEPS * limits.sweeps if rough else limits.sweeps
+            rough = worst[island] >= 30.0 * limits.tolerance
+            most = 6 * limits.sweeps if rough else limits.sweeps
             if worst[island] >= limits.tolerance and swept[island] < most:
                 solved = False
                 chosen = points[first[island] : first[island + 1]]
@@ -315,7 +310,7 @@ def solve_from(
 def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], axes: Array, impulse: Array) -> None:
     """Write the impulses of the nearest old points of the same pair.
 
-    An old point that is not the nearest of any new one within `SAME_POINT` gives its impulse to the nearest new one, as
+    An old point that is not the nearest of any new one within 0.01 m gives its impulse to the nearest new one, as
     witness points jump from corner to corner.
 
     Args:
@@ -341,7 +336,7 @@ def _warm_start(old: tuple[Indices, Array, Array], new: tuple[Indices, Array], a
         new_head[new_pair[c]] = c
     used, none = np.zeros(len(pair), dtype=np.bool_), np.zeros(len(new_pair), dtype=np.bool_)
     for c in range(len(new_pair)):
-        number = _nearest(head[new_pair[c]], following, local, new_local[c], used, SAME_POINT)
+        number = _nearest(head[new_pair[c]], following, local, new_local[c], used, 0.01)
         if number >= 0:
             used[number] = True
             _add(world[number], axes[c], impulse[c])

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
-from wholebody.dynamics import energy_kernel, impact_kernel, rows_kernel, solve_kernel
+from wholebody.dynamics import energy_kernel, impact_kernel, motion_kernel, passing, rows_kernel, solve_kernel
 from wholebody.dynamics.bodies_state import BodiesState
-from wholebody.dynamics.contact_points import ContactPoints
 from wholebody.dynamics.impact_kernel import SLOW
 from wholebody.dynamics.joints import Joints
-from wholebody.dynamics.rows_kernel import Rows
-from wholebody.dynamics.settings import PROGRAM, SKIN
+from wholebody.dynamics.motion_kernel import Bodies
+from wholebody.dynamics.pieces import ContactPoints, SweptPoints
+from wholebody.dynamics.rows_kernel import JointPoints, Rows
 from wholebody.dynamics.solve_kernel import Laws, Limits
+
+SKIN = 5e-5  # m: gap at which bodies rest: coal's distances stay positive, its normals right to 0.02 rad
+TOUCH = 1e-5  # m: a gap larger than `SKIN` by this still touches
 
 
 class Impulses(NamedTuple):
@@ -62,7 +66,7 @@ class StepProgram:
         self.state, self.points, self.gravity, self.joints = state, points, gravity, joints
         pieces = state.pieces
         self._restitution, self._friction = pieces.restitution[points.pair], pieces.friction[points.pair]
-        self._touching = points.gap <= SKIN + PROGRAM.touch
+        self._touching = points.gap <= SKIN + TOUCH
         self._until = np.full(len(points.gap), np.inf)  # s: for which each gap has to last, at most
         self._rows = self._point_rows(state.bodies.moving)
         self.impulse = np.zeros((len(points.gap) + len(joints), 3))
@@ -96,7 +100,8 @@ class StepProgram:
         return rows
 
     def _limits(self, tolerance: float) -> Limits:
-        return Limits(tolerance, min(PROGRAM.sweeps, PROGRAM.visits // max(len(self._rows.bodies), 1) + 1))
+        """At most 1,000 sweeps of an island, and 20,000 visits of points: more are more exact and slower."""
+        return Limits(tolerance, min(1000, 20_000 // max(len(self._rows.bodies), 1) + 1))
 
     def add_points(self, points: ContactPoints, time: float, share: float = 1.0) -> None:
         """Add contact points as they are after a share of a step, which led to overlap that no point foresaw.
@@ -113,7 +118,7 @@ class StepProgram:
         self._restitution = np.concatenate([self._restitution, late._restitution])
         self._friction = np.concatenate([self._friction, late._friction])
         self._jammed = np.zeros(count + len(gap), dtype=bool)
-        self._touching = np.concatenate([self._touching, gap <= SKIN + PROGRAM.touch])
+        self._touching = np.concatenate([self._touching, gap <= SKIN + TOUCH])
         self._until = np.concatenate([self._until, np.full(len(gap), until)])
         joined = (np.concatenate(both) for both in zip(self.points, with_values(points, gap=gap), strict=True))
         self.points = ContactPoints(*joined)
@@ -139,7 +144,7 @@ class StepProgram:
         state, points = self.state, self.points
         weighed = state.bodies.given & np.isfinite(state.pieces.mass)
         rows = self._point_rows(state.bodies.moving | weighed) if weighed.any() else self._rows
-        twist, events = state.bodies.twist.copy(), np.zeros((PROGRAM.events, 5))
+        twist, events = state.bodies.twist.copy(), np.zeros((1000, 5))
         laws = Laws(self._friction, np.zeros(len(points.gap)), np.zeros((len(self.joints), 3)))
         count, ended = impact_kernel.resolve(
             np.flatnonzero(self._touching), points.pair, rows, self._restitution, laws, state.bodies.jointed, twist,
@@ -184,7 +189,7 @@ class StepProgram:
     def _restrain(self, began: Array, time: float, target: Array) -> None:
         """Take away what the tolerance of the program added to the energy; `began` (n, 6) are the velocities before."""
         bodies, points = self.state.bodies, self._rows.bodies
-        off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > PROGRAM.unsolved
+        off = np.abs(self._rates(bodies.twist)[: len(target), 0] - target) > 1.2e-4  # m/s: a program is solved to 1e-4
         energy_kernel.restrain(points, self.impulse, off, bodies, began, time * self.gravity, self._jammed)
 
     def work(self) -> Array:
@@ -213,7 +218,7 @@ class StepProgram:
         self.impulse[len(target) :] = start.joint
         self.residuals = solve_kernel.solve_from(
             old, new, self._rows, Laws(self._friction, target, hold), self.state.bodies.twist, self.impulse,
-            self._limits(PROGRAM.tolerance),
+            self._limits(1e-4),  # m/s: 0.4 um of the way of a step
         )  # fmt: skip
 
     def world_impulse(self) -> Array:
@@ -259,3 +264,37 @@ def impact_times(gap: Array, speed: Array, pull: Array) -> Array:
     real = (root >= 0.0) & (below > 0.0) & (gap > 0.0)
     found[real] = 2.0 * gap[real] / below[real]
     return found
+
+
+@lru_cache(maxsize=1)
+def compiled_kernel() -> Any:
+    """The loops of motion; those of all other modules named above are compiled or read back with them."""
+    one, unit, mask, twist = np.zeros((1, 3)), np.eye(3)[None].copy(), np.ones(1, dtype=bool), np.zeros((1, 6))
+    none, pairs, some, no_mask = _integers(0), _integers(0, 2), np.zeros(0), np.zeros(0, dtype=bool)
+    vectors, placed = np.zeros((0, 3)), np.zeros((1, 4, 3))
+    bodies = Bodies(np.ones(1), unit, unit, one, unit.copy(), twist, mask, mask, mask)
+    motion_kernel.drift(bodies, mask, np.zeros(3), 1.0)
+    motion_kernel.displace(bodies, twist)
+    motion_kernel.place_pieces(one, unit, one, _integers(1), placed, placed.copy())
+    rows, joints = Rows.room(pairs, 0, mask), JointPoints(pairs, np.zeros((0, 2, 3)), no_mask)
+    rows_kernel.contact_rows(ContactPoints(none, pairs, vectors, vectors, some), bodies, rows)
+    rows_kernel.joint_rows(joints, bodies, rows)
+    rows_kernel.joint_gaps(joints, bodies, vectors)
+    rows_kernel.rates(pairs, rows.jacobian, twist, vectors)
+    laws = Laws(some, some, vectors)
+    solve_kernel.solve(none, rows, laws, twist, vectors, Limits(1.0, 1))
+    solve_kernel.solve_islands(rows, laws, twist, vectors, Limits(1.0, 1))
+    solve_kernel.residuals(rows, laws, twist, vectors)
+    solve_kernel.join(none, pairs, mask, _integers(1))
+    solve_kernel.solve_from((none, vectors, vectors), (none, vectors), rows, laws, twist, vectors, Limits(1.0, 1))
+    energy_kernel.restrain(pairs, vectors, no_mask, bodies, twist, np.zeros(3), no_mask)
+    energy_kernel.settle(pairs, vectors, some, 0, bodies, (one, unit, twist), np.zeros(3))
+    impact_kernel.resolve(none, none, rows, some, laws, mask, twist, np.zeros((1, 5)))
+    swept = SweptPoints(vectors, none, none, some, vectors, np.zeros((0, 4)))
+    way = passing.Way(pairs, none, np.zeros((2, 0)), np.zeros((2, 0, 3)), np.zeros((2, 0, 4, 3)), one, some, some, 0.0)
+    passing.doubtful(way, swept, no_mask)
+    return motion_kernel
+
+
+def _integers(*shape: int) -> Indices:
+    return np.zeros(shape, dtype=np.intp)

@@ -23,7 +23,6 @@ from wholebody.dynamics.frame import EngineFrame
 from wholebody.dynamics.overlaps import Overlap, overlaps
 from wholebody.dynamics.pieces import HUMAN, segment_placements
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import PUSH
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts
 from wholebody.methods.newton.assembly_bodies import AssemblyBodies
@@ -190,7 +189,7 @@ class World(NotCopyable):
         """Give things the impulses of the figure that was stopped at the posture q (nq,)."""
         assert self.engine is not None
         self._workspace.refresh()
-        near = self._workspace.near(q, PUSH.touch)
+        near = self._workspace.near(q, 1.5e-3)  # m: the figure stops short of things by less
         contacts = PushedContacts(self.engine, self._workspace.state, self._workspace.table, near, self._owner_of)
         return contacts.push(self._coupling.velocity, self._surfaces)
 

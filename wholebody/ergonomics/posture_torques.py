@@ -15,7 +15,7 @@ from wholebody.ergonomics.work import LOAD
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import clip_torques
-from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
 
 LEGS = ("hip", "knee", "ankle", "toe")

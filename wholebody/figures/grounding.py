@@ -13,7 +13,6 @@ from wholebody.base.errors import InputError
 from wholebody.figures.postures import support
 
 DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
-STEPS = 2000  # most steps; each goes down by the least distance, so none goes through anything
 
 
 class SceneLike(Protocol):
@@ -61,7 +60,8 @@ def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Scene
     # m: segments that reach as low as this above the lowest point are those that stand
     soles = [(shape, place) for shape, place, low in body if low <= bottom + 0.03]
     shift = 0.0
-    for _ in range(STEPS):
+    # most steps; each goes down by the least distance, so none goes through anything
+    for _ in range(2000):
         gap = _least(soles, things, shift)
         if abs(gap) <= 1e-7:  # m: gap that counts as standing
             break

@@ -27,9 +27,6 @@ FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
 
 
-MET = 0.001
-"""Metres within which a stated dimension must be met."""
-
 SIZES = {"hand_length": "hand", "hand_breadth": "hand_breadth", "foot_length": "foot_length"}
 """Dimensions that are sizes of the body themselves, with the names of the sizes. Others are measured."""
 
@@ -75,7 +72,8 @@ def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Pers
     made = _sized(person, sizes, {name: wanted[name] for name in names if name not in SIZES}, fixed)
     found = _measured(made)
     for name, value in stated:
-        if abs(found[name] - value) > MET:
+        # metres within which a stated dimension must be met.
+        if abs(found[name] - value) > 0.001:
             raise InputError(
                 f"proportions: {name} {value:g} m is out of the model's reach with the other dimensions and stature "
                 f"{person.stature:g} m, it comes to {found[name]:.3f} m; give that or leave one dimension out"

@@ -20,8 +20,6 @@ from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 APART = 1e-3
 """Least distance of two pieces in the posture, metres."""
 
-STEPS = 60
-"""Corrections from one start; ordinary overlaps take three to ten."""
 
 LONGEST_STEP = 0.25
 """Largest change of a joint in one correction, radians or metres."""
@@ -114,7 +112,8 @@ class _Parting:
         """Correct until nothing is nearer than `APART`; otherwise return the posture with the fewest overlaps."""
         best: _Try | None = None
         since = 0
-        for _ in range(STEPS):
+        # corrections from one start; ordinary overlaps take three to ten.
+        for _ in range(60):
             near = self.contacts(q, APART)
             left = tuple(np.sort(near.number[near.distance <= 0.0]).tolist())
             found = _Try(q, left, float(np.minimum(near.distance, 0.0).sum()))

@@ -13,8 +13,6 @@ from wholebody.figures.description import ExcludedPair
 SELDOM = 0.02
 """Share of the sampled postures: pairs that are free in at most this share are left out, as nested shells."""
 
-TOUCHING = 2e-4
-"""Metres: pieces nearer than this touch. The phalanges of some hands are never farther apart."""
 
 UNLIMITED = np.pi
 """Range in both directions for sampling joints without limits: radians, or metres for prismatic joints."""
@@ -115,7 +113,8 @@ def _seldom_free(model: pin.Model, geometry: pin.GeometryModel, postures: Array)
         return {}
     data, results = model.createData(), pin.GeometryData(geometry)
     for request in results.collisionRequests:
-        request.security_margin = TOUCHING
+        # metres: pieces nearer than this touch. The phalanges of some hands are never farther apart.
+        request.security_margin = 2e-4
     free = dict.fromkeys(range(len(geometry.collisionPairs)), 0)
     most = int(SELDOM * len(postures))
     for q in postures:

@@ -16,12 +16,6 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array
 from wholebody.geometry.components import Component, split_components
 
-CONTINUED = 0.25
-"""Share of a loop's edges at which the cap turns by less than 45 degrees from the face beside it, for a hole."""
-
-MOUTH = 0.1
-"""Greatest area of a mouth that is closed, as a share of the part's surface."""
-
 
 class Closed(NamedTuple):
     """A part that was closed, and the number of its holes and mouths."""
@@ -54,7 +48,8 @@ def closed_up(part: Component) -> Closed | None:
         center = sum(map(len, vertices))
         vertices.append(middle[None])
         caps.append(np.array([(loop[(k + 1) % len(loop)], loop[k], center) for k in range(len(loop))]))
-    if len(mouths) > 1 or sum(mouths) > MOUTH * area:
+    # greatest area of a mouth that is closed, as a share of the part's surface.
+    if len(mouths) > 1 or sum(mouths) > 0.1 * area:
         return None
     whole = split_components(np.vstack(vertices), np.vstack(caps).astype(np.int64))
     if len(whole) != 1 or not whole[0].closed or whole[0].volume <= 0.0:
@@ -68,7 +63,8 @@ def _continues(
     around = np.array([normals[beside[loop[k], loop[(k + 1) % len(loop)]]] for k in range(len(loop))])
     lengths = np.linalg.norm(around, axis=1) * np.linalg.norm(cap)
     cosines = around @ cap / np.maximum(lengths, 1e-300)
-    return bool((cosines > np.cos(np.pi / 4.0)).mean() >= CONTINUED)
+    # share of a loop's edges at which the cap turns by less than 45 degrees from the face beside it, for a hole.
+    return bool((cosines > np.cos(np.pi / 4.0)).mean() >= 0.25)
 
 
 def _wound_alike(faces: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -173,10 +173,6 @@ def _smallest_basis(points: Array, candidates: list[int], scale: float) -> tuple
     return best
 
 
-SAME_NORMAL = 0.02
-"""Radians: of faces whose normals differ by less, only one is tried."""
-
-
 def simplified_hull(points: Array, max_vertices: int) -> Array:
     """Vertices of a convex polytope that contains points and has few vertices.
 
@@ -222,7 +218,8 @@ def _apart(equations: Array) -> Array:
     """Of thousands of faces, those whose normals differ: a rounded edge of a part in CAD has hundreds."""
     if len(equations) <= 1000:  # Number of faces above which only some are tried.
         return equations
-    _, first = np.unique(np.round(equations[:, :3] / SAME_NORMAL), axis=0, return_index=True)
+    # radians: of faces whose normals differ by less, only one is tried.
+    _, first = np.unique(np.round(equations[:, :3] / 0.02), axis=0, return_index=True)
     return np.asarray(equations[np.sort(first)])
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.human.fingers import finger_angles
+from wholebody.figures.human.fingers import opened_for_a_bar
 from wholebody.figures.state import State
 from wholebody.problem import Problem
 from wholebody.tasks.grasp import Grasp
@@ -67,27 +67,17 @@ def restarts(
 def hooked_hands(problem: Problem, state: State, start: Array) -> Iterator[Array]:
     """The start with hooked fingers of every hand that takes a bar by a power grip, shape (nq,); nothing without them.
 
-    Fingers that bend at their roots first lay their first parts on the bar before it meets the palm. Of a hook the
-    roots are nearly straight. First the thumb is as at the start, then that of a fist, which lies over the fingers.
-
     Args:
         problem: its bounds are kept.
         state: of the run; it is moved.
         start: (nq,).
     """
-    figure = problem.scene.figure
-    terms = (*problem.goals, *problem.constraints)
+    figure, terms = problem.scene.figure, (*problem.goals, *problem.constraints)
     sides = sorted({term.hand.split("_")[0] for term in terms if isinstance(term, Grasp) and term.kind == "power"})
-    hook, fist = (
-        {joint: angle for side in sides for joint, angle in finger_angles(shape, side).items()}
-        for shape in ("hook", "fist")
-    )
-    if hook and hook.keys() <= set(figure.joints):
-        fingers = {joint: angle for joint, angle in hook.items() if "thumb" not in joint}
-        thumbs = {joint: angle for joint, angle in fist.items() if "thumb" in joint}
-        for angles in (fingers, fingers | thumbs):
-            q = figure.with_joints(start, angles)
-            yield _moved(problem, state, start, pin.difference(figure.model, start, q))
+    for angles in opened_for_a_bar(sides):
+        if angles.keys() <= set(figure.joints):
+            move = pin.difference(figure.model, start, figure.with_joints(start, angles))
+            yield _moved(problem, state, start, move)
 
 
 def throughout(problem: Problem, state: State, start: Array, rng: np.random.Generator, count: int) -> Iterator[Array]:

@@ -10,14 +10,13 @@ if TYPE_CHECKING:
     from wholebody.motion.batch import BatchProgress, avoid_many, read_many
     from wholebody.motion.batch_table import AvoidedCase
     from wholebody.motion.bisection.method import Bisection
-    from wholebody.motion.bones import bone_errors
     from wholebody.motion.checking import ClipCheck
     from wholebody.motion.clip_torques import Torques, torques
-    from wholebody.motion.fade import Fade
     from wholebody.motion.judging import AvoidanceReport, Avoided
     from wholebody.motion.measures import MotionBounds
     from wholebody.motion.per_frame import PerFrame
     from wholebody.motion.reading import read_skeleton
+    from wholebody.motion.retargeting import bone_errors
     from wholebody.motion.skeleton import SkeletonMotion
     from wholebody.motion.stance import StanceFeet
     from wholebody.motion.strength import Strength
@@ -32,7 +31,6 @@ __all__ = [
     "Bisection",
     "ClipCheck",
     "Equipment",
-    "Fade",
     "MotionBounds",
     "PerFrame",
     "SkeletonMotion",
@@ -55,13 +53,12 @@ __getattr__, __dir__ = exported(
         "wholebody.motion.batch": "BatchProgress avoid_many read_many",
         "wholebody.motion.batch_table": "AvoidedCase",
         "wholebody.motion.bisection.method": "Bisection",
-        "wholebody.motion.bones": "bone_errors",
         "wholebody.motion.checking": "ClipCheck",
         "wholebody.motion.clip_torques": "Torques torques",
-        "wholebody.motion.fade": "Fade",
         "wholebody.motion.measures": "MotionBounds",
         "wholebody.motion.per_frame": "PerFrame",
         "wholebody.motion.reading": "read_skeleton",
+        "wholebody.motion.retargeting": "bone_errors",
         "wholebody.motion.skeleton": "SkeletonMotion",
         "wholebody.motion.stance": "StanceFeet",
         "wholebody.motion.strength": "Strength",

@@ -29,35 +29,16 @@ from wholebody.motion.faults import DEPTH
 from wholebody.motion.frame_terms import FrameTerms, Given, frame_terms
 from wholebody.motion.judging import COLLISION, HELD, ROUNDING, AvoidanceReport, Avoided, judged
 from wholebody.motion.measures import MotionBounds, resolved
-from wholebody.motion.soles import usual_feet
-from wholebody.motion.stance import StanceFeet, has_feet
+from wholebody.motion.stance import StanceFeet, has_feet, usual_feet
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Freeze
 from wholebody.tasks.base import Bound
 
-METHODS: Mapping[str, tuple[str, str]] = MappingProxyType(
-    {
-        "trajectory": ("wholebody.motion.trajectory.method", "Trajectory"),
-        "frames": ("wholebody.motion.per_frame", "PerFrame"),
-        "bisection": ("wholebody.motion.bisection.method", "Bisection"),
-        "fade": ("wholebody.motion.fade", "Fade"),
-    }
+METHODS: Mapping[str, str] = MappingProxyType(
+    {"trajectory": "Trajectory", "frames": "PerFrame", "bisection": "Bisection"}
 )
-"""Methods by name: module and class of the settings."""
-
-
-def avoider_named(name: str) -> Avoider:
-    """A method with its default settings.
-
-    Raises:
-        UnknownNameError: there is no such method.
-    """
-    if name not in METHODS:
-        raise UnknownNameError("method of avoidance", name, METHODS)
-    module, kind = METHODS[name]
-    made: Avoider = getattr(import_module(module), kind)()
-    return made
+"""Methods by name: the classes of their settings in `wholebody.motion`."""
 
 
 def as_avoider(given: object) -> Avoider:
@@ -68,7 +49,10 @@ def as_avoider(given: object) -> Avoider:
         InputError: it is neither.
     """
     if isinstance(given, str):
-        return avoider_named(given)
+        if given not in METHODS:
+            raise UnknownNameError("method of avoidance", given, METHODS)
+        made: Avoider = getattr(import_module("wholebody.motion"), METHODS[given])()
+        return made
     if isinstance(given, type) or not callable(getattr(given, "avoid", None)):
         raise InputError(
             f"avoid: method is {shown(given)}; give a name such as 'trajectory', or wb.motion.Trajectory()"
@@ -97,7 +81,7 @@ def avoid(
     Args:
         clip: the original postures; they may collide and be beyond limits.
         scene: its figure with carried things, and the things around; None for the figure alone.
-        method: "trajectory", "frames", "fade", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
+        method: "trajectory", "frames", "bisection", or configured: `wb.motion.Trajectory(clearance=0.005)`.
         constraints: what holds in every frame. What a term takes from the start it takes from the original posture of
             its own frame: `Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has.
         hold_feet: keep the feet of a figure that has some where they stand, as `wb.motion.StanceFeet()` does, unless

@@ -7,18 +7,25 @@ judges the answer. So a method has no judge, repair or report of its own.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, fields, is_dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from wholebody.base.arrays import Array, Mask
+from wholebody.figures.state import State
+from wholebody.methods.qp.method import QP
 from wholebody.motion.clip import Clip
 from wholebody.motion.faults import Faults, faults
-from wholebody.motion.following import Follower, Work, freed_posture
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.strength import Strength
 from wholebody.motion.windows import Window, windows
+from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
+from wholebody.tasks import Posture
+from wholebody.tasks.base import Bound, Constraint, Goal, filled
 
 
 class AvoidProgress(NamedTuple):
@@ -57,6 +64,91 @@ class Watch:
     def teller(self, begun: float, share: float, note: str) -> Callable[[float], bool]:
         """Reports how far a part of the clip is, by the share of it; looking for collisions counts for a tenth."""
         return lambda part: self.tell(0.1 + 0.9 * (begun + share * part), note)
+
+
+@dataclass
+class Work:
+    """What freeing a clip took so far.
+
+    Attributes:
+        programs: quadratic programs that were solved.
+        posture_solves: postures that were solved for, each on its own.
+    """
+
+    programs: int = 0
+    posture_solves: int = 0
+    _left_out: dict[str, set[int]] = field(default_factory=dict, init=False, repr=False)
+
+    def leave_out(self, frame: int, said: str) -> None:
+        """Keep what a problem of a frame says of a default that makes no sense there; see `Problem.left_out`."""
+        if said:
+            self._left_out.setdefault(said, set()).add(frame)
+
+    @property
+    def left_out(self) -> str:
+        """Which defaults were left out in postures that were solved for, and in which frames; "" where none was."""
+        found = []
+        for said, frames in self._left_out.items():
+            more = f" and {len(frames) - 1} others" if len(frames) > 1 else ""
+            found.append(f"{said} (frame {min(frames)}{more})")
+        return "; ".join(found)
+
+
+class Follower:
+    """Follows the original motion frame by frame."""
+
+    def __init__(self, terms: FrameTerms, clearance: float, work: Work) -> None:
+        """Set up for what is held in the frames of a clip, and a least distance of every pair, metres."""
+        self._terms, self._clearance, self._work = terms, clearance, work
+        q = terms.scene.figure.clamp(terms.q[0])
+        self._problem = Problem(terms.scene, q, goals=[Posture(terms.q[0])], measures=(), clearance=0.0)
+        bounds = [term.resolve(terms.scene, q) for term in terms.given if isinstance(term, Bound)]
+        still = [bound for bound in bounds if np.isfinite(bound.bounds(State(terms.scene.model), None)).any()]
+        self._problem.bounds = tuple(still)
+        self._goal = Posture(terms.q[0]).resolve(terms.scene, q)
+        self._tracker = QP(restarts=0).tracker(self._problem, terms.dt)
+
+    def frame(self, number: int, q: Array, more: float = 0.0, *, goal: Array | None = None) -> Array:
+        """The posture (nq,) of a frame, after three steps of the tracker at most.
+
+        Args:
+            number: of the frame.
+            q: (nq,) where the steps begin, once it is within the bounds of the frame.
+            more: metres that are asked of every pair beyond the clearance.
+            goal: (nq,) posture that is followed in place of the original one.
+        """
+        terms, problem = self._terms, self._problem
+        if terms.kept(number):
+            return np.array(terms.q[number])
+        problem.clearances = np.full_like(problem.clearances, self._clearance + more)
+        q = terms.within(number, q)
+        target = terms.q[number] if goal is None else goal
+        near = filled(self._goal, target=target, resolved_target=target)
+        held = terms.held(number)
+        problem.goals = (near, *(term for term in held if isinstance(term, Goal)))
+        problem.constraints = tuple(term for term in held if isinstance(term, Constraint))
+        for _ in range(3):  # more come nearer to the original where much is in the way, for dearer frames
+            step = self._tracker.step(q)
+            self._work.programs += 1
+            q = step.q
+            if np.abs(step.displacement).max(initial=0.0) <= 1e-3:  # rad, m: what is left is little
+                break
+        return q
+
+    def freed(self, number: int, q: Array) -> Array:
+        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap, by a solve of its own."""
+        terms, work = self._terms, self._work
+        held = terms.held(number)
+        goals = [term for term in held if isinstance(term, Goal)]
+        others = [term for term in held if not isinstance(term, Goal)]
+        bounds = [term for term in terms.given if isinstance(term, Bound)]
+        problem = Problem(terms.scene, terms.scene.figure.clamp(q), goals=goals, constraints=[*others, *bounds])
+        work.leave_out(number, problem.left_out)
+        problem.clearances = np.full_like(problem.clearances, self._clearance)
+        solution = QP(restarts=0).solve(problem)
+        work.posture_solves += 1
+        work.programs += sum(solution.programs.values())
+        return solution.q
 
 
 class Run:
@@ -111,10 +203,6 @@ class Run:
         """Windows around marked frames (n,), with so many seconds and at least so many frames on both sides."""
         return windows(marked, self.frames(seconds, least))
 
-    def freed_posture(self, frame: int, q: Array) -> Array:
-        """A posture (nq,) of a frame without overlap, near a posture (nq,) that may overlap."""
-        return freed_posture(self.terms, frame, q, self.clearance, self.work)
-
 
 class MethodResult(NamedTuple):
     """What a method makes of a clip.
@@ -160,6 +248,6 @@ class Avoider(Protocol):
         """
 
 
-def has_setting(method: Avoider, name: str) -> bool:
+def has_setting(method: object, name: str) -> bool:
     """Whether a method has a setting of a name, such as "dynamics", so that `dataclasses.replace` changes it."""
-    return name in getattr(method, "__dataclass_fields__", {})
+    return is_dataclass(method) and name in {each.name for each in fields(method)}

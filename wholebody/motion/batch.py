@@ -28,8 +28,6 @@ from wholebody.motion.worn_equipment import NOTHING, Worn, dressed, label
 from wholebody.tracking.tracks import check_figure
 from wholebody.version import __version__
 
-MOST_JOBS = 4096
-
 Source = Clip | str | os.PathLike[str]
 
 
@@ -115,7 +113,7 @@ def avoid_many(
     worn: dict[str, Worn] = {label(one): one for one in pieces}
     ways = _ways([as_avoider(one) for one in checks.listed(methods, f"{what}: methods", "['trajectory']")])
     hold_feet = checks.flag(hold_feet, f"{what}: hold_feet")
-    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
+    jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
     checks.function(progress, f"{what}: progress")
@@ -278,7 +276,7 @@ def read_many(
     check_figure(figure, what)
     sources = _sources(checks.listed(files, f"{what}: files", "['walk.bvh']"), figure, what)
     table = BatchTable(checks.path(folder, f"{what}: folder"))
-    jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
+    jobs = checks.whole(jobs, f"{what}: jobs", 1, 4096)
     checks.function(progress, f"{what}: progress")
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")

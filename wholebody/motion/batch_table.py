@@ -16,8 +16,6 @@ from wholebody.motion.clip import Clip
 
 TABLE = "cases.json"
 SHEET = "cases.csv"
-ORIGINALS = "originals"
-"""Folder of the clips as they were before; of a skeleton what was retargeted from it."""
 
 
 @dataclass(frozen=True)
@@ -113,7 +111,7 @@ class BatchTable:
 
     def original(self, name: str) -> Path:
         """The file of a clip as it was before."""
-        return self.folder / ORIGINALS / f"{file_name(name)}.npz"
+        return self.folder / "originals" / f"{file_name(name)}.npz"
 
     def has_original(self, name: str, asked: str) -> bool:
         """Whether the clip of a recording was made before, of the same file and figure."""
@@ -121,7 +119,7 @@ class BatchTable:
 
     def add_original(self, name: str, clip: Clip, asked: str) -> None:
         """Keep the clip of a recording."""
-        make_folder(self.folder / ORIGINALS)
+        make_folder(self.original(name).parent)
         clip.write(self.original(name))
         self._originals[name] = asked
         self._write()

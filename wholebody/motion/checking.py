@@ -22,8 +22,7 @@ from wholebody.scene.scene import Scene
 DEPTH = 1e-4
 """Depth up to which an overlap is no contact, metres: that of sweeps, a tenth of a millimetre."""
 
-SMALLEST = 1e-5  # m: ten times coal's own accuracy
-LARGEST = 1.0  # m
+SMALLEST, LARGEST = 1e-5, 1.0  # m, of the tolerance; ten times coal's own accuracy
 ROUNDING = 1e-9  # rad, m: by which a limit may be missed; share by which a speed may be
 
 Progress = Callable[[int], object]

@@ -21,9 +21,6 @@ from wholebody.tracking.tracks import MOST_FRAMES, Track, check_figure, check_fr
 MIRROR = np.diag([1.0, -1.0, 1.0])
 """Reflection at the plane y = 0."""
 
-PLACE, DIRECTION = 0.01, 0.05
-"""Metres and radians by which a figure may be off symmetry: descriptions of robots have their digits cut off."""
-
 SIDES = (
     ("left", "right"),
     ("Left", "Right"),
@@ -34,16 +31,15 @@ SIDES = (
 )
 """How names say their side; the patterns of single letters need a letter that stands alone or before a capital."""
 
-_WORDS = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
-_OTHER = {**_WORDS, **{right: left for left, right in _WORDS.items()}}
-
 
 def other_side(name: str) -> str:
     """The name of the same part on the other side; the name itself if it names no side."""
+    words = {"left": "right", "Left": "Right", "LEFT": "RIGHT", "l": "r", "L": "R"}
+    words |= {right: left for left, right in words.items()}
     for left, right in SIDES:
         both = re.compile(f"{left}|{right}")
         if both.search(name):
-            return both.sub(lambda found: _OTHER[found.group()], name, count=1)
+            return both.sub(lambda found: words[found.group()], name, count=1)
     return name
 
 
@@ -78,10 +74,11 @@ def _exchange(figure: Figure) -> tuple[Indices, Array]:
         if joint.nv != 1 or joint.nq != other.nq:
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} is no joint of one degree of freedom")
         here = MIRROR @ data.oMi[joint.id].translation
-        if np.linalg.norm(here - data.oMi[other.id].translation) > PLACE:
+        apart = np.linalg.norm(here - data.oMi[other.id].translation)
+        if apart > 0.01:  # m: descriptions of robots have their digits cut off
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} are not symmetric to y = 0")
         along = _along(data.J[:, joint.idx_v], data.J[:, other.idx_v])
-        if abs(along) < np.cos(DIRECTION):
+        if abs(along) < np.cos(0.05):
             raise InputError(f"{figure.name} cannot be mirrored: {name!r} and {partner!r} turn about other axes")
         for k in range(joint.nq):  # an unlimited joint holds cosine and sine; the sine alone changes its sign
             source[joint.idx_q + k] = other.idx_q + k
@@ -101,9 +98,6 @@ def _along(own: Array, other: Array) -> float:
 
 ROUNDING = 1e-9
 """Share of a time step by which a time may be outside of a clip: the rounding of sums of steps."""
-
-BLOCK = 10_000
-"""Frames that are normalised at once: an array for each of a million takes more than their values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +143,8 @@ class Clip:
     def _normalise(self, q: Array) -> None:
         """Make quaternions, and cosines and sines of unlimited joints, of unit length."""
         model = self.figure.model
-        for first in range(0, len(q), BLOCK):
-            block = q[first : first + BLOCK]
+        for first in range(0, len(q), 10_000):  # an array for each of a million frames takes more than their values
+            block = q[first : first + 10_000]
             unit = np.array([pin.normalize(model, frame) for frame in block])
             off = ~(np.abs(unit - block) <= UNIT_TOLERANCE)
             off[[not pin.isNormalized(model, frame, UNIT_TOLERANCE) for frame in unit]] = True  # a quaternion of zeros
@@ -313,16 +307,6 @@ class Clip:
             a[-1] = 2.0 * a[-2] - a[-1 - last]
         a /= self.dt**2
         return a
-
-    def jerk(self) -> Array:
-        """Jerk (n, nv), rad/s³ and m/s³: differences of the accelerations, exact for cubic polynomials of time.
-
-        It is zero for a clip of less than four frames.
-        """
-        if len(self) < 4:
-            return np.zeros((len(self), self.figure.model.nv))
-        found: Array = np.gradient(self.accelerations(), self.dt, axis=0)
-        return found
 
     def _differences(self) -> tuple[Array, Array]:
         """Displacements (n, nv) from each frame to the next one and to the one before; zero where there is none."""

@@ -14,8 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
 from wholebody.motion.clip import Clip
 from wholebody.motion.inverse_dynamics import ROOT, InverseDynamics, foot_wrenches
-from wholebody.motion.soles import standing_feet
-from wholebody.motion.stance import FEET
+from wholebody.motion.stance import FEET, standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 
 CUTOFF = 6.0

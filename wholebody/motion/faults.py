@@ -52,9 +52,7 @@ def _swept(workspace: Workspace, q: Array, gaps: Iterable[int]) -> Iterator[tupl
 
 def dip_depth(workspace: Workspace, before: Array, after: Array) -> float:
     """How deep the motion between two postures (nq,) dips, metres; see `SweptDepth.advance`."""
-    swept = workspace.depths(DIP)
-    swept.start(before)
-    return float(swept.advance(after)[1].depth.max(initial=0.0))
+    return depths_between(workspace, np.stack([before, after]), [0])[0]
 
 
 def dips(workspace: Workspace, q: Array, gaps: Iterable[int]) -> dict[int, list[float]]:

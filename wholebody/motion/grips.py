@@ -23,15 +23,11 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.motion.trajectory.banded_program import BandedQP
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.windows import Window, windows
 from wholebody.scene.scene import Scene
 from wholebody.tasks import Hold
 
-OVERLAP = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
-ROOM = 3e-4  # m: of shifted things beyond what is asked; they come nearer by less between places that are looked at
 NEAR = 0.02  # m: pairs nearer than this have rows
 SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
 
@@ -112,10 +108,11 @@ def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float 
     """
     grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
     depths = np.array([_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)])
-    wrong, passing = depths > OVERLAP, list[int]()
+    overlap = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
+    wrong, passing = depths > overlap, list[int]()
     # where pairs are nearer than a centimetre, places between frames are looked at
     for gap in np.flatnonzero((depths[:-1] > -0.01) | (depths[1:] > -0.01)).tolist():
-        if max(_deepest(_rows_at(grip, gap + share, q, shifts, clearance)) for share in SHARES) > OVERLAP:
+        if max(_deepest(_rows_at(grip, gap + share, q, shifts, clearance)) for share in SHARES) > overlap:
             passing.append(gap)
             wrong[gap : gap + 2] = True
     for window in windows(wrong, max(3, round(0.5 / dt))):  # 0.5 s before and after an overlap
@@ -156,6 +153,8 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     """
     import scipy.sparse as sp
 
+    from wholebody.motion.trajectory.interior_point import BandedQP, minimise
+
     count = len(window)
     seams = window.first > 0, window.end < len(q)
     bands = Objective(count, np.ones(3), 0.1, dt, seams).bands  # tau is 0.1 s
@@ -164,15 +163,15 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + 100.0 * across)  # c is 100
     shifts = np.zeros((count, 3))
     places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]
-    _, solve = banded_solver(None)
+    room = 3e-4  # m: beyond what is asked; things come nearer by less between places that are looked at
     for _ in range(8):  # the normals turn less each time
         rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
-        if min((row.distance for row in rows), default=NEAR) >= 0.5 * ROOM:
+        if min((row.distance for row in rows), default=NEAR) >= 0.5 * room:
             return shifts
         G = sp.vstack([sp.csr_matrix(_over_frames(row, count)) for row in rows], format="csc")
-        lower = np.array([ROOM - row.distance for row in rows]) + G @ shifts.ravel()
+        lower = np.array([room - row.distance for row in rows]) + G @ shifts.ravel()
         most = np.full(3 * count, 0.05)  # m: what needs a larger shift is no grip, and stays as it is
-        answer = solve(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
+        answer = minimise(BandedQP(P, np.zeros(3 * count), G, lower, np.full(len(rows), np.inf), -most, most))
         if not answer.solved:
             return None
         shifts = answer.z.reshape(count, 3)

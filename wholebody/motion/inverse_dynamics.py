@@ -8,7 +8,7 @@ on the joints through the foot's Jacobian.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -16,12 +16,113 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.motion.soles import GroundForces, Soles, ground_forces
-from wholebody.tasks.balance import convex_polygon, edges
+from wholebody.motion.stance import pieces_on
+from wholebody.tasks.balance import convex_polygon, edges, low_points
 
 ROOT = 6  # degrees of freedom of a free root
 LIGHT = 0.2
 """Share of the weight: with less vertical force, in a take-off or landing, the zero moment point says little."""
+
+
+class Soles:
+    """Points of feet that bear force: the lowest corners of their pieces, toes included.
+
+    Attributes:
+        joints: number of the joint of each foot.
+    """
+
+    def __init__(self, figure: Figure, feet: tuple[str, ...]) -> None:
+        """Find the pieces of the feet.
+
+        Raises:
+            InputError: a foot has none.
+        """
+        self.joints: list[int] = []
+        self._pieces: list[list[Any]] = []
+        for foot in feet:
+            joint = figure.model.frames[figure.frame_id(foot)].parentJoint
+            pieces = pieces_on(figure, joint)
+            if joint == 0 or not pieces:
+                raise InputError(f"torques: {foot} has no pieces to stand on; name segments with geometry as feet")
+            self.joints.append(joint)
+            self._pieces.append(pieces)
+
+    def points(self, data: pin.Data, stand: list[bool]) -> tuple[Array, Any]:
+        """Points (n, 3) in the world of the feet that stand, and the number of each one's foot (n,)."""
+        points, owner = [np.zeros((0, 3))], [np.zeros(0, dtype=int)]
+        for foot, stands in enumerate(stand):
+            if not stands:
+                continue
+            lows = np.vstack(
+                [
+                    low_points(piece.geometry, data.oMi[piece.parentJoint] * piece.placement)
+                    for piece in self._pieces[foot]
+                ]
+            )
+            # up to 2 cm above the lowest point: soles are rounded, recordings uneven
+            lows = _outermost(lows[lows[:, 2] <= lows[:, 2].min() + 0.02])
+            points.append(lows)
+            owner.append(np.full(len(lows), foot))
+        return np.vstack(points), np.concatenate(owner)
+
+
+def _outermost(points: Array) -> Array:
+    """The points that are farthest in the horizontal plane in twelve evenly spread directions."""
+    around = 2.0 * np.pi * np.arange(12) / 12  # fewer cut off the ends of a rounded sole
+    far = np.argmax(points[:, :2] @ np.array([np.cos(around), np.sin(around)]), axis=0)
+    found: Array = points[np.unique(far)]
+    return found
+
+
+class GroundForces(NamedTuple):
+    """Forces of the ground in one frame.
+
+    Attributes:
+        forces: (points, 3) force on each point of the soles, N, in the world.
+        missing: (6,) what the ground cannot give of the wrench: force N, moment N m about the wrench's point.
+        split: (3 points, 6) derivative of the forces with respect to the wrench, while the same edges bear.
+    """
+
+    forces: Array
+    missing: Array
+    split: Array
+
+
+def ground_forces(wrench: Array, about: Array, points: Array, friction: float) -> GroundForces:
+    """Forces at points of the soles, within their cones of friction, that give a wrench as nearly as can be.
+
+    Minimises |sum of the forces' wrenches - wrench|^2 + (e |forces|)^2 over combinations with coefficients >= 0 of the
+    edges of each point's friction pyramid (non-negative least squares, Lawson and Hanson 1974, chapter 23).
+
+    Args:
+        wrench: (6,) force, N, and moment about a point, N m; in the world.
+        about: (3,) the point, metres.
+        points: (points, 3) where the soles touch the level ground; there may be none.
+        friction: coefficient of friction, more than 0.
+    """
+    if len(points) == 0:
+        return GroundForces(np.zeros((0, 3)), wrench.copy(), np.zeros((0, 6)))
+    from scipy.optimize import nnls
+
+    count = 8  # edges of a pyramid, which lies within 8 % of the cone of friction, and inside
+    even = 1e-3  # m: e; many splits give the same wrench; more misses the wrench by about its square
+    around = 2.0 * np.pi * np.arange(count) / count
+    rims = np.column_stack([friction * np.cos(around), friction * np.sin(around), np.ones(count)])
+    directions = np.tile(rims, (len(points), 1))
+    arms = np.repeat(points - about, count, axis=0)
+    columns = np.hstack([directions, np.cross(arms, directions)]).T
+    # scaled to the wrench, so that e means the same for a mouse and an elephant
+    scale = max(float(np.linalg.norm(wrench[:3])), 1.0)
+    stacked = np.vstack([columns, even * np.eye(columns.shape[1])])
+    found, _ = nnls(stacked, np.concatenate([wrench / scale, np.zeros(columns.shape[1])]))
+    forces = (found[:, None] * directions).reshape(len(points), count, 3).sum(axis=1) * scale
+    bears = found > 0.0
+    active = columns[:, bears]
+    # the answer on the edges that bear is that of linear least squares with e
+    solved = np.linalg.solve(active.T @ active + even**2 * np.eye(active.shape[1]), active.T)
+    split = np.zeros((len(points), 3, 6))
+    np.add.at(split, np.flatnonzero(bears) // count, directions[bears][:, :, None] * solved[:, None, :])
+    return GroundForces(forces, wrench - columns @ (found * scale), split.reshape(-1, 6))
 
 
 class Stand(NamedTuple):

@@ -14,17 +14,15 @@ import numpy as np
 
 from wholebody.assessment.motion import limit_violation
 from wholebody.base.arrays import Array
-from wholebody.motion.avoider import MethodResult
+from wholebody.motion.avoider import MethodResult, Work
 from wholebody.motion.checking import ClipCheck, check
 from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import LoadChange
-from wholebody.motion.following import Work
 from wholebody.motion.frame_terms import FrameTerms
 from wholebody.motion.measures import MotionBounds, excess
 from wholebody.tasks.base import filled
 
 COLLISION = 1e-4  # m: a frame, or the motion between two, that is deeper collides
-FASTER = 0.02  # of a speed that was given, by which it may be exceeded in a solved clip
 HELD = 1e-3  # m, rad: by which what is held may be missed in a solved clip
 ROUNDING = 1e-6  # rad, m: by which limits may be missed
 
@@ -183,7 +181,7 @@ def _missed(terms: FrameTerms, clip: Clip) -> tuple[float, list[str]]:
         said.append(f"a joint limit is missed by {beyond:.3g} rad or m")
     if not misses[at].by <= HELD:
         said.append(f"{misses[at].name} is missed by {misses[at].by:.3g} m or rad, at {at * clip.dt:.2f} s")
-    if not faster <= FASTER:
+    if not faster <= 0.02:
         when = f"{past.index(faster) * clip.dt:.2f} s"
         said.append(f"a speed that was given is exceeded by {faster:.1%} of it, at {when}")
     return misses[at].by, said

@@ -19,7 +19,6 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import instance
 from wholebody.base.errors import InputError
-from wholebody.figures.figure import Figure
 from wholebody.motion.checking import joint_jerk
 from wholebody.motion.clip import Clip
 from wholebody.motion.stance import paths, standing_points
@@ -102,56 +101,6 @@ def foot_sliding(before: Clip, after: Clip) -> float:
     return most
 
 
-def hand_error(before: Clip, after: Clip, hand: str, other: str) -> float:
-    """By how much a hand leaves its place in the frame of the other one, which holds a weapon: metres.
-
-    Args:
-        before: the clip in which both hands hold it.
-        after: the clip that was made from it.
-        hand: frame that holds the weapon firmly.
-        other: frame of the other hand.
-
-    Returns:
-        The greatest change of the position of the other hand, in the axes of the first, in any frame.
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: two clips of different figures or lengths.
-    """
-    _same(before, after, "hand_error")
-    ids = before.figure.frame_id(hand), before.figure.frame_id(other)
-    held = [_relative(clip.figure, clip.q, *ids) for clip in (before, after)]
-    return float(np.linalg.norm(held[0] - held[1], axis=1).max())
-
-
-def hand_off_weapon(before: Clip, after: Clip, hand: str, other: str) -> float:
-    """By how much a hand leaves a straight weapon that both hands hold, along which it may slide: metres.
-
-    The weapon lies along the line between both frames in each posture of the clip before.
-
-    Args:
-        before: the clip in which both hands hold it.
-        after: the clip that was made from it.
-        hand: frame that holds the weapon firmly.
-        other: frame of the other hand.
-
-    Returns:
-        The greatest distance by which the change of the other hand's position leaves that line, in any frame.
-
-    Raises:
-        UnknownNameError: the figure has no such frame.
-        InputError: two clips of different figures or lengths.
-    """
-    _same(before, after, "hand_off_weapon")
-    ids = before.figure.frame_id(hand), before.figure.frame_id(other)
-    held, now = (_relative(clip.figure, clip.q, *ids) for clip in (before, after))
-    length = np.linalg.norm(held, axis=1, keepdims=True)
-    line = np.divide(held, length, out=np.zeros_like(held), where=length > 0.0)
-    change = now - held
-    off = change - (change * line).sum(axis=1, keepdims=True) * line
-    return float(np.linalg.norm(off, axis=1).max())
-
-
 def _centres(clip: Clip) -> Array:
     """(n, njoints - 1, 3) centres of the joints in the world, metres."""
     model, data = clip.figure.model, clip.figure.model.createData()
@@ -159,16 +108,6 @@ def _centres(clip: Clip) -> Array:
     for k, q in enumerate(clip.q):
         pin.forwardKinematics(model, data, q)
         found[k] = [place.translation for place in data.oMi.tolist()[1:]]
-    return found
-
-
-def _relative(figure: Figure, q: Array, first: int, second: int) -> Array:
-    """(n, 3) position of the second frame in the axes of the first."""
-    data, found = figure.model.createData(), np.zeros((len(q), 3))
-    for k, posture in enumerate(q):
-        pin.forwardKinematics(figure.model, data, posture)
-        base = pin.SE3(pin.updateFramePlacement(figure.model, data, first))
-        found[k] = base.actInv(pin.updateFramePlacement(figure.model, data, second)).translation
     return found
 
 
@@ -186,23 +125,9 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2))) if values.size else 0.0
 
 
-SPAN = 0.5
-"""Seconds over which jerk and speed are compared: a tenth of it would compare single frames, and the whole clip would
-hide a jump of one frame among many calm ones."""
-
-TURN, TIME = 1.0, 0.5
-"""Radians and seconds of a plain movement of one joint. Where the original is calmer than it, the new motion may be as
-fast as this movement, which has the least jerk of all of its size and duration (Flash and Hogan 1985, Journal of
-Neuroscience 5(7): 1688)."""
-
-PLAIN_SPEED = 15.0 / 8.0 * TURN / TIME
-"""Largest speed of that movement, rad/s."""
-
-PLAIN_JERK = math.sqrt(720.0) * TURN / TIME**3
-"""Root mean square jerk of that movement, rad/s^3."""
-
-LARGEST = 1e6  # times; rad, m
-ROUNDING = 1e-6  # times, rad, m: by which a bound may be exceeded
+PLAIN_SPEED, PLAIN_JERK = 15.0 / 8.0 / 0.5, math.sqrt(720.0) / 0.5**3
+"""Largest speed (rad/s) and root mean square jerk (rad/s^3) of a turn by 1 rad in 0.5 s with the least jerk (Flash and
+Hogan 1985, Journal of Neuroscience 5(7): 1688). Where the original is calmer, the new motion may be as fast."""
 
 
 @dataclass(frozen=True)
@@ -236,7 +161,7 @@ class MotionBounds:
         """Check the values."""
         for name, least in (("jerk", 1.0), ("speed", 1.0), ("deviation", 0.0)):
             if getattr(self, name) is not None:
-                checks.number(getattr(self, name), f"MotionBounds: {name}", least, LARGEST)
+                checks.number(getattr(self, name), f"MotionBounds: {name}", least, 1e6)
         checks.warn_of_degrees(self.deviation or 0.0, "MotionBounds: deviation")
         checks.flag(self.keep_ends, "MotionBounds: keep_ends")
 
@@ -294,7 +219,7 @@ def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
         beyond[first : first + 4] = True
     for first in np.flatnonzero(fast).tolist():
         beyond[first : first + 2] = True
-    far = ~(away <= largest + ROUNDING)
+    far = ~(away <= largest + 1e-6)
     beyond |= far
     for name, ratio, marks, most in (("jerk", jerk, rough, bounds.jerk), ("speed", speed, fast, bounds.speed)):
         if marks.any():
@@ -312,11 +237,11 @@ def excess(before: Clip, after: Clip, bounds: MotionBounds) -> Excess:
 
 def _beyond(ratio: Array, most: float | None) -> Mask:
     """Which ratios are not within a bound; NaN is not."""
-    return np.zeros(len(ratio), dtype=bool) if most is None else ~(ratio <= most + ROUNDING)
+    return np.zeros(len(ratio), dtype=bool) if most is None else ~(ratio <= most + 1e-6)
 
 
 def _jerk_ratios(before: Clip, after: Clip) -> Array:
-    """(n - 3,) jerk over `SPAN`, in parts of the original's there, of its whole clip, or of a plain movement."""
+    """(n - 3,) jerk over half a second, in parts of the original's there, of its whole clip, or of a plain movement."""
     model, dt = before.figure.model, before.dt
     old, new = (third_differences(model, clip.q, dt) for clip in (before, after))
     found = np.zeros(len(old))
@@ -345,7 +270,7 @@ def _parts(clip: Clip) -> tuple[slice, ...]:
 
 
 def _mean_near(values: Array, dt: float) -> Array:
-    """(k,) the mean of values (k,) within half of `SPAN` on both sides."""
+    """(k,) the mean of values (k,) within 0.25 s on both sides."""
     reach = _reach(dt)
     sums = np.concatenate([[0.0], np.cumsum(values)])
     places = np.arange(len(values))
@@ -355,7 +280,7 @@ def _mean_near(values: Array, dt: float) -> Array:
 
 
 def _largest_near(values: Array, dt: float) -> Array:
-    """(k,) the largest of values (k,) within half of `SPAN` on both sides."""
+    """(k,) the largest of values (k,) within 0.25 s on both sides."""
     reach = _reach(dt)
     near = sliding_window_view(np.pad(values, reach), 2 * reach + 1)
     found: Array = near.max(axis=1)[: len(values)]
@@ -363,5 +288,5 @@ def _largest_near(values: Array, dt: float) -> Array:
 
 
 def _reach(dt: float) -> int:
-    """Half of `SPAN` in frames."""
-    return max(1, round(0.5 * SPAN / dt))
+    """0.25 s in frames: single frames say little, and the whole clip would hide a jump among many calm frames."""
+    return max(1, round(0.25 / dt))

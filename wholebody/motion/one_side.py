@@ -1,9 +1,7 @@
-"""Postures on one side of what the original motion passes through, found by following it frame by frame.
+"""Postures on one side of what the original motion passes through.
 
-A limb that passes through the trunk is pushed out on one side before the middle and on the other after it; postures
-that were found one by one may be on either side of a thin thing. No rows of contact free the motion from one side to
-the other. So a posture on one side is taken, and from there the original motion is followed in contact with what is in
-the way, outwards or until the motion to the next frame as it is passes nothing.
+No rows of contact bring a limb from one side of a thin thing to the other. So from a posture on one side the original
+motion is followed frame by frame in contact, outwards or until the motion to the next frame as it is passes nothing.
 """
 
 from __future__ import annotations
@@ -21,22 +19,15 @@ from wholebody.motion.faults import depth, depths_between, dip_depth
 from wholebody.motion.windows import Window, outwards
 
 SHALLOW = 2e-3  # m: a deeper dip passes through something; others are arcs between postures in contact
-PASSED = 1e-2
-"""Metres: a motion between postures that were found one by one passes through something if it is deeper. Less changes
-more frames, more leaves more to the rows of contact."""
+PASSED = 1e-2  # m: a deeper motion between two postures passes through something; less changes more frames
 
 
 def one_sided(run: Run, q: Array) -> Array:
-    """Postures (n, nq) of a clip of which fewer motions pass something; the given ones where that is not found.
+    """Postures (n, nq) of a clip of which fewer motions pass something; the given q (n, nq) where that is not found.
 
-    Motions that pass divide the clip into runs of frames, on one side and on the other in turn. A posture is mostly on
-    the side from which it deviates less. So where one side has at most a quarter of the frames, these take the other.
-    Else, or where something is passed still, motions that pass are gone through from the first to the last one, each
-    side being that of the frame before, and from the last to the first one where that leaves as many.
-
-    Args:
-        run: is told of every frame.
-        q: (n, nq) postures; they stay as they are.
+    Motions that pass divide the clip into runs of frames, on one side and on the other in turn. Where one side has at
+    most a quarter of the frames, these take the other. Else motions that pass take the side of the frame before, from
+    the first to the last, or that of the frame after, from the last to the first.
     """
     depths = depths_between(run.workspace, q, range(len(q) - 1))
     passing = [gap for gap, deep in depths.items() if deep > PASSED]  # frames that overlap are followed too
@@ -115,9 +106,7 @@ def kept_beside(run: Run, window: Window, q: Array, gaps: Iterable[int]) -> Arra
 def followed(run: Run, window: Window, middles: Iterable[int]) -> Iterator[Array]:
     """Postures (n, nq) of a window, followed from the freed postures of frames; the nearest to the original first.
 
-    Followed from one frame a limb may stay on the farther side of a thing for the whole window. Iterations keep the
-    side, so which start ends nearest is seen before them. Following ends where another start is nearer already;
-    it is gone on with only if that one leads to nothing.
+    Iterations keep the side on which they begin. Following ends where another start is nearer already.
 
     Args:
         run: of the clip.
@@ -182,12 +171,10 @@ def _kept(run: Run, q: Array, passing: Sequence[int], side: int) -> Array:
 
 
 def _beside(run: Run, q: Array, gap: int, side: int, passed: float, first: int = 0) -> Iterator[_Beside]:
-    """Frames on the one side of what a motion between two frames passes, as far as they were on the other.
+    """Frames after (side 1) or before (-1) a gap, on the side of what the motion in it passes of the frame at its end.
 
-    They follow the original motion from one end of the gap, in contact with what is in the way, until the motion from
-    there to the next one of q is no deeper than `passed`, metres. Each begins at the posture before it: with its
-    deviation on the next original posture it would begin on the other side of a thin thing. For `side` 1 it is frames
-    after the gap, for -1 frames before it.
+    They follow the original motion until the motion to the next one of q is no deeper than `passed`, metres. Each
+    begins at the posture before it: its deviation on the next original posture may be on the other side.
     """
     workspace = run.workspace
     here, frame = (q[gap], gap + 1) if side > 0 else (q[gap + 1], gap)
@@ -206,7 +193,7 @@ def _outwards(run: Run, window: Window, middle: int, most: float) -> _Followed:
     """
     terms, model = run.terms, run.workspace.model
     q = np.array(terms.q[window.first : window.end])
-    q[middle - window.first] = run.freed_posture(middle, terms.q[middle])
+    q[middle - window.first] = run.follower.freed(middle, terms.q[middle])
     far = float((pin.difference(model, terms.q[middle], q[middle - window.first]) ** 2).sum())
     patience, calm, side = run.frames(0.25, 2), 0, 1
     for frame, neighbour in outwards(window, middle):

@@ -8,6 +8,7 @@ tracker, and what is left then, such as dips between frames, by the shared repai
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -25,28 +26,19 @@ class PerFrame:
 
     Attributes:
         clearance: least distance of every pair, metres.
-        backward: whether a backward pass is blended with the forward pass; twice the time, no lag.
 
     Raises:
         InputError: a value out of range.
     """
 
+    name: ClassVar[str] = "frames"
+    dynamics: ClassVar[None] = None
+
     clearance: float = 0.0
-    backward: bool = True
 
     def __post_init__(self) -> None:
         """Check the settings."""
         checks.settle(self, "clearance", checks.number(self.clearance, "PerFrame: clearance", 0.0, 0.5, "m"))
-        checks.settle(self, "backward", checks.flag(self.backward, "PerFrame: backward"))
-
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "frames"
-
-    @property
-    def dynamics(self) -> None:
-        """It looks at no torques."""
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
@@ -63,7 +55,7 @@ class PerFrame:
     def _free(self, run: Run, window: Window, q: Array) -> None:
         """Free the frames of a window of q (n, nq) in place."""
         forward = _passed(run, range(window.first, window.end))
-        if not self.backward or len(window) < 2:
+        if len(window) < 2:
             q[window.first : window.end] = forward
             return
         backward = _passed(run, range(window.end - 1, window.first - 1, -1))[::-1]

@@ -1,33 +1,26 @@
 """Postures that bring points and frames of a figure nearest to given ones: Levenberg-Marquardt within hard limits.
 
-Each step is a quadratic program: least squares of the linearised errors, subject to the joint limits and to the reach
-cones to first order. Limits hold exactly; cones, which are curved, hold to second order of the last step, and a step
-that leaves one further than it was is refused.
+`Fitter.fit` does so for one frame, `smooth` for all frames of a motion with their accelerations. A step of a frame is a
+quadratic program: least squares of the linearised errors, subject to joint limits and to reach cones to first order.
+Limits hold exactly, cones to second order of the last step; a step that leaves a cone further than before is refused.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import daqp
 import numpy as np
 import pinocchio as pin
+from scipy.linalg import LinAlgError, solveh_banded
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 
-STEP = 0.6
-"""Largest change of a joint in one iteration, radians: beyond it the linearisation says little."""
-
-DAMPING = (1e-4, 1e3)
-"""Least damping, and the greatest beyond which the descent ends; squared metres per squared radian."""
-
-CONE_MARGIN = 2e-3
-"""Radians inside of a reach cone that the rows aim at, so that curvature does not lead outside."""
-
-CONE_SLACK = 1e-6
-"""Radians outside of a reach cone that are rounding."""
+STEP = 0.6  # rad: largest change of a joint in one iteration; beyond it the linearisation says little
+CONE_MARGIN, CONE_SLACK = 2e-3, 1e-6  # rad: inside of a cone that rows aim at, as they are curved; outside, of rounding
 
 
 class Goals(NamedTuple):
@@ -177,7 +170,7 @@ class Fitter:
             The posture, and its cost.
         """
         q = self.figure.clamp(q)
-        cost, damping = self.cost(q, goals), DAMPING[0]
+        cost, damping = self.cost(q, goals), 1e-4  # m²/rad², the least
         cones = cones and bool(self._cones)
         inside = self._angles() if cones else np.zeros(0)
         for _ in range(iterations):
@@ -194,10 +187,10 @@ class Fitter:
                 if kept and (tried <= cost or (inside < 0.0).any()):
                     break
                 damping *= 8.0
-                if damping > DAMPING[1]:
+                if damping > 1e3:
                     return q, cost
             done = (cost - tried < 1e-4 * cost or np.abs(step).max() < tolerance) and not (left < -CONE_SLACK).any()
-            q, cost, inside, damping = trial, tried, left, max(DAMPING[0], damping / 8.0)
+            q, cost, inside, damping = trial, tried, left, max(1e-4, damping / 8.0)
             if done:
                 break
         return q, cost
@@ -252,3 +245,128 @@ class Fitter:
         low[len(lower) :] = np.minimum(CONE_MARGIN - inside, 0.5 * STEP)
         x, _, flag, _ = daqp.solve(hessian, gradient, rows, high, low, np.zeros(len(low), dtype=np.int32))
         return np.asarray(x) if flag > 0 else None
+
+
+def smooth(
+    fitter: Fitter, q: Array, goals: Callable[[int], Goals], dt: float, iterations: int, told: Callable[[], None]
+) -> Array:
+    """The postures (n, nq) of least sum of costs and squared accelerations, by descent from q.
+
+    Args:
+        fitter: of the figure.
+        q: (n, nq) where the descent begins, within the limits.
+        goals: of each frame.
+        dt: seconds from frame to frame.
+        iterations: at most.
+        told: called after each iteration.
+    """
+    if len(q) < 3:
+        return q
+    # m²/rad²: where errors are left, their curvature is about the error times a limb's length, which Gauss-Newton omits
+    damping = 3e-3
+    for _ in range(iterations):
+        q, damping = _iteration(fitter, q, goals, dt, damping)
+        told()
+    return q
+
+
+def _iteration(
+    fitter: Fitter, q: Array, goals: Callable[[int], Goals], dt: float, damping: float
+) -> tuple[Array, float]:
+    """Better postures, and the damping for the next iteration."""
+    model, count, size = fitter.model, len(q), fitter.model.nv
+    cones = 3.0  # m/rad: weight of an angle outside of a reach cone
+    # 1e-4 m for each rad/s², and m/s² of the root: 900 rad/s² weigh as much as 90 mm
+    weights = np.full(size, (1e-4 / dt**2) ** 2)
+    gradients, blocks = np.empty((count, size)), np.empty((count, size, size))
+    before = np.empty(count)
+    for k in range(count):
+        gradients[k], blocks[k], before[k] = fitter.quadratic(q[k], goals(k), cones)
+    a = _second_differences(model, q)
+    pulled = weights * a
+    gradients[:-2] += pulled
+    gradients[1:-1] -= 2.0 * pulled
+    gradients[2:] += pulled
+    lower, upper = (np.array(ends) for ends in zip(*(fitter.bounds(posture) for posture in q), strict=True))
+    least = before.sum() + 0.5 * float((weights * a * a).sum())
+    for _ in range(4):
+        step = _bounded(blocks, gradients, weights, lower, upper, damping)
+        trial = np.array([fitter.figure.clamp(pin.integrate(model, *pair)) for pair in zip(q, step, strict=True)])
+        a = _second_differences(model, trial)
+        cost = sum(fitter.cost(trial[k], goals(k), cones) for k in range(count))
+        if cost + 0.5 * float((weights * a * a).sum()) <= least:
+            return trial, damping / 10.0
+        damping *= 10.0
+    return q, damping
+
+
+def _second_differences(model: pin.Model, q: Array) -> Array:
+    """(n - 2, nv) displacement to the next frame plus that to the one before."""
+    found = np.empty((len(q) - 2, model.nv))
+    for k in range(1, len(q) - 1):
+        found[k - 1] = pin.difference(model, q[k], q[k + 1]) + pin.difference(model, q[k], q[k - 1])
+    return found
+
+
+def _bounded(blocks: Array, gradients: Array, weights: Array, lower: Array, upper: Array, damping: float) -> Array:
+    """The step (n, nv) within bounds; those that it would exceed are met, and the rest is solved again."""
+    fixed: Mask = np.zeros(gradients.shape, dtype=bool)
+    at = np.zeros_like(gradients)
+    step = at
+    for _ in range(3):  # in each more joints are kept at their limits
+        step = _in_parts(blocks, gradients, weights, fixed, at, damping)
+        beyond = ((step < lower) | (step > upper)) & ~fixed
+        if not beyond.any():
+            break
+        fixed |= beyond
+        at = np.where(fixed, np.clip(step, lower, upper), at)
+    clipped: Array = np.clip(step, lower, upper)
+    return clipped
+
+
+def _in_parts(blocks: Array, gradients: Array, weights: Array, fixed: Mask, at: Array, damping: float) -> Array:
+    """The step of all frames, from parts that overlap; in the middle of an overlap they are joined smoothly."""
+    count, overlap = len(gradients), 60
+    step, total = np.zeros_like(gradients), np.zeros(count)
+    first = 0
+    while True:
+        last = min(count, first + 600)  # memory grows with it
+        frames = slice(first, last)
+        share = np.ones(last - first)
+        if first:
+            share[:overlap] = np.linspace(0.0, 1.0, overlap)
+        if last < count:
+            share[-overlap:] = np.minimum(share[-overlap:], np.linspace(1.0, 0.0, overlap))
+        part = _solved(blocks[frames], gradients[frames], weights, fixed[frames], at[frames], damping)
+        step[frames] += share[:, None] * part
+        total[frames] += share
+        if last == count:
+            return step / total[:, None]
+        first = last - overlap
+
+
+def _solved(blocks: Array, gradients: Array, weights: Array, fixed: Mask, at: Array, damping: float) -> Array:
+    """Solution of the banded system; what is fixed is held at its value."""
+    count, size = gradients.shape
+    stiff = np.where(fixed, 1e6, 0.0)  # m²/rad²
+    band = np.zeros((2 * size + 1, count * size))  # row d has the entries (i + d, i), as scipy's lower form
+    for offset in range(size):
+        diagonal = np.zeros((count, size))
+        diagonal[:, : size - offset] = np.diagonal(blocks, offset, axis1=1, axis2=2)
+        band[offset] = diagonal.ravel()
+    own, one, two = np.zeros(count), np.zeros(count), np.zeros(count)
+    own[:-2] += 1.0
+    own[1:-1] += 4.0
+    own[2:] += 1.0
+    one[:-2] -= 2.0
+    one[1:-1] -= 2.0
+    two[:-2] = 1.0
+    band[0] += (own[:, None] * weights + stiff + damping).ravel()
+    band[size] += (one[:, None] * weights).ravel()
+    band[2 * size] += (two[:, None] * weights).ravel()
+    right = (stiff * at - gradients).ravel()
+    try:
+        found: Array = solveh_banded(band, right, lower=True, overwrite_ab=True, check_finite=False)
+    except LinAlgError:  # never where weights are finite and the damping is positive
+        return np.zeros_like(gradients)
+    return found.reshape(count, size)

@@ -21,7 +21,6 @@ from wholebody.motion.avoider import Run
 from wholebody.motion.faults import Faults, dip_depth, dips
 from wholebody.motion.measures import MotionBounds, excess
 from wholebody.motion.one_side import SHALLOW, keep_back, one_sided
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
 from wholebody.motion.trajectory.program import Limits
@@ -98,7 +97,7 @@ def _repair(run: Run, window: Window, q: Array) -> bool:
     held = [terms.held(frame) for frame in range(window.first, window.end)]
     evaluator = NodeEvaluator(workspace, chart, held, run.clearance)
     limits = Limits.of(terms, chart, window.first, seams)
-    program = WindowProgram(evaluator, objective, limits, banded_solver(None)[1], SETTINGS.programs)
+    program = WindowProgram(evaluator, objective, limits, SETTINGS.programs)
 
     def looked_at(postures: Array) -> tuple[Faults, dict[int, list[float]]]:
         found = run.faults(postures, window.first)
@@ -149,7 +148,7 @@ def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
         return Smoothed(q, 0)
     found = run.faults(terms.q)
     for time in (None, 0.2, 0.4):  # s: the smoothness of the method "trajectory", and more where its jerk is beyond
-        windows = ClipRun(run, banded_solver(None)[1], terms.q, time)
+        windows = ClipRun(run, terms.q, time)
         changed: Mask = beyond | (q != terms.q).any(axis=1)
         for window in run.windows(changed, 0.5):
             frames = slice(window.first, window.end)

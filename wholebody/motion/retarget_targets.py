@@ -144,9 +144,6 @@ LIMBS = (
 )
 """Bones whose directions are taken from the skeleton, and their lengths from the figure."""
 
-LIMB_ABOVE = {second: first for first, second in LIMBS}
-"""Part of a limb to the part nearer to the trunk."""
-
 
 class Targets(NamedTuple):
     """Goals of all frames.
@@ -301,10 +298,11 @@ def _points(own: _Body, source: _Body, hips: Array, anchored: bool) -> dict[str,
     Limbs of which nothing nearer to the trunk is known begin where the figure's do, if they are `anchored`.
     """
     points, top = _girdles(own, source, hips)
+    above = {second: first for first, second in LIMBS}
     for side in ("left", "right"):
         for first, second in LIMBS:
             a, b = f"{side}_{first}", f"{side}_{second}"
-            if anchored and a not in points and own.has(a, b) and not own.has(f"{side}_{LIMB_ABOVE.get(first)}"):
+            if anchored and a not in points and own.has(a, b) and not own.has(f"{side}_{above.get(first)}"):
                 points[a] = np.tile(own.places[a], (len(hips), 1))
             if a in points and own.has(a, b) and source.has(a, b):
                 points[b] = _directed(own, source, a, b, points[a])

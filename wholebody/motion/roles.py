@@ -19,8 +19,6 @@ ROWS = packaged_table(Path(__file__).parent / "data" / "roles.csv")
 ROLES = tuple(row["role"] for row in ROWS)
 """Parts of a body that skeletons and figures have in common. Each but the pelvis may be absent."""
 
-SIDED = tuple(role.removeprefix("left_") for role in ROLES if role.startswith("left_"))
-
 
 class Roles(NamedTuple):
     """What has which role.
@@ -114,12 +112,13 @@ def _frames(figure: Figure) -> dict[str, str]:
     if set(person.values()) <= known:
         return person
     found: dict[str, str] = {}
+    parts = [role.removeprefix("left_") for role in ROLES if role.startswith("left_")]
     for joint in figure.joints:
         words = joint.lower()
         side = next(
             (side for side in ("left", "right") if re.search(rf"{side}|(?<![a-z]){side[0]}(?![a-z])", words)), ""
         )
-        part = next((part for part in SIDED if part in words), "")
+        part = next((part for part in parts if part in words), "")
         # Of several joints at a hip, a shoulder or an ankle the last one is where they meet; of a wrist the first.
         if side and part and (part in ("hip", "shoulder", "ankle") or f"{side}_{part}" not in found):
             found[f"{side}_{part}"] = joint

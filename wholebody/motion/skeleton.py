@@ -12,9 +12,6 @@ from wholebody.base.checks import instance, listed, settle, text, time_step, who
 from wholebody.base.errors import InputError
 from wholebody.tracking.tracks import LARGEST
 
-FOOT_TO_HEAD = 2.2
-"""Metres along the bones from a foot to the top of the head, by which units of length are recognised."""
-
 UNITS = {
     "metres": 1.0,
     "units of CMU (0.0564 m)": 0.0254 / 0.45,
@@ -24,8 +21,7 @@ UNITS = {
 }
 """Units of length of motion files, metres; CMU's converted files keep the scale 0.45 of its skeletons."""
 
-RIGID = 1e-6
-"""By how much the product of a rotation and its transpose may differ from the identity."""
+RIGID = 1e-6  # by which the product of a rotation and its transpose may differ from the identity
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +189,7 @@ def longest_way(parents: Indices, offsets: Array) -> float:
 def recognised_unit(parents: Indices, offsets: Array) -> str:
     """The unit of `UNITS` in which a skeleton is nearest to the size of a person."""
     size = max(longest_way(parents, offsets), 1e-12)
-    return min(UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / FOOT_TO_HEAD)))
+    return min(UNITS, key=lambda unit: abs(np.log(size * UNITS[unit] / 2.2)))  # m, along the bones from foot to head
 
 
 UP = {

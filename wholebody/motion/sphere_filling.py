@@ -25,8 +25,7 @@ from wholebody.geometry.shapes import Box, Hull, Mesh, Shape, Sphere
 
 Faces = NDArray[np.int64]
 
-UNCOVERED = 3.0
-"""Weight of a volume that stays uncovered against one that protrudes: a limb would get into the former."""
+UNCOVERED = 3.0  # weight of a volume that is uncovered against one that protrudes: a limb would get into the former
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,7 @@ until its last one is up, gets one horizontal shift. Feet that do not overlap ge
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
@@ -21,8 +21,8 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.errors import InputError
 from wholebody.figures.figure import Figure
-from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
+from wholebody.motion.clip import Clip
 from wholebody.motion.windows import Window, long_runs, runs
 from wholebody.tasks import Hold
 
@@ -102,11 +102,7 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
     """
     settings = StanceFeet() if feet is None else feet
     names = settings.names(figure)
-    state = State(figure.model)
-    places = np.empty((len(q), len(names), 3))
-    for frame, posture in enumerate(q):
-        state.update(posture)
-        places[frame] = [state.frame(figure.frame_id(name)).translation for name in names]
+    places = paths(figure, q, names)
     speed = speeds(places, dt)
     shortest = max(1, round(settings.least / dt))
     found = {}
@@ -115,6 +111,44 @@ def standing(figure: Figure, q: Array, dt: float, feet: StanceFeet | None = None
         lowest = np.quantile(height, 0.02)  # what is lower is an error
         stand = (speed[:, number] <= settings.speed) & (height <= lowest + settings.height)
         found[name] = long_runs(stand, shortest)
+    return found
+
+
+def pieces_on(figure: Figure, joint: int) -> list[Any]:
+    """Pieces of a figure that a joint, or one after it, carries."""
+    return [piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]]
+
+
+def usual_feet(figure: Figure, constraints: Iterable[object]) -> tuple[str, ...]:
+    """The segments on which a figure with a free root stands, or else the frames that `StanceFeet` among terms name."""
+    if figure.root != "free":
+        return ()
+    found = tuple(name for name in FEET if name in figure.segments)
+    given = [term for term in constraints if isinstance(term, StanceFeet) and term.feet is not None]
+    return found or tuple(name for term in given for name in term.names(figure))
+
+
+def standing_feet(clip: Clip, feet: Sequence[str]) -> dict[str, Mask]:
+    """In which frames (n,) each foot stands: one of its points does; none of a root that is fixed.
+
+    Raises:
+        InputError: no feet are named.
+    """
+    figure = clip.figure
+    found: dict[str, Mask] = {}
+    if figure.root != "free":
+        return found
+    for name in feet:
+        joint = figure.model.frames[figure.frame_id(name)].parentJoint
+        points = tuple(
+            point
+            for point in foot_points(figure)
+            if joint in figure.model.supports[figure.model.frames[figure.frame_id(point)].parentJoint]
+        )
+        marks = standing(figure, clip.q, clip.dt, StanceFeet(points or (name,)))
+        found[name] = np.any(list(marks.values()), axis=0)
+    if not found:
+        raise InputError(f"torques: {figure.name} has no segments {' or '.join(FEET)}; name its feet with feet=[...]")
     return found
 
 
@@ -140,18 +174,12 @@ def speeds(places: Array, dt: float) -> Array:
     return np.asarray(np.linalg.norm(np.gradient(places, dt, axis=0), axis=-1))
 
 
-APART = 1e-3
-"""Metres that feet are apart after their shift: room for their rows to be met."""
-
-
 class _Foot:
     """One foot: the frames that may stand, its pieces, and its stands."""
 
     def __init__(self, figure: Figure, joint: int, names: set[str], stands: Sequence[Sequence[str]]) -> None:
         self.names = names
-        self.pieces = [
-            piece for piece in figure.geometry.geometryObjects if joint in figure.model.supports[piece.parentJoint]
-        ]
+        self.pieces = pieces_on(figure, joint)
         self.stands: list[Window] = runs(np.array([any(name in names for name in each) for each in stands], dtype=bool))
         self.shifts = [np.zeros(3) for _ in self.stands]
 
@@ -227,12 +255,12 @@ def _push(first: _Foot, second: _Foot, frames: Sequence[dict[str, pin.SE3]], bef
     if not np.linalg.norm(apart) > 0.0:
         return np.zeros(3)
     way = apart / np.linalg.norm(apart)
-    far = 0.0
+    far, apart_by = 0.0, 1e-3  # m: room for the rows of feet that were shifted
     for _ in range(20):
         least = min(_distance(first, second, each, before + far * way) for each in frames)
-        if least >= (APART if far else 0.0):
+        if least >= (apart_by if far else 0.0):
             break
-        far += max(APART - least, 1e-4)
+        far += max(apart_by - least, 1e-4)
     found: Array = far * way
     return found
 

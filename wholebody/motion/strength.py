@@ -15,7 +15,6 @@ from wholebody.figures.anthropometry import Row, table
 from wholebody.figures.figure import Figure
 
 PERCENTILES = (5.0, 50.0, 95.0)
-SEXES = ("male", "female")
 
 
 @dataclass(frozen=True)
@@ -42,7 +41,7 @@ class Strength:
         checks.settle(
             self, "percentile", checks.number(self.percentile, "Strength: percentile", PERCENTILES[0], PERCENTILES[-1])
         )
-        checks.known(self.sex, SEXES, "sex", "Strength")
+        checks.known(self.sex, ("male", "female"), "sex", "Strength")
 
     def limits(self, figure: Figure) -> tuple[Array, Array]:
         """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is published.

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 import pinocchio as pin
@@ -28,9 +28,6 @@ from wholebody.motion.sphere_filling import SphereFilling, fill_with_spheres
 from wholebody.scene.scene import Scene
 
 Side = Literal["front", "back", "left", "right"]
-
-OUTWARD = {"front": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}
-"""Direction from the body to what is worn on a side: x is forward and y left."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +109,11 @@ class Equipment:
         instance(figure, Figure, f"{where}: figure", "load one with wb.load('human')")
         instance(shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         known(to, figure.segments, "segment", f"{where}: to")
-        outward = np.array(OUTWARD[choice(side, tuple(OUTWARD), f"{where}: side")])
+        outward = np.array(
+            {"front": (1.0, 0.0, 0.0), "back": (-1.0, 0.0, 0.0), "left": (0.0, 1.0, 0.0), "right": (0.0, -1.0, 0.0)}[
+                choice(side, get_args(Side), f"{where}: side")
+            ]
+        )
         shift = number(sideways, f"{where}: sideways", -1.0, 1.0, "m")
         middle = np.array([0.0, shift, 0.0]) if side in ("front", "back") else np.array([shift, 0.0, 0.0])
         middle[2] = number(height, f"{where}: height", -1.0, 1.0, "m")
@@ -200,20 +201,16 @@ def _along(geometry: object, at: pin.SE3, direction: Array) -> float:
     return float(at.translation @ direction) + reach
 
 
-CARRIERS = ("lower_thorax", "thorax")
 CLOTH = (0.35, 0.38, 0.28, 1.0)
-
-BALL = 0.075  # m: radius of the sphere at the torso's side, of which half is inside the torso
-SIDE, WAIST, BELT = -0.05, -0.11, -0.15  # m: heights above the origin of the lower thorax
-SECTIONS, ROUND = 16, 12  # convex sections of the torus, and corners of each
 
 
 def side_sphere(figure: Figure) -> tuple[Equipment, ...]:
     """A ball at the left side of the torso, half inside it."""
+    radius = 0.075  # m
     ball = Equipment.worn(
-        Sphere(BALL), figure, name="side_sphere", to="lower_thorax", side="left", height=SIDE, color=CLOTH
+        Sphere(radius), figure, name="side_sphere", to="lower_thorax", side="left", height=-0.05, color=CLOTH
     )
-    at = ball.at.translation - np.array([0.0, BALL, 0.0])  # type: ignore[union-attr]
+    at = ball.at.translation - np.array([0.0, radius, 0.0])  # type: ignore[union-attr]
     return (Equipment(ball.name, ball.shape, ball.to, at, ball.rests_on, CLOTH),)
 
 
@@ -223,7 +220,7 @@ def pouches(figure: Figure) -> tuple[Equipment, ...]:
     shape = Box((width, depth, height))
     return tuple(
         Equipment.worn(
-            shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=BELT, sideways=0.1, color=CLOTH
+            shape, figure, name=f"{side}_pouch", to="lower_thorax", side=side, height=-0.15, sideways=0.1, color=CLOTH
         )
         for side in ("left", "right")
     )
@@ -244,7 +241,7 @@ def pack(figure: Figure) -> tuple[Equipment, ...]:
 def torus(figure: Figure) -> tuple[Equipment, ...]:
     """A horizontal ring at the left side of the waist; a hanging arm can get into its hole."""
     mesh = Mesh(torus_mesh(0.13, 0.03))  # the hole is wide enough for a forearm
-    return (Equipment.worn(mesh, figure, name="torus", to="lower_thorax", side="left", height=WAIST, color=CLOTH),)
+    return (Equipment.worn(mesh, figure, name="torus", to="lower_thorax", side="left", height=-0.11, color=CLOTH),)
 
 
 NOTHING = "nothing"
@@ -272,9 +269,9 @@ def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:
     """
     known(name, READY, "equipment", "equipment")
     instance(figure, Figure, "equipment: figure", "load one with wb.load('human')")
-    if not set(CARRIERS) <= set(figure.segments):
+    if not {"lower_thorax", "thorax"} <= set(figure.segments):
         raise InputError(
-            f"equipment {name!r} fits a person, and {figure.name!r} lacks {', '.join(CARRIERS)}; "
+            f"equipment {name!r} fits a person, and {figure.name!r} lacks lower_thorax, thorax; "
             "put it on with wb.motion.Equipment(name, shape, to=..., at=...)"
         )
     return READY[name](figure)
@@ -337,17 +334,18 @@ def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
         radius: of the circle of centres, metres.
         tube: radius of its cross-section, metres.
     """
-    turn = 2.0 * np.pi * np.arange(ROUND) / ROUND
-    ring = np.stack([radius + tube * np.cos(turn), np.zeros(ROUND), tube * np.sin(turn)], axis=1)
-    sides = [(k, (k + 1) % ROUND) for k in range(ROUND)]
-    section = [[a, b + ROUND, b] for a, b in sides] + [[a, a + ROUND, b + ROUND] for a, b in sides]
-    section += [[0, k, k + 1] for k in range(1, ROUND - 1)]
-    section += [[ROUND, ROUND + k + 1, ROUND + k] for k in range(1, ROUND - 1)]
+    sections, corners = 16, 12  # convex sections, and corners of each
+    turn = 2.0 * np.pi * np.arange(corners) / corners
+    ring = np.stack([radius + tube * np.cos(turn), np.zeros(corners), tube * np.sin(turn)], axis=1)
+    sides = [(k, (k + 1) % corners) for k in range(corners)]
+    section = [[a, b + corners, b] for a, b in sides] + [[a, a + corners, b + corners] for a, b in sides]
+    section += [[0, k, k + 1] for k in range(1, corners - 1)]
+    section += [[corners, corners + k + 1, corners + k] for k in range(1, corners - 1)]
     vertices, faces = [], []
-    for k in range(SECTIONS):
+    for k in range(sections):
         # rad: between two sections, so that they stay separate parts, each convex
-        for angle in (2.0 * np.pi * k / SECTIONS + 1e-4, 2.0 * np.pi * (k + 1) / SECTIONS):
+        for angle in (2.0 * np.pi * k / sections + 1e-4, 2.0 * np.pi * (k + 1) / sections):
             c, s = np.cos(angle), np.sin(angle)
             vertices.append(ring @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]))
-        faces.append(np.array(section, dtype=np.int64) + 2 * ROUND * k)
+        faces.append(np.array(section, dtype=np.int64) + 2 * corners * k)
     return np.vstack(vertices), np.vstack(faces)

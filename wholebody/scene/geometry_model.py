@@ -157,7 +157,7 @@ class SceneGeometry:
                 continue
             moved[name] = (moved[name][0] if name in moved else before, after)
 
-    def pool(self, kind: type[T], make: Callable[[], T]) -> Pool[T]:
+    def pool(self, kind: object, make: Callable[[], T]) -> Pool[T]:
         """The pool of objects of a kind, made by `make`; one run uses one of them at a time."""
         pool: Pool[T] | None = self._pools.get(kind)
         return self._pools.setdefault(kind, Pool(make)) if pool is None else pool

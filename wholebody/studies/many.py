@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import pickle
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, is_dataclass, replace
 from typing import Any, NamedTuple
@@ -12,13 +11,15 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.batches import run_batch
 from wholebody.base.errors import InputError, WholebodyError, one_line
-from wholebody.base.runner import Job, packed
+from wholebody.base.runner import Job, Outcome
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.records import ENDED, REFUSED, Records, SolveRecord
+from wholebody.studies.sending import Kept, Sender, Sent
 from wholebody.studies.store import RecordStore
+from wholebody.tasks.answers import is_own
 from wholebody.version import __version__
 
 MOST_JOBS = 4096
@@ -101,10 +102,11 @@ def solve_many(
     folder: str | os.PathLike[str] | None = None,
     progress: Callable[[SolveProgress], Any] | None = None,
 ) -> Records:
-    """Solve many problems, several at a time, each in a child process.
+    """Solve many problems, several at a time, in child processes that keep the scenes which they have seen.
 
     The answers are the same whatever `jobs` is. A problem that fails, or whose process ends, has a record that says so
-    and ends no other. A problem that is not solved from its own start is tried from the answers of up to four solved
+    and ends no other. One at a time, without a deadline and with the package's own terms alone, problems are solved in
+    this process. A problem that is not solved from its own start is tried from the answers of up to four solved
     ones beside it in the order given, of figures with as many coordinates; `SolveRecord.neighbour` names the one that
     led to its answer.
 
@@ -198,11 +200,13 @@ def _from_neighbours(
     tried: dict[int, dict[int, int]] = {k: {} for k, one in done.items() if one.q is not None and not one.solved}
     while True:
         work = {k: near for k in tried if not done[k].solved and (near := _nearest(k, order, done, tried[k]))}
+        sender, found = Sender(), {}
         jobs = (
-            Job(k, _solve_from, (packed(order[k].make), running.method, done[j].q), running.seconds or 0.0)
+            Job(k, _solve_from, (sender.sent(order[k].make), running.method, done[j].q), running.seconds or 0.0)
             for k, (j, _) in work.items()
         )
-        outcomes, found = run_batch(jobs, running.jobs, running.cluster), {}
+        here = _is_here([order[k] for k in work], running)
+        outcomes = _done_here(jobs) if here else run_batch(jobs, running.jobs, running.cluster)
         try:
             for outcome in outcomes:
                 if outcome.error is None and outcome.answer is not None:
@@ -239,13 +243,16 @@ def _run(
     alone: list[range],
 ) -> bool:  # fmt: skip
     """Do runs; whether the caller ended them. Runs of several cases whose process ended are left in `alone`."""
+    sender = Sender()
+    here = _is_here([order[k] for run in work for k in run], running)
 
     def jobs() -> Iterator[Job]:
         for run in work:
-            makers = packed([order[k].make for k in run])
-            yield Job(run, _solve_run, (makers, running.method), (running.seconds or 0.0) * len(run))
+            makes = [order[k].make for k in run]
+            sent = Kept(makes) if here else sender.sent(makes)
+            yield Job(run, _solve_run, (sent, running.method), (running.seconds or 0.0) * len(run))
 
-    outcomes = run_batch(jobs(), running.jobs, running.cluster)
+    outcomes = _done_here(jobs()) if here else run_batch(jobs(), running.jobs, running.cluster)
     try:
         for outcome in outcomes:
             run = outcome.job.name
@@ -264,10 +271,21 @@ def _run(
     return False
 
 
-def _solve_run(makers: bytes, method: Method) -> list[dict[str, Any]]:
+def _is_here(cases: Sequence[Case], running: Running) -> bool:
+    """Whether cases are solved in this process: one at a time, and nobody else's code can end it or go on for ever."""
+    alone = running.seconds is None and running.cluster is None and running.jobs == 1
+    return alone and all(isinstance(case.make, _Given) and not case.make.is_own for case in cases)
+
+
+def _done_here(jobs: Iterator[Job]) -> Iterator[Outcome]:
+    for job in jobs:
+        yield Outcome(job, (), job.function(*job.arguments), None)
+
+
+def _solve_run(makers: Sent | Kept, method: Method) -> list[dict[str, Any]]:
     """Solve the problems of a run, in a process of its own: what their records say."""
     answers, q = [], None
-    for make in pickle.loads(makers):
+    for make in makers.read():
         record = _solved(make, method, q)
         q = record.q if record.solved else None
         answers.append({name: getattr(record, name) for name in _ANSWERED})
@@ -295,9 +313,9 @@ def _solved(make: Make, method: Method, q: Array | None) -> SolveRecord:
         return replace(empty, outcome=REFUSED, message=one_line(f"{type(error).__name__}: {error}"))
 
 
-def _solve_from(make: bytes, method: Method, q: Array) -> dict[str, Any] | None:
+def _solve_from(make: Sent, method: Method, q: Array) -> dict[str, Any] | None:
     """Solve a problem from another's answer (nq,), in a process of its own: what its record says; None if unsolved."""
-    problem = check_problem(pickle.loads(make)(), "the task's answer")
+    problem = check_problem(make.read()(), "the task's answer")
     record = SolveRecord("").of(_alone(method).solve(problem.with_start(q)))
     return {name: getattr(record, name) for name in _ANSWERED} if record.solved else None
 
@@ -326,6 +344,12 @@ class _Given:
     """Gives a problem that was made before."""
 
     problem: Problem
+
+    @property
+    def is_own(self) -> bool:
+        """Whether it has terms of one's own."""
+        problem = self.problem
+        return any(map(is_own, (*problem.goals, *problem.constraints, *problem.bounds, *problem.measures)))
 
     def __call__(self) -> Problem:
         return self.problem

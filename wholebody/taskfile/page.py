@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Mapping
 
@@ -96,7 +97,8 @@ def _form(chooser: str, name: str, form: Form, known: Mapping[str, Form]) -> str
 
 def _rows(keys: tuple[Key, ...]) -> str:
     names = [f"**`{key.name}`**" if key.required else f"`{key.name}`" for key in keys]
-    return "".join(f"- {name} ({key.kind.words}): {key.says}\n" for name, key in zip(names, keys, strict=True))
+    said = [re.sub(r"(^|; )([^;,]*) if left out$", r"\1default: \2", key.says) for key in keys]
+    return "".join(f"- {name} ({key.kind.words}): {text}\n" for name, key, text in zip(names, keys, said, strict=True))
 
 
 if __name__ == "__main__":

@@ -20,7 +20,6 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.surfaces import Face, Surface, outermost
 
 ROUNDNESS = 0.1  # largest deviation of a ring's pieces from a circle and its plane, as a share of its radius
-LEVEL = 0.1  # sine of the angle to a ring's axis below which a direction names no place of the rim
 
 
 def bar_of(thing: Surface, state: State, where: str) -> Face:
@@ -72,7 +71,8 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
     if not (flat and sizes[1] >= (1.0 - ROUNDNESS) * sizes[0]):  # all around, not an arc
         return None
     level = outwards - (outwards @ n) * n
-    if np.linalg.norm(level) < LEVEL:  # it looks along the ring's axis: the rim's highest place
+    # sine of the angle to a ring's axis below which a direction names no place of the rim
+    if np.linalg.norm(level) < 0.1:  # it looks along the ring's axis: the rim's highest place
         up = np.array((0.0, 0.0, 1.0))
         level = up - (up @ n) * n
     e = level / np.linalg.norm(level)

@@ -20,7 +20,6 @@ from wholebody.tasks.base import Bound, Surroundings, filled
 
 SPEED = Range(1e-9, 1e9, endless=True)  # rad/s, m/s
 Speed: TypeAlias = Annotated[float, SPEED]
-BRAKING = 0.05  # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
 
 
 class Freeze(Bound):
@@ -115,7 +114,8 @@ class StepLimit(Bound):
 
     def braking(self, dt: float | None) -> Array:
         """(nv,) largest share of the way to its limit that each freedom goes in a step of dt seconds."""
-        share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / BRAKING))
+        # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
+        share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / 0.05))
         return np.where(np.isfinite(self._velocity), share, 1.0)
 
 

@@ -27,7 +27,6 @@ from wholebody.tasks.touch import check_apart
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
-CLOSING = 0.1  # m: distance of the farthest of fingertips from which they begin to oppose the thumb
 CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
 APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
@@ -188,6 +187,7 @@ class Grasp(ContactTerm):
                 )
         thumb, *others = (surface(scene, end, where) for end in ends)
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
+        # m: distance of the farthest of fingertips from which they begin to oppose the thumb
         parts.append(
             Opposing(
                 thumb,
@@ -195,7 +195,7 @@ class Grasp(ContactTerm):
                 thing,
                 rounded(thing),
                 float(self.opposed),
-                CLOSED if self.kind == "pinch" else CLOSING,
+                CLOSED if self.kind == "pinch" else 0.1,
             )
         )
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None

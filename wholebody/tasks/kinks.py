@@ -12,10 +12,7 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import across
 from wholebody.tasks.surfaces import ACCURACY, Nearest, Surface, between_pieces, outermost
 
-FACES = 8  # most faces of a piece that are looked at, those first that are nearest or passed
 MOST_FACES = 256  # more than a piece ever has
-SLIDE = 1e-2  # share of the radius, by which pieces are moved along each other to see how their normal turns
-GOES_ON = 0.05  # m: pieces of one thing that are farther away do not continue its surface
 STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
 EDGE = 1e-3  # m: by which pieces are moved along each other to find the normals of edges that cross near a contact
 
@@ -65,7 +62,8 @@ def faces_met(
     points = np.array([_behind(first, i, ours, normal) for normal in normals])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     found = []
-    for key in np.argsort(-values)[:FACES].tolist():
+    # most faces of a piece that are looked at, those first that are nearest or passed
+    for key in np.argsort(-values)[:8].tolist():
         plane = FacePlane(float(values[key]), normals[key], points[key], key)
         if not _goes_on(second, j, plane, first.shapes[i], ours, state):
             found.append(plane)
@@ -103,7 +101,8 @@ def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array
     if round_by == 0.0:
         return np.zeros((0, 3))
     along = across(near.normal)[:2]
-    turned, step = np.empty((2, 2)), SLIDE * round_by
+    # share of the radius, by which pieces are moved along each other to see how their normal turns
+    turned, step = np.empty((2, 2)), 1e-2 * round_by
     for row, way in enumerate(along):
         normals = []
         for sign in (-step, step):
@@ -135,7 +134,8 @@ def _goes_on(thing: Surface, number: int, plane: FacePlane, shape: Any, placed: 
     for other, own in enumerate(thing.shapes):
         if other != number:
             place = thing.placed(other, state)
-            if float(np.linalg.norm(place.translation - plane.point)) < thing.reach[other] + GOES_ON:
+            # m: pieces of one thing that are farther away do not continue its surface
+            if float(np.linalg.norm(place.translation - plane.point)) < thing.reach[other] + 0.05:
                 beyond = (
                     not np.isfinite(thing.reach[other])
                     or float((outermost(own, place, plane.normal, thing.swept[other]) @ plane.normal).max())

@@ -14,9 +14,6 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
-GRAVITY = 9.80665
-"""Standard acceleration of gravity [m/s^2] (CGPM 1901)."""
-
 
 class Masses(NamedTuple):
     """The masses: joint indices, the centre of each mass in its joint, squared weights, rest heights."""
@@ -55,7 +52,8 @@ class PotentialEnergy(Measure):
         state = State(model).update(neutral)
         joints = np.array([k for k in range(1, model.njoints) if model.inertias[k].mass > 0.0], dtype=np.intp)
         centres = tuple(np.array(model.inertias[int(k)].lever) for k in joints)
-        weights = np.array([(model.inertias[int(k)].mass * GRAVITY) ** 2 for k in joints])
+        # standard acceleration of gravity [m/s^2] (CGPM 1901).
+        weights = np.array([(model.inertias[int(k)].mass * 9.80665) ** 2 for k in joints])
         heights = _centres(state, joints, centres)[:, 2]
         return filled(self, masses=Masses(joints, centres, weights, heights, state.support[joints]))
 

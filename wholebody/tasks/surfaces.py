@@ -24,7 +24,6 @@ from wholebody.tasks.base import Surroundings
 
 POINT = 1e-9  # m: radius of the ball that stands for a point
 ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal is noise
-TOP = 2e-3  # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
 
 
 class Surface(NamedTuple):
@@ -274,7 +273,8 @@ def face(scene: Surroundings, name: str, direction: Array, state: State, where: 
         points.append(outermost(shape, found.placed(number, state), direction))
     everything = np.vstack(points)
     height = everything @ direction
-    top = everything[height >= height.max() - TOP]
+    # m: how far below the highest point of a thing its face reaches; more joins faces, less loses corners
+    top = everything[height >= height.max() - 2e-3]
     axes = across(direction)
     flat = top @ axes[:2].T
     low, high = flat.min(axis=0), flat.max(axis=0)

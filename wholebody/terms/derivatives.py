@@ -18,8 +18,6 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 
 STEP = 1e-6  # rad, m: half of the central difference's width
 AGREEMENT = 1e-5  # largest difference, as a share of 1 + the largest entry
-SPREAD = 0.3  # rad, m: standard deviation of the postures around the first
-INSIDE = 0.02  # share of its range that a joint stays away from its limits
 SEED = 0
 
 
@@ -85,7 +83,8 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
     state, rng = State(model), np.random.default_rng(SEED)
     worst: tuple[float, int, int, float, float, Array, float] = (-1.0, 0, 0, 0.0, 0.0, start, 1.0)
     for number in range(5):
-        here = start if number == 0 else _inside(scene, pin.integrate(model, start, SPREAD * rng.normal(size=model.nv)))
+        # rad, m: standard deviation of the postures around the first
+        here = start if number == 0 else _inside(scene, pin.integrate(model, start, 0.3 * rng.normal(size=model.nv)))
         given = _derivative(resolved, state.update(here))
         measured, kink = _differences(resolved, state, here)
         if given.shape != measured.shape:
@@ -112,7 +111,8 @@ def check_derivatives(term: Goal | Constraint | Measure, scene: Scene, q: ArrayL
 def _inside(scene: Scene, q: Array) -> Array:
     """The posture (nq,) with every limited joint inside its limits, where values of terms may have kinks."""
     limits = scene.figure.limits
-    room = INSIDE * np.where(np.isfinite(limits.upper - limits.lower), limits.upper - limits.lower, 0.0)
+    # share of its range that a joint stays away from its limits
+    room = 0.02 * np.where(np.isfinite(limits.upper - limits.lower), limits.upper - limits.lower, 0.0)
     q = q.copy()
     q[limits.idx_q] = np.clip(q[limits.idx_q], limits.lower + room, limits.upper - room)
     return q

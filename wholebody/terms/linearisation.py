@@ -29,8 +29,6 @@ from wholebody.tasks.checks import undefined
 from wholebody.terms.plan import OtherTerm, TermPlan, Terms, checked_rows, make_plan
 from wholebody.terms.planes import TermPlanes, term_planes
 
-MORE = 1e-3  # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
-
 
 class Linearisation(NamedTuple):
     """A problem at one posture, to first order in the tangent displacement dq of shape (nv,).
@@ -309,7 +307,8 @@ class Lineariser:
         if self.dt is None or not limits:
             return None
         most = np.min([bound.bounds(self.state, self.dt)[1] for bound in limits], axis=0)
-        return self.workspace.largest_approach(most) + MORE
+        # m: that pairs may come nearer than their bound; for postures that are put back into their limits first
+        return self.workspace.largest_approach(most) + 1e-3
 
     def _grow(self, contacts: int) -> None:
         """Make room for the rows of so many contacts."""

@@ -6,13 +6,13 @@ import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
+from wholebody.methods.ccd.frames import resolve_overlap
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
 
 
 class CCDStrategy:
-    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.overlap_resolution`)."""
+    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`)."""
 
     sweep_tolerance = 8e-4
 

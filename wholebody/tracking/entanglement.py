@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.proximity import PENETRATION, Contacts
-from wholebody.methods.ccd.overlap_resolution.resolver import chains_of
+from wholebody.methods.ccd.resolver import chains_of
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 

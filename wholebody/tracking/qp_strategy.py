@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
+from wholebody.methods.ccd.resolver import OverlapResolver
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene

@@ -17,7 +17,6 @@ from typing import Any
 from wholebody.base.errors import MissingPackageError, WholebodyError
 from wholebody.base.files import Scratch
 
-_NAMES = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome", "chromium-headless-shell")
 _FLAGS = (
     "--headless",
     "--no-sandbox",  # a container has no sandbox; the only page is our own, and it has no network
@@ -50,7 +49,15 @@ def find_chromium() -> str | None:
     named = os.environ.get("WHOLEBODY_CHROMIUM")
     if named:
         return shutil.which(named)
-    return next((path for name in _NAMES if (path := shutil.which(name))), None)
+    names = (
+        "chromium",
+        "chromium-browser",
+        "google-chrome",
+        "google-chrome-stable",
+        "chrome",
+        "chromium-headless-shell",
+    )
+    return next((path for name in names if (path := shutil.which(name))), None)
 
 
 class Browser:

@@ -8,7 +8,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.view import commands
-from wholebody.view.server import CAMERA, Command
+from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK
 
 NEAR = 0.3
@@ -41,7 +41,7 @@ def look(
         command["direction"] = np.asarray(direction, dtype=float).tolist()
         command["points"] = commands.floats(points)
         command["margin"] = float(margin)
-    return Command(CAMERA, "", "", commands.pack(command))
+    return Command(Op.CAMERA, "", "", commands.pack(command))
 
 
 def camera_on(figure: Array, things: Array, direction: Array | None = None) -> Command:

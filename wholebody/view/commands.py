@@ -9,25 +9,23 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.view.server import ANIMATION, DELETE, OBJECT, PROPERTY, STOP, TRANSFORM, Command
+from wholebody.view.server import Command, Op
 from wholebody.view.surface import Patch
-
-_FLOATS, _INTEGERS = 0x17, 0x16  # msgpack extension types: Float32Array, Uint32Array
 
 
 def floats(values: Any) -> Any:
     """Numbers as the page's Float32Array, in C order."""
-    return _extension(_FLOATS, np.ascontiguousarray(values, dtype="<f4").tobytes())
+    return _extension(0x17, np.ascontiguousarray(values, dtype="<f4").tobytes())
 
 
 def integers(values: Any) -> Any:
     """Numbers as the page's Uint32Array, in C order."""
-    return _extension(_INTEGERS, np.ascontiguousarray(values, dtype="<u4").tobytes())
+    return _extension(0x16, np.ascontiguousarray(values, dtype="<u4").tobytes())
 
 
 def set_object(path: str, three: Mapping[str, Any]) -> Command:
     """Put a three.js object (its JSON form) at a node."""
-    return Command(OBJECT, path, "", pack({"type": "set_object", "path": path, "object": dict(three)}))
+    return Command(Op.OBJECT, path, "", pack({"type": "set_object", "path": path, "object": dict(three)}))
 
 
 def label(path: str, text: str, color: str, size: float) -> Command:
@@ -39,7 +37,9 @@ def label(path: str, text: str, color: str, size: float) -> Command:
         color: of the letters, as in CSS.
         size: height, as a fraction of the distance from the camera.
     """
-    return Command(OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size}))
+    return Command(
+        Op.OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size})
+    )
 
 
 def set_skeleton(
@@ -63,7 +63,7 @@ def set_skeleton(
         "inverses": _numbers(np.swapaxes(inverses, 1, 2), "<f4"),
         "halves": [list(half) for half in halves],
     }
-    return Command(OBJECT, path, "", pack(message))
+    return Command(Op.OBJECT, path, "", pack(message))
 
 
 def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
@@ -91,7 +91,7 @@ def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], u
         "fine": patch.faces.size,
         "color": [float(part) for part in color],
     }
-    return Command(OBJECT, path, "", pack(message))
+    return Command(Op.OBJECT, path, "", pack(message))
 
 
 def _numbers(values: Any, kind: str) -> bytes:
@@ -100,19 +100,19 @@ def _numbers(values: Any, kind: str) -> bytes:
 
 def set_transform(path: str, matrix: Array) -> Command:
     """Place a node: matrix (4, 4) relative to its parent node, scale allowed."""
-    return Command(TRANSFORM, path, "", _transform_head(path) + np.asarray(matrix, dtype="<f4").T.tobytes())
+    return Command(Op.TRANSFORM, path, "", _transform_head(path) + np.asarray(matrix, dtype="<f4").T.tobytes())
 
 
 @lru_cache(maxsize=8192)
 def set_property(path: str, name: str, value: Any) -> Command:
     """Set a property of a node's three.js object; `color` takes red, green, blue, alpha and reaches all below."""
     payload = pack({"type": "set_property", "path": path, "property": name, "value": value})
-    return Command(PROPERTY, path, name, payload)
+    return Command(Op.PROPERTY, path, name, payload)
 
 
 def delete(path: str) -> Command:
     """Remove a node and all below it."""
-    return Command(DELETE, path, "", pack({"type": "delete", "path": path}))
+    return Command(Op.DELETE, path, "", pack({"type": "delete", "path": path}))
 
 
 class Track(NamedTuple):
@@ -159,19 +159,19 @@ def set_animation(tracks: Sequence[Track], times: Array, repetitions: float) -> 
         {"path": path, "clip": {"fps": 1, "name": path, "tracks": lowered}} for path, lowered in clips.items()
     ]
     options = {"play": True, "repetitions": float(repetitions)}
-    return Command(ANIMATION, "", "", pack({"type": "set_animation", "animations": animations, "options": options}))
+    return Command(Op.ANIMATION, "", "", pack({"type": "set_animation", "animations": animations, "options": options}))
 
 
 def stop_animation() -> Command:
     """End the motion; moved nodes return to their state before it."""
     empty = {"type": "set_animation", "animations": [], "options": {"play": False}}
-    return Command(ANIMATION, "", STOP, pack(empty))
+    return Command(Op.ANIMATION, "", Op.STOP, pack(empty))
 
 
 @lru_cache(maxsize=4096)
 def _transform_head(path: str) -> bytes:
     """All of a set_transform message before its 64 bytes of numbers: packing it each time costs ten times as much."""
-    message = pack({"type": "set_transform", "path": path, "matrix": _extension(_FLOATS, bytes(64))})
+    message = pack({"type": "set_transform", "path": path, "matrix": _extension(0x17, bytes(64))})
     return message[:-64]
 
 

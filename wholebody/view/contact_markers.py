@@ -1,22 +1,23 @@
-"""Contacts, penetrations and overlap of whole objects: colours, normals, witness points, and vectors of penetration."""
+"""Contacts, penetrations, overlap of whole objects, and what was in the way of a pose: colours and markers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from wholebody.base import checks
+from wholebody.base.arrays import Array
 from wholebody.dynamics.overlaps import Overlap
+from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedContacts
+from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
 
-_NORMAL = Marker("arrow", LOOK.normal, 0.8)
-_WITNESS = Marker("ball", LOOK.witness, LOOK.witness_radius)
 _DEPTH = Marker("arrow", LOOK.depth, 1.3)
 
 
@@ -37,15 +38,16 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
     as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled with their depth.
     """
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
+    witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
     for row in range(min(len(contacts.distance), 60)):
         root = f"{LOOK.contact_node}/{row}"
         distance, normal = float(contacts.distance[row]), np.asarray(contacts.normal[row])
         start, end = np.asarray(contacts.point_a[row]), np.asarray(contacts.point_b[row])
         for name, point in (("a", start), ("b", end)):
-            keyframe.markers[f"{root}/{name}"] = (_WITNESS, drawing.point_placement(point))
+            keyframe.markers[f"{root}/{name}"] = (witness, drawing.point_placement(point))
         if distance >= -PENETRATION:
             place = drawing.arrow_placement(start, normal, LOOK.normal_length)
-            keyframe.markers[f"{root}/normal"] = (_NORMAL, place)
+            keyframe.markers[f"{root}/normal"] = (touch, place)
             continue
         first, second = (bodies.all[int(index)] for index in contacts.pair[row])
         out, origin = -normal, start
@@ -84,3 +86,48 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
         text = f"{one.first} and {one.second}: {1e3 * float(np.linalg.norm(one.depth)):.1f} mm"
         label = Marker("label", LOOK.depth_label, LOOK.label_size, text)
         keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))
+
+
+def mark_blockers(
+    keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
+) -> None:
+    """Mark each of the strongest blockers by a ball and its name.
+
+    Args:
+        keyframe: the keyframe to which the markers are added.
+        scene: the scene.
+        state: of the figure at the shown posture.
+        contacts: near pairs at that posture.
+        blockers: `Blocker`s of an assessment, the strongest first.
+    """
+    # most blockers that are marked, the strongest; more labels hide each other
+    for number, blocker in enumerate(blockers[:4]):
+        place = _place(scene, state, contacts, blocker)
+        if place is None:
+            continue
+        root = f"{LOOK.blocker_node}/{number}"
+        keyframe.markers[f"{root}/ball"] = (
+            Marker("ball", LOOK.blocker, LOOK.blocker_radius),
+            drawing.point_placement(place),
+        )
+        label = Marker("label", LOOK.blocker_label, LOOK.label_size, f"in the way: {blocker}")
+        above = drawing.point_placement(place + [0.0, 0.0, 2.0 * LOOK.blocker_radius])
+        keyframe.markers[f"{root}/text"] = (label, above)
+
+
+def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
+    """Position of a blocker (3,), or None for one without a position, such as a balance."""
+    if blocker.kind == "contact":
+        owners = scene.piece_owner
+        for row, (a, b) in enumerate(np.asarray(contacts.pair)):
+            if {owners[a], owners[b]} == set(blocker.names):
+                return np.asarray(0.5 * (contacts.point_a[row] + contacts.point_b[row]))
+        return None
+    if blocker.kind == "constraint":
+        frame = blocker.frame
+        if frame is None:
+            return None
+        frame_id = scene.model.getFrameId(frame)
+        joint = scene.model.frames[frame_id].parentJoint
+        return np.array(state.data.oMi[joint].act(scene.model.frames[frame_id].placement.translation))
+    return np.array(state.data.oMi[scene.model.getJointId(blocker.names[0])].translation)

@@ -14,10 +14,7 @@ from wholebody.base.arrays import Array, Indices
 from wholebody.view import drawing
 from wholebody.view.style import Color
 
-MANY = 1000
-"""Number of opaque pieces of things in the world from which those of one form are drawn together."""
-
-_BALL, _BOX = ("ball",), ("box",)
+MANY = 1000  # opaque pieces of things in the world, from which on those of one form are drawn together
 
 
 class Instances(NamedTuple):
@@ -94,11 +91,11 @@ def _form(geometry: Any) -> tuple[Any, tuple[float, float, float]]:
     """What pieces of one form share, and the scale of this one."""
     kind, one = type(geometry).__name__, (1.0, 1.0, 1.0)
     if kind == "Sphere":
-        return _BALL, (geometry.radius,) * 3
+        return ("ball",), (geometry.radius,) * 3
     if kind == "Ellipsoid":
-        return _BALL, tuple(geometry.radii)
+        return ("ball",), tuple(geometry.radii)
     if kind == "Box":
-        return _BOX, tuple(2.0 * side for side in geometry.halfSide)
+        return ("box",), tuple(2.0 * side for side in geometry.halfSide)
     if kind == "Convex":
         return np.asarray(geometry.points()).tobytes(), one
     return (kind, geometry.radius, geometry.halfLength), one

@@ -15,9 +15,7 @@ from wholebody.view.commands import floats, integers
 from wholebody.view.style import LOOK, Color
 
 Three = dict[str, Any]
-_FRONT, _BOTH = 0, 2
 _AROUND, _ALONG = 32, 8
-_TRIANGLES = 1_500_000  # of balls that are drawn together
 
 
 def piece(geometry: Any, name: str, color: Color) -> Three:
@@ -55,7 +53,8 @@ def instances(form: Any, name: str, places: Array, colors: Array) -> Three:
     """
     shape, _, _, flat = _shape(form, name)
     if shape["type"] == "SphereGeometry":
-        around = int(np.clip((_TRIANGLES / len(places) / 1.5) ** 0.5, 8, _AROUND))
+        triangles = 1_500_000  # of all balls that are drawn together
+        around = int(np.clip((triangles / len(places) / 1.5) ** 0.5, 8, _AROUND))
         shape = {**shape, "widthSegments": around, "heightSegments": 3 * around // 4}
     made = _mesh(name, shape, _material((1.0, 1.0, 1.0, 1.0), flat=flat))
     made["object"].update(
@@ -77,7 +76,7 @@ def mesh(vertices: Array, faces: NDArray[Any], name: str, color: Color) -> Three
         name: an identifier that nothing else in the page has.
         color: red, green, blue, alpha.
     """
-    material = {**_material(color, flat=True), "side": _BOTH}
+    material = {**_material(color, flat=True), "side": 2}  # three.js: both
     return _mesh(name, _triangles(vertices, faces, None), material, shadow=color[3] == 1.0)
 
 
@@ -265,7 +264,7 @@ def _material(color: Color, *, flat: bool) -> Three:
         "flatShading": flat,
         "shininess": 18,
         "specular": 0x1E1E1E,
-        "side": _FRONT,
+        "side": 0,  # three.js: the front
     }
 
 
@@ -275,7 +274,7 @@ def _overlay(color: Color) -> Three:
         "color": _number(color),
         "depthTest": False,
         "transparent": True,  # three.js draws transparent things last: on top
-        "side": _FRONT,
+        "side": 0,  # three.js: the front
     }
 
 

@@ -13,9 +13,6 @@ from wholebody.motion.files.gltf import add_piece, joint_tree, triangles
 from wholebody.view.bodies import Bodies
 from wholebody.view.viewed_scene import ViewedScene
 
-GROUND = 6.0  # m: of the piece of a half-space that is drawn
-THIN = 1e-3  # m: its thickness
-
 
 def posture_glb(scene: ViewedScene, q: Array) -> bytes:
     """The figure's pieces and all things at a posture (nq,): y up, z forward, metres.
@@ -40,7 +37,8 @@ def drawn_triangles(shape: Any) -> Any:
     if not isinstance(shape, coal.Halfspace):
         return triangles(shape)
     normal = np.array(shape.n)
-    mesh = creation.box((GROUND, GROUND, THIN))
+    wide, thin = 6.0, 1e-3  # m: of the piece of a half-space that is drawn
+    mesh = creation.box((wide, wide, thin))
     mesh.apply_transform(geometry.align_vectors((0.0, 0.0, 1.0), normal))
-    mesh.apply_translation(normal * (float(shape.d) - 0.5 * THIN))
+    mesh.apply_translation(normal * (float(shape.d) - 0.5 * thin))
     return mesh

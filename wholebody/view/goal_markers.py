@@ -18,8 +18,6 @@ from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
 from wholebody.view.viewed_scene import ViewedScene
 
-_TARGET = Marker("ball", LOOK.target, LOOK.target_radius)
-_TO_TARGET = Marker("rod", LOOK.target)
 FARTHEST_LOOK = 1.0
 """Metres: what an axis is turned to is not drawn, and not kept in the picture, if it is farther from the frame."""
 
@@ -50,10 +48,11 @@ class Goals:
             if not _far(goal, here) and (
                 np.linalg.norm(target.translation - here.translation) > 1e-9 or not (directed or hasattr(goal, "axis"))
             ):
-                keyframe.markers[f"{root}/target"] = (_TARGET, drawing.point_placement(target.translation))
+                ball = Marker("ball", LOOK.target, LOOK.target_radius)
+                keyframe.markers[f"{root}/target"] = (ball, drawing.point_placement(target.translation))
             line = drawing.rod_placement(here.translation, target.translation, LOOK.line_radius)
             if line is not None:
-                keyframe.markers[f"{root}/line"] = (_TO_TARGET, line)
+                keyframe.markers[f"{root}/line"] = (Marker("rod", LOOK.target), line)
             if directed:
                 mark_axes(keyframe, f"{root}/axes", target, LOOK.axes_length)
                 mark_axes(keyframe, f"{root}/frame", here, LOOK.axes_length / 2)

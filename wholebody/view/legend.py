@@ -10,19 +10,8 @@ from wholebody.assessment.posture import Assessment
 from wholebody.geometry.proximity import PENETRATION
 from wholebody.view.commands import pack
 from wholebody.view.scene_graph import Keyframe
-from wholebody.view.server import OBJECT, Command
+from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK
-
-_MARKED = (
-    ("/normal", LOOK.contact_node, LOOK.normal, "normal of a contact"),
-    ("/depth", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
-    ("/first", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
-    ("/second", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
-    ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
-    ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
-    ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),
-)
-"""End of a marker's node, its folder, its colour and its meaning."""
 
 
 def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
@@ -33,7 +22,16 @@ def legend(keyframes: Sequence[Keyframe]) -> list[tuple[str, Any]]:
     if any(keyframe.overlapping for keyframe in keyframes):
         found["overlaps"] = LOOK.penetration[:3]
     paths = {path for keyframe in keyframes for path in keyframe.markers}
-    for end, folder, shade, meaning in _MARKED:
+    marked = (  # end of a marker's node, its folder, its colour and its meaning
+        ("/normal", LOOK.contact_node, LOOK.normal, "normal of a contact"),
+        ("/depth", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+        ("/first", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+        ("/second", LOOK.contact_node, LOOK.depth, "way out of an overlap"),
+        ("/target", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+        ("/wanted", LOOK.goal_node, LOOK.target, "goal, and the way to it"),
+        ("/ball", LOOK.blocker_node, LOOK.blocker, "in the way"),
+    )
+    for end, folder, shade, meaning in marked:
         if any(path.startswith(folder) and path.endswith(end) for path in paths):
             found[meaning] = shade
     return list(found.items())
@@ -66,4 +64,4 @@ def panel(title: str, keyframes: Sequence[Keyframe], count: int, dt: float, foun
     """The command that puts the panel on the page; the arguments are those of `status`, and the page's title."""
     rows = [[meaning, *(round(255 * float(part)) for part in color)] for meaning, color in legend(keyframes)]
     message = {"type": "panel", "title": title, "status": status(keyframes, count, dt, found), "legend": rows}
-    return Command(OBJECT, "/panel", "", pack(message))  # node under which the page keeps it; nothing is drawn there
+    return Command(Op.OBJECT, "/panel", "", pack(message))  # node under which the page keeps it; nothing is drawn there

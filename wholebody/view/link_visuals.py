@@ -23,9 +23,6 @@ from wholebody.view.skin import Skinned
 from wholebody.view.style import Color
 from wholebody.view.surface.nets import clustered
 
-FORMAT = "2"
-"""Part of the key of kept meshes: another one whenever what is kept changes."""
-
 MANY = 4000
 """Triangles of one mesh from which what is finer than `FINE` is left out: robots' meshes have up to a million."""
 
@@ -130,7 +127,8 @@ def mesh_parts(path: str, scale: tuple[float, ...]) -> MeshParts:
         content = place.read_bytes()
     except OSError:
         return make()
-    key = hashlib.sha256(f"visual {FORMAT} {MANY} {FINE} {scale!r} {place.suffix}".encode() + content).hexdigest()
+    # The 2 is another one whenever what is kept changes.
+    key = hashlib.sha256(f"visual 2 {MANY} {FINE} {scale!r} {place.suffix}".encode() + content).hexdigest()
     return cached_entry(key, make, _packed, _unpacked)
 
 

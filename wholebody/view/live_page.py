@@ -19,7 +19,6 @@ from wholebody.tracking.live import LiveDrag, LiveFrame
 from wholebody.view.gltf import drawn_triangles
 from wholebody.view.viser_server import viser_server
 
-SKIN, FREE, HELD, GRIP = (214, 180, 150), (70, 130, 220), (225, 90, 40), (90, 170, 90)
 STILL = 1e-5  # m, rad: what moves less is not sent
 
 
@@ -92,7 +91,7 @@ class LivePage:
         pieces = []
         for number, piece in enumerate(scene.geometry.geometryObjects):
             thing = scene.objects.get(scene.piece_owner[number])
-            color = SKIN if thing is None else _bytes(thing.color, number)
+            color = (214, 180, 150) if thing is None else _bytes(thing.color, number)
             # opacity of the figure, so that the handles in it are seen
             opacity = 0.7 if thing is None else None if thing.color is None else thing.color[3]
             mesh = drawn_triangles(piece.geometry)
@@ -106,7 +105,7 @@ class LivePage:
         return pieces
 
     def _handle(self, name: str) -> Any:
-        color = GRIP if name in self.drag.things else HELD if name in self.drag.held else FREE
+        color = (90, 170, 90) if name in self.drag.things else _handle_color(name in self.drag.held)
         # m: radius of a handle
         ball = self.server.scene.add_icosphere(
             f"/handles/{name}", 0.04, color=color, position=self.drag.place(name), cast_shadow=False
@@ -141,7 +140,7 @@ class LivePage:
         """Hold or release a frame."""
         with self._lock:
             held = self.drag.toggle(name)
-            self._handles[name].color = HELD if held else FREE
+            self._handles[name].color = _handle_color(held)
             self._boxes[name].value = held
 
     def _panel(self) -> None:
@@ -238,6 +237,11 @@ class LivePage:
                 if known is None or not place.isApprox(known, STILL):
                     handle, self._sent[number] = self._pieces[number], place
                     handle.position, handle.wxyz = place.translation, _wxyz(place)
+
+
+def _handle_color(held: bool) -> tuple[int, int, int]:
+    """Red, green, blue of the handle of a frame."""
+    return (225, 90, 40) if held else (70, 130, 220)
 
 
 def _wxyz(place: pin.SE3) -> Any:

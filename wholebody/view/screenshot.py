@@ -11,10 +11,8 @@ from wholebody.base.errors import InputError
 from wholebody.view import commands
 from wholebody.view.browser import Browser
 from wholebody.view.page import picture_page
-from wholebody.view.server import ANIMATION, CAMERA, OBJECT, Command, Store, bundle
+from wholebody.view.server import Command, Op, Store, bundle
 from wholebody.view.style import LOOK
-
-LARGEST = 8192  # pixels: limit of software renderers
 
 
 def check_size(size: Any) -> tuple[int, int]:
@@ -26,7 +24,8 @@ def check_size(size: Any) -> tuple[int, int]:
     given = listed(size, "size", "(960, 720), pixels")
     if len(given) != 2:
         raise InputError(f"size is {shown(size)}; give width and height, pixels")
-    return whole(given[0], "the width of size", 16, LARGEST), whole(given[1], "the height of size", 16, LARGEST)
+    most = 8192  # pixels: limit of software renderers
+    return whole(given[0], "the width of size", 16, most), whole(given[1], "the height of size", 16, most)
 
 
 def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
@@ -51,12 +50,12 @@ def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
         ):
             return None
     found = [commands.stop_animation()] if before.animation not in (None, after.animation) else []
-    remade = {command.path for command in wanted if command.op == OBJECT and not before.has(command)}
+    remade = {command.path for command in wanted if command.op == Op.OBJECT and not before.has(command)}
     for command in wanted:
-        if command.op == ANIMATION:
+        if command.op == Op.ANIMATION:
             if command.payload != before.animation:
                 found.append(command)
-        elif command.op == CAMERA or command.path in remade or not before.has(command):
+        elif command.op == Op.CAMERA or command.path in remade or not before.has(command):
             found.append(command)
     return found
 

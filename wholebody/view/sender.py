@@ -18,10 +18,7 @@ from typing import Any
 from wholebody.base import checks
 from wholebody.base.errors import InputError, MissingPackageError, WholebodyError
 from wholebody.view import server
-from wholebody.view.server import PAGE, PUSH, SYNC, Command
-
-_START = "import runpy, sys; runpy.run_path(sys.argv.pop(1), run_name='__main__')"
-_STARTING = 20.0  # s
+from wholebody.view.server import Command, Op
 
 
 def seconds(timeout: object) -> float:
@@ -66,8 +63,9 @@ class Sender:
         self._partial = b""
         self._syncs = 0
         self.tabs = 0
+        start, starting = "import runpy, sys; runpy.run_path(sys.argv.pop(1), run_name='__main__')", 20.0  # s
         self._process = subprocess.Popen(
-            [sys.executable, "-c", _START, server.__file__, str(os.getpid()), host, str(port)],
+            [sys.executable, "-c", start, server.__file__, str(os.getpid()), host, str(port)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -76,7 +74,7 @@ class Sender:
         )
         atexit.register(self.close)
         try:
-            answer = self._read(("url", "refused"), _STARTING)
+            answer = self._read(("url", "refused"), starting)
             if answer is not None and "refused" in answer:
                 raise InputError(
                     f"the page cannot be served at {host}, port {port or 'any'} ({answer['refused']}); give another"
@@ -84,8 +82,8 @@ class Sender:
             if answer is None:
                 raise ViewerClosedError("the viewer's server did not start; run `wholebody doctor`")
             self.url = str(answer["url"])
-            self._write(Command(PAGE, payload=page.encode()).pack())
-            self._read(("ready",), _STARTING)
+            self._write(Command(Op.PAGE, payload=page.encode()).pack())
+            self._read(("ready",), starting)
         except BaseException:
             self.close()
             raise
@@ -96,7 +94,7 @@ class Sender:
         Raises:
             ViewerClosedError: the server process has ended.
         """
-        self._write(b"".join(command.pack() for command in commands) + Command(PUSH).pack())
+        self._write(b"".join(command.pack() for command in commands) + Command(Op.PUSH).pack())
 
     def wait(self, timeout: float) -> bool:
         """Wait until a tab shows the page; False if none did within `timeout` seconds."""
@@ -114,7 +112,7 @@ class Sender:
         """Wait until every open tab has carried out all commands; False if not within `timeout` seconds."""
         self._syncs += 1
         number = self._syncs
-        self._write(Command(PUSH).pack() + Command(SYNC, key=str(number)).pack())
+        self._write(Command(Op.PUSH).pack() + Command(Op.SYNC, key=str(number)).pack())
         return self._read(("sync",), timeout, number) is not None
 
     def close(self) -> None:

@@ -20,14 +20,16 @@ import sys
 from os import _exit
 from typing import Any, NamedTuple
 
-OBJECT, TRANSFORM, PROPERTY, DELETE = b"o", b"t", b"p", b"d"
-CAMERA, ANIMATION = b"c", b"a"
-PUSH, SYNC, PAGE = b"e", b"s", b"h"
-STOP = "stop"
 HEADER = struct.Struct("<cHHI")
 LOCAL = ("127.0.0.1", "localhost", "::1")
-FIRST_PORT, PORTS = 7000, 100
-_HOST = re.compile(r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^\[\]:/@\s]+))(:\d+)?")
+
+
+class Op:
+    """Kinds of commands: to the page, and PUSH, SYNC and PAGE to the server; STOP is a key of an ANIMATION."""
+
+    OBJECT, TRANSFORM, PROPERTY, DELETE, CAMERA, ANIMATION = b"o", b"t", b"p", b"d", b"c", b"a"
+    PUSH, SYNC, PAGE = b"e", b"s", b"h"
+    STOP = "stop"
 
 
 class Command(NamedTuple):
@@ -68,22 +70,22 @@ class Store:
     def apply(self, command: Command) -> None:
         """Apply a command to the picture."""
         op, path, key, payload = command
-        if op == TRANSFORM:
+        if op == Op.TRANSFORM:
             self._node(path).transform = payload
-        elif op == PROPERTY:
+        elif op == Op.PROPERTY:
             self._node(path).properties[key] = payload
-        elif op == OBJECT:
+        elif op == Op.OBJECT:
             node = self._node(path)
             node.object = payload
             node.properties.clear()
             self.nodes.pop(f"{path}/<object>", None)
-        elif op == DELETE:
+        elif op == Op.DELETE:
             for name in [name for name in self.nodes if name == path or name.startswith(path + "/")]:
                 del self.nodes[name]
-        elif op == CAMERA:
+        elif op == Op.CAMERA:
             self.camera = payload
-        elif op == ANIMATION:
-            self.animation = None if key == STOP else payload
+        elif op == Op.ANIMATION:
+            self.animation = None if key == Op.STOP else payload
 
     def _node(self, path: str) -> _Node:
         node = self.nodes.get(path)
@@ -96,11 +98,11 @@ class Store:
         node = self.nodes.get(command.path)
         if node is None:
             return False
-        if command.op == TRANSFORM:
+        if command.op == Op.TRANSFORM:
             return node.transform == command.payload
-        if command.op == PROPERTY:
+        if command.op == Op.PROPERTY:
             return node.properties.get(command.key) == command.payload
-        return command.op == OBJECT and node.object == command.payload
+        return command.op == Op.OBJECT and node.object == command.payload
 
     def commands(self, *, motion: bool = True) -> list[Command]:
         """Commands that build the picture in an empty page; the animation last, when all its nodes exist.
@@ -111,14 +113,14 @@ class Store:
         commands: list[Command] = []
         for path, node in self.nodes.items():
             if node.object is not None:
-                commands.append(Command(OBJECT, path, "", node.object))
-            commands.extend(Command(PROPERTY, path, key, payload) for key, payload in node.properties.items())
+                commands.append(Command(Op.OBJECT, path, "", node.object))
+            commands.extend(Command(Op.PROPERTY, path, key, payload) for key, payload in node.properties.items())
             if node.transform is not None:
-                commands.append(Command(TRANSFORM, path, "", node.transform))
+                commands.append(Command(Op.TRANSFORM, path, "", node.transform))
         if self.camera is not None:
-            commands.append(Command(CAMERA, "", "", self.camera))
+            commands.append(Command(Op.CAMERA, "", "", self.camera))
         if motion and self.animation is not None:
-            commands.append(Command(ANIMATION, "", "", self.animation))
+            commands.append(Command(Op.ANIMATION, "", "", self.animation))
         return commands
 
 
@@ -138,7 +140,7 @@ class Queue:
     def put(self, command: Command) -> None:
         """Add a command."""
         slot = (command.op, command.path, command.key)
-        if command.op in (TRANSFORM, PROPERTY):
+        if command.op in (Op.TRANSFORM, Op.PROPERTY):
             if slot in self._place:
                 self.waiting[self._place[slot]] = command.payload
                 return
@@ -183,13 +185,13 @@ class Hub:
 
     def take(self, command: Command) -> None:
         """Carry out one command."""
-        if command.op == PAGE:
+        if command.op == Op.PAGE:
             self.page = command.payload.decode()
             tell(ready=True)
-        elif command.op == SYNC:
+        elif command.op == Op.SYNC:
             self.syncs.append(int(command.key))
             self.settle()
-        elif command.op == PUSH:
+        elif command.op == Op.PUSH:
             for tab in self.tabs:
                 tab.send_waiting()
         else:
@@ -198,7 +200,7 @@ class Hub:
                 tab.queue.put(command)
 
     def settle(self) -> None:
-        """Answer the pending SYNC commands if every tab has drawn everything."""
+        """Answer the pending Op.SYNC commands if every tab has drawn everything."""
         if self.syncs and all(tab.idle for tab in self.tabs):
             for number in self.syncs:
                 tell(sync=number, tabs=len(self.tabs))
@@ -221,7 +223,8 @@ class Guard:
 
     def accepts(self, host: str | None, origin: str | None) -> bool:
         """Whether to answer a request with these headers `Host` and `Origin`; None where it has none, or several."""
-        read = _HOST.fullmatch(host.lower()) if host is not None else None
+        named = r"(\[(?P<address>[0-9a-f:.]+)\]|(?P<name>[^\[\]:/@\s]+))(:\d+)?"
+        read = re.fullmatch(named, host.lower()) if host is not None else None
         if read is None:
             return False
         name = read["address"] or read["name"]
@@ -300,7 +303,7 @@ async def serve(parent: int, host: str, port: int) -> None:
 
     logging.getLogger("tornado").setLevel(logging.CRITICAL)
     hub = Hub()
-    candidates = [port] if port else [*range(FIRST_PORT, FIRST_PORT + PORTS), 0]
+    candidates = [port] if port else [*range(7000, 7100), 0]
     for candidate in candidates:
         try:
             sockets = bind_sockets(candidate, host)

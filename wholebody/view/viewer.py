@@ -34,11 +34,10 @@ from wholebody.view.page import live_page, static_page
 from wholebody.view.scene_graph import SceneGraph
 from wholebody.view.screenshot import Screenshots
 from wholebody.view.sender import Sender, seconds
-from wholebody.view.server import ANIMATION, CAMERA, Command
+from wholebody.view.server import Command, Op
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene, checked_scene
 
-DEFAULT_DT = 1 / 30  # s: postures without a time step
 SAVED = (".glb", ".htm", ".html", ".png")  # endings of the files that `Viewer.save` writes
 
 
@@ -130,7 +129,7 @@ class Viewer:
         self._seen, self._motion, self._shown = [posture], None, (posture, problem, marked)
         if self._graph.store.camera is None:
             self._graph.do(self._camera_command())
-        self._graph.do(panel(self.title, [keyframe], 1, DEFAULT_DT, found))
+        self._graph.do(panel(self.title, [keyframe], 1, 1 / 30, found))
         self._graph.show(keyframe)
 
     def play(
@@ -156,7 +155,7 @@ class Viewer:
         postures = [self._composition.checked(q) for q in given]
         if not postures:
             raise InputError("a motion has at least one posture; give a list of postures, each of shape (nq,)")
-        step = checks.time_step(getattr(motion, "dt", DEFAULT_DT) if dt is None else dt, "dt")
+        step = checks.time_step(getattr(motion, "dt", 1 / 30) if dt is None else dt, "dt")
         if not (isinstance(repeat, float) and math.isinf(repeat) and repeat > 0.0):
             repeat = checks.number(repeat, "repeat", 1e-3, 1e9, "times, or math.inf")
         marked = [()] * len(postures) if overlaps is None else checks.listed(overlaps, "overlaps", "[frame.overlaps]")
@@ -335,7 +334,7 @@ class Viewer:
         """
         legend = checks.flag(legend, "legend")
         place = checked_target(path, "picture: path", "a picture", (".png",))
-        wanted = [command for command in self._commands() if command.op != ANIMATION]
+        wanted = [command for command in self._commands() if command.op != Op.ANIMATION]
         return write(place, self._screenshots.picture(wanted, size, legend=legend))
 
     def movie(
@@ -397,4 +396,5 @@ class Viewer:
         """Commands that draw the whole picture, with the camera on the present figure."""
         if not self._seen:
             raise InputError("nothing is shown yet; call show(q) or play(motion) first")
-        return [self._camera_command() if command.op == CAMERA else command for command in self._graph.store.commands()]
+        camera, kept = self._camera_command(), self._graph.store.commands()
+        return [camera if command.op == Op.CAMERA else command for command in kept]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -54,8 +54,7 @@ class Recorder(QPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Keep a copy of a program, and solve it."""
-        copies = {field.name: np.array(getattr(program, field.name)) for field in fields(program)}
-        self.programs.append(replace(program, **copies))
+        self.programs.append(QuadraticProgram(*map(np.array, program)))
         return self._solver.solve_cold(program)
 
 

@@ -11,7 +11,7 @@ import pytest
 
 from wholebody.base.errors import FileFormatError, InputError, UnknownNameError
 from wholebody.bench.attack.case import Case, Verdict
-from wholebody.bench.attack.report import Row
+from wholebody.bench.rows import Row
 from wholebody.bench.tables import read_rows
 from wholebody.cli.bench import run as group
 
@@ -30,12 +30,12 @@ def test_counts_failures_and_page_are_written(tmp_path: Path) -> None:
     words = ("--cases", "12", "--kinds", "file", "argument", "--seed", "2", "--seconds", "900", "--out", str(out))
     code = bench(*words, "--update-docs", str(docs))
     _, rows = read_rows(out / "attack.csv", Row)
-    wrong = [row for row in rows if row.outcome == "wrong"]
+    wrong = [row for row in rows if row["outcome"] == "wrong"]
     assert len(rows) == 12
-    assert {row.kind for row in rows} == {"file", "argument"}
+    assert {row.tool for row in rows} == {"file", "argument"}
     assert code == int(bool(wrong))
     for row in wrong:
-        assert (out / f"{row.kind}-2-{row.number:06d}" / "repeat.py").is_file()
+        assert (out / row.case / "repeat.py").is_file()
     page = (docs / "reliability.md").read_text()
     assert "\nold\n" not in page
     assert "calls with odd arguments" in page
@@ -47,10 +47,10 @@ def test_other_runs_are_counted_too(tmp_path: Path) -> None:
     bench(*words, "--seed", "3", "--out", str(tmp_path / "a"))
     bench(*words, "--seed", "1", "--out", str(tmp_path / "b"), "--also", str(tmp_path / "a" / "attack.csv"))
     _, rows = read_rows(tmp_path / "b" / "attack.csv", Row)
-    assert [row.seed for row in rows] == [1, 1, 3, 3]
+    assert [row["seed"] for row in rows] == [1, 1, 3, 3]
     assert "Seed 1, 3." in (tmp_path / "b" / "attack.md").read_text()
     (tmp_path / "none.csv").write_text("a,b\n1,2\n")
-    with pytest.raises(FileFormatError, match=r"none.csv: the columns are a, b, not kind, "):
+    with pytest.raises(FileFormatError, match=r"none.csv: the columns are a, b, not case, tool"):
         bench(*words, "--also", str(tmp_path / "none.csv"))
 
 
@@ -63,7 +63,7 @@ def test_ctrl_c_leaves_what_ended_before_it(tmp_path: Path, monkeypatch: pytest.
     monkeypatch.setattr("wholebody.bench.attack.running.attack", two)
     assert bench("--out", str(tmp_path)) == 130
     _, rows = read_rows(tmp_path / "attack.csv", Row)
-    assert [row.number for row in rows] == [0, 1]
+    assert [row["number"] for row in rows] == [0, 1]
 
 
 def test_what_cannot_be_asked_is_refused() -> None:

@@ -20,7 +20,7 @@ from wholebody.base.runner import Child
 from wholebody.bench.attack import running
 from wholebody.bench.attack.case import KINDS, PATTERN, Case, Verdict, kind_of
 from wholebody.bench.attack.inputs import mutated
-from wholebody.bench.attack.report import Row, keep, report
+from wholebody.bench.attack.report import keep, report, row
 from wholebody.bench.attack.running import attack
 
 FACTS = {"wholebody": "0"}
@@ -113,9 +113,9 @@ def test_a_failure_is_repeated_by_its_script(tmp_path: Path) -> None:
 
 
 def test_counts_times_and_intervals_are_reported() -> None:
-    rows = [Row("solve", 0, k, "right", "solved", 0.01 * (k + 1), "") for k in range(100)]
-    rows += [Row("solve", 0, 100, "wrong", "solved", 6.0, "a false claim")]
-    rows += [Row("file", 0, k, "refused", "", 0.0, "") for k in range(10)]
+    rows = [row(Case(0, k, "solve"), Verdict("right", "", 0.01 * (k + 1), "solved")) for k in range(100)]
+    rows += [row(Case(0, 100, "solve"), Verdict("wrong", "a false claim", 6.0, "solved"))]
+    rows += [row(Case(0, k, "file"), Verdict("refused", "", 0.0, "")) for k in range(10)]
     text = report(rows, FACTS)
     assert "| 101 | 100 | 0 | 0 | 1 |" in text
     assert "| solves that end | solved | 101 | 510 | 960 | 6000 |" in text
@@ -123,7 +123,7 @@ def test_counts_times_and_intervals_are_reported() -> None:
 
 
 def test_what_was_never_wrong_may_be_so_in_the_next_case() -> None:
-    rows = [Row("file", 0, k, "right", "", 0.0, "") for k in range(200)]
+    rows = [row(Case(0, k, "file"), Verdict("right", "", 0.0, "")) for k in range(200)]
     text = report(rows, FACTS)
     assert "| file | 200 | 200 | 0 | 0 | 0 | 1.88 |" in text  # Wilson's interval for 200 of 200, as published
 

@@ -102,12 +102,12 @@ def test_the_report_has_every_method_and_every_case(tmp_path: Path) -> None:
     rows = [
         Row("walk, pack", "bisection", base),
         Row("walk, pack", "trajectory", base | {"deviation rad": 0.06, "jerk": 1.1, "s a second": 1.5}),
-        Row("walk, pack", "fade", base | {"outcome": "left", "after": 3, "deepest mm": 2.0}),
+        Row("walk, pack", "frames", base | {"outcome": "left", "after": 3, "deepest mm": 2.0}),
         Row("walk, pack", CHECKED, base | {"outcome": "left"}),
     ]
-    one, fade = (next(row for row in motion.summary(rows) if row.tool == name) for name in ("trajectory", "fade"))
+    one, other = (next(row for row in motion.summary(rows) if row.tool == name) for name in ("trajectory", "frames"))
     assert (one["free"], one["deviation rad, median"], one["s a second of motion, median"]) == ("1 of 1", 0.06, 1.5)
-    assert (fade["free"], fade["deepest, most mm"]) == ("0 of 1", 2.0)
+    assert (other["free"], other["deepest, most mm"]) == ("0 of 1", 2.0)
     text = motion.motion_report(rows, {"wholebody": "0"})
     assert "| all clips | trajectory | 1 of 1 |" in text
     assert "nan" not in text

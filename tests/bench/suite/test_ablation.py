@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 
-import numpy as np
 import pytest
 
 import wholebody as wb
@@ -12,9 +11,9 @@ from wholebody.bench.rows import Row
 from wholebody.bench.suite import ablation
 from wholebody.bench.suite.ablation import Constant, report
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.cli.bench.counts import ablation as command
+from wholebody.cli.bench.measuring import ablation as command
 from wholebody.methods import contradictions, starts
-from wholebody.methods.qp import working_set
+from wholebody.methods.qp import settings, sqp
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +31,7 @@ def test_constants_are_those_of_the_method_and_of_what_methods_share() -> None:
 
 def test_constants_that_loops_were_compiled_with_are_left_out() -> None:
     found, compiled = ablation.constants("ccd")
-    assert "wholebody.methods.ccd.limbs_kernel" in compiled
+    assert "wholebody.methods.ccd.sweep" in compiled
     assert all(each.module not in compiled for each in found)
 
 
@@ -62,15 +61,14 @@ def test_a_constant_is_changed_wherever_it_was_imported(monkeypatch: pytest.Monk
     assert all(getattr(owner, name) == constant.value for owner, name in places)
 
 
-def test_what_a_module_made_of_a_constant_is_made_anew() -> None:
-    """Loops get the limits of a working set in an array."""
-    before = working_set.LIMITS.copy()
-    constant = Constant("wholebody.methods.qp.working_set", "BOUND_TOLERANCE", working_set.BOUND_TOLERANCE)
-    with ablation.changed(constant, 2.0 * constant.value):
-        now = working_set.LIMITS
-        assert np.flatnonzero(now != before).size == 1
-        assert 2.0 * constant.value in now
-    assert (before == working_set.LIMITS).all()
+def test_a_field_of_a_record_is_changed_in_every_module_that_reads_it() -> None:
+    constant = Constant("wholebody.methods.qp.settings", "DESCENT.first_radius", settings.DESCENT.first_radius)
+    assert constant in ablation.constants("qp")[0]
+    before = sqp.DESCENT
+    with ablation.changed(constant, 7.0):
+        assert sqp.DESCENT.first_radius == settings.DESCENT.first_radius == 7.0
+        assert sqp.DESCENT.largest_radius == before.largest_radius
+    assert sqp.DESCENT is settings.DESCENT is before
 
 
 def test_what_is_switched_off_is_counted_and_switched_on_again(given, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,8 +10,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.cones import Polygon
-from wholebody.methods.ccd.guards import guards
+from wholebody.methods.ccd.guards import Kept, Polygon, guards
 from wholebody.methods.ccd.limbs import Limbs
 
 
@@ -33,7 +32,7 @@ def test_a_limb_that_left_its_cone_is_brought_back(
     chain: str, human: wb.Figure, random_joints: Callable[..., Any], outside: Callable[..., float]
 ) -> None:
     limbs = Limbs(human.model, map(human.joint_id, human.chains[chain].joints))
-    cones = guards(human, limbs)
+    cones = guards(human, limbs, Kept())
     data, rng, left = human.model.createData(), np.random.default_rng(7), 0
     for _ in range(150):
         start, q = human.neutral, random_joints(human, human.chains[chain].joints, rng)

@@ -11,7 +11,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
-from wholebody.methods.ccd.guards import guards
+from wholebody.methods.ccd.guards import Kept, guards
 from wholebody.methods.ccd.limbs import Limbs
 
 
@@ -32,7 +32,7 @@ def test_what_left_its_range_is_brought_back(
     scene = wb.Scene(human)
     names = human.chains[chain].joints if moving is None else moving
     limbs = Limbs(human.model, map(human.joint_id, names))
-    made = guards(human, limbs, None, tuple(human.ranges))
+    made = guards(human, limbs, Kept(ranges=tuple(human.ranges)))
     data, rng, out = human.model.createData(), np.random.default_rng(5), 0
     for _ in range(60):
         start = human.neutral

@@ -13,9 +13,8 @@ from hypothesis import strategies as st
 
 import wholebody as wb
 from tests.reference import limbs as reference
-from wholebody.methods.ccd.limbs import Limbs, compiled_kernel, movable
-from wholebody.methods.ccd.limbs_kernel import within
-from wholebody.methods.ccd.sweep import Aims, Plan, sweep
+from wholebody.methods.ccd.limbs import Limbs, movable
+from wholebody.methods.ccd.sweep import Aims, within
 
 
 def _one_joint(made: Any, low: float, high: float) -> tuple[Any, Limbs]:
@@ -39,10 +38,9 @@ def test_a_joint_takes_the_best_of_all_its_values(seed: int, low: float, high: f
     kinds = [False, False, False] if slides else [False, True, False, True]
     here, there = rng.normal(size=(len(kinds), 3)), rng.normal(size=(len(kinds), 3))
     weights = rng.uniform(0.1, 2.0, len(kinds))
-    aims = Aims()
-    for k, direction in enumerate(kinds):
-        aims.add(0, tuple(here[k]), tuple(there[k]), weight=float(weights[k]), direction=direction)
-    sweep(limbs, aims, aims.plan(limbs))
+    aims = Aims(limbs, [0] * len(kinds), here, there, [not direction for direction in kinds], weights)
+    aims.here[:] = here  # in the world, wherever the node is
+    aims.sweep(aims.plan())
     assert low <= limbs.values[0] <= high
 
     data = model.createData()
@@ -59,7 +57,7 @@ def test_a_joint_takes_the_best_of_all_its_values(seed: int, low: float, high: f
         return total
 
     found = left(limbs.values[0])
-    assert aims.distance() ** 2 == pytest.approx(found, abs=1e-9)
+    assert aims.distance**2 == pytest.approx(found, abs=1e-9)
     assert found <= min(left(float(value)) for value in np.linspace(low, high, 100)) + 1e-9
 
 
@@ -129,11 +127,10 @@ def test_compiled_kinematics_and_sweeps_do_what_plain_floats_do(name: str) -> No
         assert np.abs(limbs.lines - lines).max() < 1e-13
         count = int(rng.integers(1, 5))
         here, there = rng.normal(size=(2, count, 3))
-        aims = Aims()
-        for k in range(count):
-            tip, weight = int(rng.integers(len(chosen))), float(rng.uniform(0.1, 2.0))
-            aims.add(tip, here[k], there[k], weight=weight, direction=bool(rng.random() < 0.4))
-        plan = aims.plan(limbs) if case % 2 else aims.plan(limbs, rng.choice(len(chosen), 3).tolist())
+        tips, weights = rng.integers(len(chosen), size=count).tolist(), rng.uniform(0.1, 2.0, count)
+        aims = Aims(limbs, tips, here, there, (rng.random(count) < 0.6).tolist(), weights)
+        aims.here[:] = here
+        plan = aims.plan() if case % 2 else aims.plan(rng.choice(len(chosen), 3).tolist())
         cuts = plan.first.tolist()
         steps = [
             (node, tuple(plan.moved[first:last].tolist()), points)
@@ -144,10 +141,10 @@ def test_compiled_kinematics_and_sweeps_do_what_plain_floats_do(name: str) -> No
         values, carried = limbs.values.tolist(), [tuple(place) for place in here.tolist()]
         targets = [tuple(place) for place in there.tolist()]
         expected = reference.sweep(limbs, values, carried, targets, aims.weights.tolist(), steps)
-        assert sweep(limbs, aims, plan) == pytest.approx(expected, abs=1e-12)
+        assert aims.sweep(plan) == pytest.approx(expected, abs=1e-12)
         assert np.abs(limbs.values - values).max() < 1e-12
         assert np.abs(aims.here - carried).max() < 1e-12
-        assert aims.distance() == pytest.approx(np.sqrt(aims.weights @ ((there - aims.here) ** 2).sum(axis=1)))
+        assert aims.distance == pytest.approx(np.sqrt(aims.weights @ ((there - aims.here) ** 2).sum(axis=1)))
 
 
 def _sliding_arm(rng: np.random.Generator) -> Any:
@@ -169,13 +166,8 @@ def _sliding_arm(rng: np.random.Generator) -> Any:
     return model
 
 
-def test_a_plan_of_no_steps_moves_nothing() -> None:
-    plan = Plan.of([])
-    assert [len(part) for part in plan] == [0, 1, 0, 0]
-
-
 def test_aims_go_along_with_their_nodes_and_errors_are_distances_and_angles() -> None:
-    model, kernel = wb.load("avatar").model, compiled_kernel()
+    model = wb.load("avatar").model
     limbs = Limbs(model, [joint for joint in range(1, model.njoints) if movable(model, joint)])
     data, rng = model.createData(), np.random.default_rng(2)
     for _ in range(50):
@@ -185,23 +177,22 @@ def test_aims_go_along_with_their_nodes_and_errors_are_distances_and_angles() ->
         limbs.forward()
         node, place, turn = int(rng.integers(-1, len(limbs.joints))), rng.normal(size=3), pin.exp3(rng.normal(size=3))
         stand = pin.SE3.Identity() if node < 0 else data.oMi[limbs.joints[node]]
-        local, here = np.vstack([place, turn.T]), np.zeros((4, 3))
-        points = np.array([True, False, False, False])
-        kernel.carry(limbs.frames, np.full(4, node), local, points, here)
+        aims = Aims(limbs, [node] * 4, np.vstack([place, turn.T]), np.zeros((4, 3)), [True, False, False, False])
+        here = aims.here
         assert np.abs(here[0] - stand.act(place)).max() < 1e-12
         assert np.abs(here[1:].T - stand.rotation @ turn).max() < 1e-12
         off, angle = 0.5 * rng.normal(size=3), float(rng.uniform(0.0, 3.1))
         axis = rng.normal(size=3)
         wanted = stand.rotation @ turn @ pin.exp3(angle * axis / np.linalg.norm(axis))
-        there = np.vstack([here[0] + off, wanted.T])
-        found = kernel.greatest_error(here, there, points)
-        assert found == pytest.approx(max(float(np.linalg.norm(off)), angle), abs=1e-7)
-        assert kernel.greatest_error(here[1:], there[1:], points[1:]) == pytest.approx(angle, abs=1e-7)
+        aims.there[:] = np.vstack([here[0] + off, wanted.T])
+        assert aims.error == pytest.approx(max(float(np.linalg.norm(off)), angle), abs=1e-7)
+        aims.there[0] = here[0]
+        assert aims.error == pytest.approx(angle, abs=1e-7)
 
 
 def test_a_slide_stays_where_there_are_directions_alone() -> None:
-    from wholebody.methods.ccd.sweep import carried, moving_all
-
     _, limbs = _one_joint(pin.JointModelPrismaticUnaligned(np.array([1.0, 0.0, 0.0])), -1.0, 1.0)
     there = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    assert carried(limbs, np.eye(3), there, np.ones(3), moving_all((0,), 3, 0)) == 0.0
+    aims = Aims(limbs, [0] * 3, np.eye(3), there, [False] * 3)
+    assert len(aims.plan().nodes) == 0
+    assert aims.sweep(aims.plan()) == 0.0

@@ -17,7 +17,7 @@ from wholebody.methods.control import Control
 from wholebody.methods.damped_least_squares import DampedLeastSquares
 from wholebody.methods.qp.chain import Chains, PlainChain, compiled_kernel, from_seeds, goal_entries
 from wholebody.methods.qp.chain_kernel import Goals
-from wholebody.methods.qp.screening import Settings
+from wholebody.methods.qp.multistart import Budget
 from wholebody.tasks.base import Goal
 from wholebody.terms.entries import RESIDUAL, Entry
 
@@ -30,9 +30,9 @@ def arm() -> wb.Figure:
 
 
 def found(problem: wb.Problem, tolerance: float = 1e-6, *, measures: bool = False, progress=None):
-    settings = Settings(tolerance, 60, 1000, 40, 0, measures, 0)
+    budget = Budget(tolerance, 60, 1000, 40, 0, measures, 0)
     with problem.borrow() as workspace:
-        return from_seeds(problem, workspace, settings, Control(progress=progress))
+        return from_seeds(problem, workspace, budget, Control(progress=progress))
 
 
 def whole_chain(model: pin.Model, limits: Limits) -> PlainChain:

@@ -6,7 +6,8 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from wholebody.methods.qp.escaping import GAP, ProjectionRows, free_end
+from wholebody.methods.qp.escaping import ProjectionRows, free_end
+from wholebody.methods.qp.settings import ESCAPE
 
 RADIUS = 0.1
 
@@ -24,7 +25,7 @@ def around(begun: np.ndarray, most: np.ndarray, wall: float = np.inf):
 
     def look(q: np.ndarray) -> ProjectionRows:
         far = float(np.linalg.norm(q))
-        rows, room = np.array([q / far, [-1.0, 0.0]]), np.array([far - RADIUS - GAP, min(wall, 9.0) - q[0]])
+        rows, room = np.array([q / far, [-1.0, 0.0]]), np.array([far - RADIUS - ESCAPE.gap, min(wall, 9.0) - q[0]])
         return ProjectionRows(max(RADIUS - far, 0.0), rows, room, np.array([begun - most, begun + most]) - q)
 
     return look

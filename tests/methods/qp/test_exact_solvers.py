@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import daqp
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.optimize import lsq_linear
 
+from wholebody.base.records import with_values
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
 from wholebody.methods.qp.solvers.quadprog_solver import inverse_factor
@@ -127,7 +126,7 @@ def test_solvers_whose_hessian_has_the_weights_close_programs_with_heavy_rows(na
     """Weights of 1e10 beside 1; what a solver answers itself is near, before its active set is corrected."""
     rng, closed, off = np.random.default_rng(2), 0, []
     for _ in range(100):
-        program = replace(random_program(rng), weight=np.array([1.0, 1e10, 1e4, 1e10]))
+        program = with_values(random_program(rng), weight=np.array([1.0, 1e10, 1e4, 1e10]))
         solver = make_solver(name, hot_start=False)
         answer = solver.solve(program, None)
         closed += answer.by == name

@@ -40,7 +40,8 @@ def test_what_fits_is_kept_where_measures_lead_away(honest):
 
 
 def test_whole_steps_stay_in_their_box(planar_arm):
-    from wholebody.methods.qp.feasibility import STEP, Feasibility
+    from wholebody.methods.qp.feasibility import Feasibility
+    from wholebody.methods.qp.settings import FEASIBILITY
     from wholebody.methods.qp.solvers.registry import make_solver
     from wholebody.methods.qp.subproblem import Subproblem
 
@@ -53,4 +54,4 @@ def test_whole_steps_stay_in_their_box(planar_arm):
     )
     local = run.run(problem.start)
     assert local.violation.worst <= 1e-6
-    assert max(entry.step for entry in run.trace) <= STEP + 1e-12
+    assert max(entry.step for entry in run.trace) <= FEASIBILITY.step + 1e-12

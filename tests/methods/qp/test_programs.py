@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from tests.reference import active_set as reference
 from wholebody import UnknownNameError
-from wholebody.methods.qp.active_set import ROW_TOLERANCE, guess_active_set, solve_from
-from wholebody.methods.qp.face_kernel import minimise_on_face
+from wholebody.base.records import with_values
+from wholebody.methods.qp.active_set import guess_active_set, solve_from
+from wholebody.methods.qp.face_kernel import Face, minimise_on_face
 from wholebody.methods.qp.quadratic_program import ActiveSet
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.registry import make_solver, solver_names
 from wholebody.methods.qp.solvers.split_form import split
 
@@ -49,7 +50,7 @@ def by_enumeration(program):
 def test_enumeration_and_quadprog_agree(random_program):
     for seed in range(4):
         program = random_program(np.random.default_rng(seed), n=3, m=2, k=3)
-        mild = replace(program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.full(3, 1e4))
+        mild = with_values(program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.full(3, 1e4))
         assert by_quadprog(mild) == pytest.approx(by_enumeration(mild), abs=1e-7)
 
 
@@ -63,7 +64,7 @@ def test_every_solver_gives_the_same_answer(random_program, name):
         answer = solver.solve_cold(program)
         assert answer.exact, (case, size)
         assert ((answer.x >= program.lower) & (answer.x <= program.upper)).all()
-        mild = replace(
+        mild = with_values(
             program, weight=np.minimum(program.weight, 1e5), elastic_weight=np.minimum(program.elastic_weight, 1e5)
         )
         assert solver.solve_cold(mild).x == pytest.approx(by_quadprog(mild), abs=1e-7)
@@ -104,7 +105,7 @@ def test_a_program_without_a_guess_often_needs_no_solver(random_program):
     for _ in range(40):
         program = random_program(rng)
         weight, elastic_weight = np.minimum(program.weight, 1e5), np.minimum(program.elastic_weight, 1e5)
-        program = replace(program, weight=weight, elastic_weight=elastic_weight)
+        program = with_values(program, weight=weight, elastic_weight=elastic_weight)
         answer = solver.solve(program, None)
         assert answer.x == pytest.approx(by_quadprog(program), abs=1e-7)
         closed.append(answer.by)
@@ -141,7 +142,7 @@ def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, 
     rng = np.random.default_rng(22)
     for _ in range(200):
         program = random_program(rng, int(rng.integers(2, 56)), *rows)
-        program = replace(
+        program = with_values(
             program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.minimum(program.elastic_weight, 1e4)
         )
         active, n = guessed_set(rng, program.size, rows[1]), program.size
@@ -151,11 +152,11 @@ def test_the_compiled_minimiser_on_a_face_is_that_of_array_code(random_program, 
         weight = np.concatenate([program.weight, program.elastic_weight[active.elastic]])
         count = len(right)
         push, gradient, x = np.empty(count), np.empty(n), np.empty(n)
-        finite = minimise_on_face(
-            program.diagonal, program.linear, program.lower, program.upper, active.lower, active.upper, stacked, right,
-            1.0 / weight, count, ROW_TOLERANCE, np.empty((max(n, 1), n)), np.empty(n * n), np.empty(n), np.empty(n),
-            push, gradient, x,
+        face = Face(
+            stacked, right, 1.0 / weight, push, gradient, np.empty(0), np.empty((max(n, 1), n)), np.empty(n * n),
+            np.empty(n), np.empty(n),
         )  # fmt: skip
+        finite = minimise_on_face(program, active, face, count, CORRECTIONS.tolerance, x)
         assert finite
         assert np.abs(x - wanted.x).max() < 1e-9
         scale = 1.0 + np.abs(push).max(initial=0.0)
@@ -169,7 +170,7 @@ def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program,
     settled = []
     for _ in range(25):
         program = random_program(rng, int(rng.integers(2, 56)), *rows)
-        program = replace(
+        program = with_values(
             program, weight=np.minimum(program.weight, 1e4), elastic_weight=np.minimum(program.elastic_weight, 1e4)
         )
         guess = guessed_set(rng, program.size, rows[1])
@@ -188,7 +189,7 @@ def test_compiled_loops_correct_an_active_set_as_array_code_does(random_program,
 def test_active_set_is_read_off_a_near_answer(random_program):
     rng = np.random.default_rng(12)
     for _ in range(10):
-        program = replace(random_program(rng), weight=np.full(4, 10.0), elastic_weight=np.full(9, 10.0))
+        program = with_values(random_program(rng), weight=np.full(4, 10.0), elastic_weight=np.full(9, 10.0))
         answer = make_solver("osqp").solve_cold(program)
         read = guess_active_set(program, by_quadprog(program), 1e-7)
         assert read.same(answer.active)
@@ -197,7 +198,7 @@ def test_active_set_is_read_off_a_near_answer(random_program):
 def test_gradient_is_the_derivative_of_the_value(random_program):
     rng = np.random.default_rng(1)
     program = random_program(rng)
-    program = replace(program, weight=np.minimum(program.weight, 10.0), elastic_weight=np.full(9, 10.0))
+    program = with_values(program, weight=np.minimum(program.weight, 10.0), elastic_weight=np.full(9, 10.0))
     x = 0.2 * rng.normal(size=program.size)
     for k, direction in enumerate(np.eye(program.size)):
         slope = (program.value(x + 1e-6 * direction) - program.value(x - 1e-6 * direction)) / 2e-6
@@ -222,17 +223,17 @@ def test_split_form_has_the_same_value(random_program):
 def test_programs_at_the_edge_of_sense(random_program, name):
     solver = make_solver(name)
     program = random_program(np.random.default_rng(5))
-    fixed = replace(program, lower=np.zeros(12), upper=np.zeros(12))
+    fixed = with_values(program, lower=np.zeros(12), upper=np.zeros(12))
     assert np.array_equal(solver.solve_cold(fixed).x, np.zeros(12))
-    twice = replace(  # rows that repeat each other, and rows that are zero
+    twice = with_values(  # rows that repeat each other, and rows that are zero
         program,
         rows=np.vstack([program.rows, program.rows, np.zeros((2, 12))]),
         target=np.concatenate([program.target, program.target, [1.0, -1.0]]),
         weight=np.concatenate([program.weight, program.weight, [1e8, 1e8]]),
     )
-    single = replace(program, weight=2.0 * program.weight)
+    single = with_values(program, weight=2.0 * program.weight)
     assert solver.solve_cold(twice).x == pytest.approx(solver.solve_cold(single).x, abs=1e-7)
-    against = replace(  # rows that contradict each other share what is left
+    against = with_values(  # rows that contradict each other share what is left
         program,
         elastic=np.vstack([np.eye(12)[:1], -np.eye(12)[:1]]),
         least=np.array([1.0, 1.0]),
@@ -263,7 +264,7 @@ def test_a_program_of_no_use_prints_nothing_and_is_answered_inside_its_box(rando
         for part, value in itertools.product(PARTS, BAD):
             array = getattr(good, part).copy()
             array.flat[1] = value
-            program = replace(good, **{part: array})
+            program = with_values(good, **{part: array})
             answer = solver.solve(program, None)
             assert np.isfinite(answer.x).all(), (part, value)
             box = np.minimum(program.lower, program.upper) - 1e-9, np.maximum(program.lower, program.upper) + 1e-9

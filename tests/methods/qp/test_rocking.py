@@ -10,6 +10,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.geometry.contact_rows import ContactRowBuilder
+from wholebody.methods.qp.settings import TRACKING
 
 PUSHES = {
     "a corner down": wb.Point("body0", (0.0, 0.0, -0.1), offset=(0.2, 0.1, 0.0)),
@@ -47,7 +48,7 @@ def distances(scene, q):
 def rows_alone(monkeypatch):
     """What is tested here is the rows alone: steps that turn are not looked at where they end."""
     for module in ("tracking", "turning"):
-        monkeypatch.setattr(f"wholebody.methods.qp.{module}.UNSEEN", np.inf)
+        monkeypatch.setattr(f"wholebody.methods.qp.{module}.TRACKING", TRACKING._replace(unseen=np.inf))
 
 
 @pytest.mark.parametrize("push", PUSHES.values(), ids=PUSHES.keys())

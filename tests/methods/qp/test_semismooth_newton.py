@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.methods.qp.test_programs import by_quadprog
 from tests.reference import active_set as reference
 from tests.reference import semismooth_newton
-from wholebody.methods.qp.active_set import solve_from, violated_set
+from wholebody.base.records import with_values
+from wholebody.methods.qp.active_set import minimise, solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
-from wholebody.methods.qp.semismooth_newton import minimise
 from wholebody.methods.qp.solvers.registry import make_solver
 
 
@@ -50,7 +48,7 @@ def test_quadprog_agrees():
     rng = np.random.default_rng(3)
     for _ in range(10):
         program = crowded(rng, n=6, k=60, diagonal=1.0)
-        mild = replace(program, elastic_weight=np.full(60, 1e4))
+        mild = with_values(program, elastic_weight=np.full(60, 1e4))
         x, active, _ = minimise(mild, rng.normal(size=6), 300)
         assert x == pytest.approx(by_quadprog(mild), abs=1e-6)
         assert np.array_equal(active.elastic, mild.elastic @ x < mild.least)
@@ -85,7 +83,7 @@ def test_correcting_a_set_takes_the_smaller_system():
 def test_rows_that_repeat_each_other_have_multipliers_that_belong_to_their_residuals():
     rng = np.random.default_rng(2)
     base = rng.normal(size=(4, 12))
-    program = replace(
+    program = with_values(
         crowded(rng, k=20),
         elastic=np.repeat(base, 2, axis=0) + 1e-9 * rng.normal(size=(8, 12)),
         least=rng.uniform(0.0, 0.05, 8),

@@ -14,21 +14,10 @@ import wholebody as wb
 from wholebody.bench.measure.track import judge, track
 from wholebody.bench.suite.adapters.registry import make_tool
 from wholebody.figures.state import State
+from wholebody.methods.qp.settings import PROGRAM, STEP
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.step_program import (
-    AGAIN,
-    BENT,
-    CURVED,
-    DAMPING,
-    LITTLE,
-    RADIUS,
-    RESTING,
-    SETTLING,
-    STRAIGHT,
-    WORSE,
-    StepProgram,
-)
-from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
+from wholebody.methods.qp.step_program import StepProgram
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.terms.linearisation import Linearisation, PackedLinearisation
 
@@ -75,32 +64,33 @@ class Plain:
         rows = self.subproblem.rows(at)
         error, goals = max(float(np.linalg.norm(at.goal_error)), 1e-12), rows.goals
         shift, damping = np.zeros(len(rows.soft_error)), 0.0
+        gain = DT / STEP.settling if goals else 1.0
         if self.before is not None and np.array_equal(self.before[0], at.q):
             shift = rows.soft_error - self.before[1]
-            shift[goals:] = np.clip(shift[goals:], -CURVED, CURVED)
-            if not np.abs(shift[:goals]).max(initial=0.0) < RESTING:
+            shift[goals:] = np.clip(shift[goals:], -STEP.curved, STEP.curved)
+            if not np.abs(shift[:goals]).max(initial=0.0) < STEP.resting:
                 shift[:goals] = 0.0
-            damping = DAMPING * min(1.0, self.before[2] / error)
-        for _ in range(1 + AGAIN):
+            damping = STEP.damping * min(1.0, self.before[2] / error)
+        for _ in range(1 + STEP.again):
             program = self.subproblem.program(
-                at, rows, RADIUS, ERROR_CLAMP * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
+                at, rows, STEP.radius, PROGRAM.error_clamp * STEP.radius, damping, shift, True, gain
             )
             answer = self.working_set.solve(program, rows.key)
             left = float(np.linalg.norm((rows.soft @ answer.x - program.target)[:goals]))
-            asked = DAMPING * min(1.0, left / error) if left > RESTING else 0.0
-            if asked <= WORSE * max(damping, LITTLE):
+            asked = STEP.damping * min(1.0, left / error) if left > STEP.resting else 0.0
+            if asked <= STEP.worse * max(damping, STEP.little):
                 break
             damping = asked
-        self.damped += damping > LITTLE
+        self.damped += damping > STEP.little
         bend, self.bend = self.bend, float(np.prod(motion(answer.x)))
-        if goals < len(shift) and (self.curving or abs(self.bend - bend) > BENT):
-            curve = np.clip(self.curve(at.q, rows, answer.x), -CURVED, CURVED)
-            self.curving = np.abs(curve - shift[goals:]).max() > STRAIGHT
+        if goals < len(shift) and (self.curving or abs(self.bend - bend) > STEP.bent):
+            curve = np.clip(self.curve(at.q, rows, answer.x), -STEP.curved, STEP.curved)
+            self.curving = np.abs(curve - shift[goals:]).max() > STEP.straight
             if self.curving:
                 self.foresaw += 1
                 shift[goals:] = curve
                 program = self.subproblem.program(
-                    at, rows, RADIUS, ERROR_CLAMP * RADIUS, damping, shift, True, DT / SETTLING if goals else 1.0
+                    at, rows, STEP.radius, PROGRAM.error_clamp * STEP.radius, damping, shift, True, gain
                 )
                 answer = self.working_set.solve(program, rows.key)
         return rows, program, answer
@@ -141,8 +131,8 @@ def test_it_is_the_plain_one_entry_by_entry(scene: wb.Scene, name: str) -> None:
             q = problem.scene.figure.clamp(pin.integrate(workspace.model, q, 0.02 * rng.normal(size=len(q) - 1)))
         at = lineariser.packed(q, 0.06)
         answer = compiled.solve(at, measures=True)
-        found, found_rows = compiled.program(), compiled.rows(at)
-        rows, program, wanted = plain.solve(whole(at), partial(compiled.motion, at))
+        found, found_rows = compiled.program, compiled.rows
+        rows, program, wanted = plain.solve(whole(at), partial(compiled.turning.motion, at))
         for field in ("soft", "soft_error", "soft_weight", "elastic", "elastic_violation", "contact", "key"):
             assert np.array_equal(getattr(found_rows, field), getattr(rows, field)), field
         assert (found_rows.goals, found_rows.contacts) == (rows.goals, rows.contacts)

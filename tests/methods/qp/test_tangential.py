@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from tests.reference import active_set as reference
+from wholebody.base.records import with_values
+from wholebody.methods.qp.active_set import room_for
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.solvers.registry import make_solver
-from wholebody.methods.qp.tangential import ALONG, ROOM, Extrapolation, Parts, parts_of
-from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.methods.qp.tangential import Extrapolation, Parts, parts_of
 
 NO_SHIFT = np.zeros(0)
 
@@ -26,7 +26,7 @@ def parts(program: QuadraticProgram, shift: np.ndarray = NO_SHIFT) -> tuple[Part
     """The parts of the program's answer, and the answer."""
     solver = make_solver("active_set")
     answer = solver.solve_cold(program)
-    return parts_of(program, answer, shift, WorkingSet(solver)), answer
+    return parts_of(program, answer, shift, room_for(program).work), answer
 
 
 def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_program):
@@ -35,8 +35,10 @@ def test_the_normal_part_is_the_answer_without_gradient_on_the_same_face(random_
     for _ in range(60):
         program = random_program(rng, int(rng.integers(4, 40)), int(rng.integers(1, 9)), int(rng.integers(0, 20)))
         split, answer = parts(program)
-        plain, held = replace(program, linear=np.zeros(program.size)), answer.active
-        near = held._replace(lower=held.lower & (program.lower >= -ROOM), upper=held.upper & (program.upper <= ROOM))
+        plain, held = with_values(program, linear=np.zeros(program.size)), answer.active
+        near = held._replace(
+            lower=held.lower & (program.lower >= -DESCENT.room), upper=held.upper & (program.upper <= DESCENT.room)
+        )
         left = (held.lower | held.upper) & ~(near.lower | near.upper)
         expected = np.clip(reference.minimise_on_face(plain, near).x, program.lower, program.upper)
         free = ((program.lower < expected) & (expected < program.upper))[left].all()
@@ -53,7 +55,7 @@ def test_the_tangential_part_saves_half_of_its_curvature(random_program):
     rng = np.random.default_rng(1)
     for _ in range(40):
         program = random_program(rng, int(rng.integers(6, 30)), int(rng.integers(1, 5)), 0)
-        program = replace(program, weight=np.full(len(program.target), 1e9), lower=program.lower - 1e3,
+        program = with_values(program, weight=np.full(len(program.target), 1e9), lower=program.lower - 1e3,
                           upper=program.upper + 1e3)  # fmt: skip
         (n, t), answer = parts(program)
 
@@ -66,7 +68,7 @@ def test_the_tangential_part_saves_half_of_its_curvature(random_program):
 
 def test_the_shift_of_the_multipliers_makes_up_for_a_gradient_that_the_normal_part_has_not():
     """One soft row of finite weight: the normal part meets the error itself, not the error and the shift."""
-    program = replace(
+    program = with_values(
         free_program(2), linear=np.array([0.0, 3.0]), rows=np.array([[1.0, 1.0]]), target=np.array([0.1 - 0.02]),
         weight=np.array([1e6]),
     )  # fmt: skip
@@ -77,7 +79,7 @@ def test_the_shift_of_the_multipliers_makes_up_for_a_gradient_that_the_normal_pa
 @pytest.mark.parametrize(("off", "along"), [(5e-4, 0.0), (2.0, -2.0)])
 def test_a_near_bound_stays_held_and_the_way_to_a_far_one_is_tangential(off, along):
     lower = np.array([-off, -2.0, -2.0])
-    program = replace(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=lower, upper=np.full(3, 2.0))
+    program = with_values(free_program(3), linear=np.array([9.0, -1.0, 0.5]), lower=lower, upper=np.full(3, 2.0))
     split, answer = parts(program)
     assert answer.active.same(ActiveSet(*np.array([[True, False, False], [False] * 3]), np.zeros(0, dtype=bool)))
     assert split.tangential == pytest.approx([along, 1.0, -0.5])
@@ -105,7 +107,7 @@ def test_steps_that_grow_are_followed_and_not_turned_back():
     ahead = Extrapolation()
     gone(ahead, [0.1, 0.13])
     split = Parts(np.zeros(2), np.array([0.169, 0.0]))
-    assert ahead.propose(split, free_program(2)) == pytest.approx([ALONG * 0.169, 0.0])
+    assert ahead.propose(split, free_program(2)) == pytest.approx([DESCENT.along * 0.169, 0.0])
 
 
 def test_a_refused_proposal_shortens_the_next_ones():
@@ -121,7 +123,7 @@ def test_a_refused_proposal_shortens_the_next_ones():
 def test_proposals_stay_in_the_box():
     ahead = Extrapolation()
     gone(ahead, [0.4, 0.2])
-    program = replace(free_program(2), lower=np.full(2, -0.15), upper=np.full(2, 0.15))
+    program = with_values(free_program(2), lower=np.full(2, -0.15), upper=np.full(2, 0.15))
     assert ahead.propose(Parts(np.zeros(2), np.array([0.1, 0.0])), program) == pytest.approx([0.15, 0.0])
 
 

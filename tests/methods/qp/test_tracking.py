@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +9,7 @@ import pinocchio as pin
 import pytest
 
 import wholebody as wb
+from wholebody.base.records import with_values
 from wholebody.methods.qp import tracking
 from wholebody.methods.qp.active_set import solve_from, violated_set
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
@@ -151,7 +151,7 @@ def program() -> QuadraticProgram:
 def test_compiled_loops_are_not_given_sizes_that_do_not_fit(field: str) -> None:
     whole = program()
     assert solve_from(whole, violated_set(whole), 50) is not None
-    broken = replace(whole, **{field: getattr(whole, field)[:-1]})
+    broken = with_values(whole, **{field: getattr(whole, field)[:-1]})
     with pytest.raises(ValueError, match="other sizes"):
         solve_from(broken, violated_set(whole), 50)
 

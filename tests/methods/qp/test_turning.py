@@ -10,7 +10,8 @@ import pytest
 
 import wholebody as wb
 from wholebody.geometry.continuous.sweep import Sweep
-from wholebody.methods.qp.turning import UNSEEN, Turning
+from wholebody.methods.qp.settings import TRACKING
+from wholebody.methods.qp.turning import Turning
 
 THIN = 2e-4  # m
 DT = 0.01
@@ -108,7 +109,7 @@ def test_what_turns_far_from_everything_is_not_looked_at(free_bodies, monkeypatc
 def test_the_bound_holds_for_random_displacements(planar_arm, least_distance):
     """A capsule of an arm and a box: where the bound says so, a pair ends no nearer than its rows say."""
     scene = wb.Scene(planar_arm((0.4, 0.3, 0.3))).add(wb.Box((0.3, THIN, 0.6)), name="plate", at=(0.9, 0.25, 0.0))
-    problem = wb.Problem(scene, start=np.array([0.1, 0.2, 0.1]), clearance=UNSEEN)  # all of it may go unseen
+    problem = wb.Problem(scene, start=np.array([0.1, 0.2, 0.1]), clearance=TRACKING.unseen)  # all of it may go unseen
     tracker, rng, trusted = wb.QP().tracker(problem, DT), np.random.default_rng(0), 0
     workspace, lineariser = tracker.workspace, problem.lineariser(tracker.workspace, DT)
     program = tracker._program  # the rows that the bound is about
@@ -119,7 +120,7 @@ def test_the_bound_holds_for_random_displacements(planar_arm, least_distance):
             continue
         at = lineariser.packed(q, 0.5)
         program.solve(at, True)
-        rows, x = program.rows(at), 0.05 * rng.normal(size=3)
+        rows, x = program.rows, 0.05 * rng.normal(size=3)
         foreseen = float((rows.elastic @ x - rows.elastic_violation).min())
         if turning.linearisation_error(at, rows, x) == 0.0:
             trusted += 1

@@ -23,9 +23,8 @@ from wholebody.methods.control import Progress
 from wholebody.methods.qp.method import QP
 from wholebody.motion.avoider import AvoidProgress, Run, Watch
 from wholebody.motion.bisection import method as method_module
-from wholebody.motion.bisection.method import Bisection
+from wholebody.motion.bisection.method import Bisection, hold_between
 from wholebody.motion.bisection.prediction import Predictor
-from wholebody.motion.bisection.recursion import hold_between
 from wholebody.motion.clip import Clip
 from wholebody.motion.frame_terms import frame_terms
 from wholebody.motion.windows import runs

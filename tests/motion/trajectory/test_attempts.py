@@ -14,7 +14,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.faults import dips
 from wholebody.motion.one_side import followed
 from wholebody.motion.trajectory import window_run
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.deviations import Objective
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.program import Limits
@@ -61,7 +60,7 @@ def asked(least: float, early: bool, share: float = 1.0, rough: bool = False) ->
     wide, free = np.full((3, 1), 9.0), np.full((2, 1), np.inf)
     limits, objective = Limits(-wide, wide, -free, free), Objective(3, np.ones(1), 0.0, 1.0, (False, False))
     looking: Any = Asked(least, share)
-    program = WindowProgram(looking, objective, limits, banded_solver(None)[1], 60)
+    program = WindowProgram(looking, objective, limits, 60)
     return program.run(np.zeros((3, 1)), lambda number, worst: False, early=early, rough=rough)
 
 
@@ -163,7 +162,7 @@ def test_what_is_held_is_met_to_a_tenth_of_a_millimetre(contact: float, held: fl
     none, free = np.zeros((3, 1)), np.full((2, 1), np.inf)
     looking: Any = Missed(contact, held)
     objective = Objective(3, np.ones(1), 0.0, 1.0, (False, False))
-    program = WindowProgram(looking, objective, Limits(none, none, -free, free), banded_solver(None)[1], 3)
+    program = WindowProgram(looking, objective, Limits(none, none, -free, free), 3)
     assert program.run(none, lambda number, worst: False).met is met
 
 

@@ -12,17 +12,16 @@ import scipy.sparse as sp
 
 from wholebody.motion.trajectory import interior_point
 from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
-from wholebody.motion.trajectory.banded_qp import ACCURACY, GAP
 from wholebody.motion.trajectory.deviations import Objective
+from wholebody.motion.trajectory.interior_point import Answer, BandedQP
 
 FRAMES, DOFS = 10, 3
 PRICE = 1e3
 
 
 def minimise(*given: Any) -> Answer:
-    """The answer of a program, its fields one after the other, to an accuracy and a gap."""
-    return interior_point.minimise(BandedQP(*given[:-2]), *given[-2:])
+    """The answer of a program, its fields one after the other."""
+    return interior_point.minimise(BandedQP(*given))
 
 
 def program(seed: int, fixed: bool = True, contradicting: bool = False) -> BandedQP:
@@ -89,13 +88,13 @@ def dense(asked: BandedQP) -> np.ndarray:
 def test_it_agrees_with_an_exact_solver(seed: int, fixed: bool, contradicting: bool, known: bool) -> None:
     asked = program(seed, fixed, contradicting)
     asked = asked if known else asked._replace(start=None)
-    answer = minimise(*asked, 1e-7, 1e-10)
+    answer = interior_point.minimise(asked, 1e-7, 1e-10)
     assert answer.solved
     np.testing.assert_allclose(answer.z, dense(asked), atol=2e-5)
 
 
 def test_it_takes_few_iterations() -> None:
-    assert max(minimise(*program(seed), ACCURACY, GAP).iterations for seed in range(8)) <= 20
+    assert max(minimise(*program(seed)).iterations for seed in range(8)) <= 20
 
 
 def test_a_program_without_an_answer_ends() -> None:
@@ -104,7 +103,6 @@ def test_a_program_without_an_answer_ends() -> None:
     twice = sp.csc_matrix(np.ones((2, 1)))
     answer = minimise(
         eye, np.zeros(1), twice, np.array([0.2, -np.inf]), np.array([np.inf, 0.1]), -np.ones(1), np.ones(1), None,
-        ACCURACY, GAP,
     )  # fmt: skip
     assert not answer.solved
     assert np.isfinite(answer.z).all()
@@ -113,7 +111,7 @@ def test_a_program_without_an_answer_ends() -> None:
 def test_unknowns_without_room_stay() -> None:
     asked = program(0)
     still = asked._replace(least=np.full(len(asked.c), 0.1), most=np.full(len(asked.c), 0.1))
-    np.testing.assert_array_equal(minimise(*still, ACCURACY, GAP).z, 0.1)
+    np.testing.assert_array_equal(minimise(*still).z, 0.1)
 
 
 @pytest.mark.parametrize(("asked", "solved"), [(2.0, True), (5.0, False)])
@@ -133,8 +131,6 @@ def test_rows_of_unknowns_without_room_hold_or_not(asked: float, solved: bool, f
         least,
         most,
         None,
-        ACCURACY,
-        GAP,
     )
     assert answer.solved == solved
     np.testing.assert_allclose(answer.z[:2], 1.0)
@@ -142,13 +138,13 @@ def test_rows_of_unknowns_without_room_hold_or_not(asked: float, solved: bool, f
 
 def test_bounds_that_cross_have_no_answer() -> None:
     eye, none = sp.csc_matrix(np.eye(1)), sp.csc_matrix((0, 1))
-    assert not minimise(eye, np.ones(1), none, *[np.zeros(0)] * 2, np.ones(1), -np.ones(1), None, ACCURACY, GAP).solved
+    assert not minimise(eye, np.ones(1), none, *[np.zeros(0)] * 2, np.ones(1), -np.ones(1), None).solved
 
 
 def test_unknowns_without_bounds_are_found() -> None:
     eye, none = sp.csc_matrix(np.eye(2)), sp.csc_matrix((0, 2))
     bound = np.array([np.inf, 0.5])
-    answer = minimise(eye, np.array([-2.0, -2.0]), none, *[np.zeros(0)] * 2, -bound, bound, None, ACCURACY, GAP)
+    answer = minimise(eye, np.array([-2.0, -2.0]), none, *[np.zeros(0)] * 2, -bound, bound, None)
     assert answer.solved
     np.testing.assert_allclose(answer.z, [2.0, 0.5], atol=1e-5)
 
@@ -162,9 +158,7 @@ def test_slacks_stay_out_of_the_band_beside_an_unknown_that_is_alone() -> None:
     most = np.full(count + 1, np.inf)
     most[0] = 0.5
     tracemalloc.start()
-    answer = minimise(
-        P, c, G, np.full(count, 0.2), np.full(count, np.inf), np.zeros(count + 1), most, None, ACCURACY, GAP
-    )
+    answer = minimise(P, c, G, np.full(count, 0.2), np.full(count, np.inf), np.zeros(count + 1), most, None)
     _, peak = tracemalloc.get_traced_memory()
     tracemalloc.stop()
     assert answer.solved
@@ -179,12 +173,12 @@ def test_a_program_whose_objective_couples_nothing(rows: int) -> None:
     G = sp.csc_matrix(np.array([[1.0, 1.0, 0.0], [0.0, 1.0, 1.0]])[:rows].reshape(rows, 3))
     answer = minimise(
         sp.csc_matrix(np.eye(3)), -target, G, np.full(rows, -1.0), np.full(rows, np.inf), np.full(3, -0.2),
-        np.full(3, 0.2), None, ACCURACY, GAP,
+        np.full(3, 0.2), None,
     )  # fmt: skip
     assert answer.solved
     half = minimise(
         sp.csc_matrix(np.eye(3)), -target, G, np.full(rows, -1.0), np.full(rows, np.inf), np.zeros(3),
-        np.full(3, np.inf), np.zeros(3), ACCURACY, GAP,
+        np.full(3, np.inf), np.zeros(3),
     )  # fmt: skip
     np.testing.assert_allclose(half.z, np.maximum(target, 0.0), atol=1e-4)
     np.testing.assert_allclose(answer.z, np.clip(target, -0.2, 0.2), atol=1e-4)

@@ -1,16 +1,12 @@
-"""The objective against its formula, and programs against a dense solver."""
+"""The objective against its formula, and the steps of programs with bounds on speed."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import qpsolvers
-import scipy.sparse as sp
 
-import wholebody as wb
-from wholebody.motion.trajectory.banded_program import BandedQP
-from wholebody.motion.trajectory.banded_qp import SOLVERS, banded_solver
 from wholebody.motion.trajectory.deviations import Objective
+from wholebody.motion.trajectory.interior_point import minimise
 from wholebody.motion.trajectory.nodes import Node, Rows
 from wholebody.motion.trajectory.program import Limits, Step, lay_out
 
@@ -28,38 +24,6 @@ def test_the_objective_is_its_formula(seams: tuple[bool, bool]) -> None:
     assert Objective(7, weights, TIME, DT, seams).value(x) == pytest.approx(expected, rel=1e-12)
 
 
-def banded(frames: int, dofs: int, seed: int) -> BandedQP:
-    """A program with rows in every frame, some of which are violated at zero."""
-    random = np.random.default_rng(seed)
-    bands = Objective(frames, np.ones(dofs), TIME, DT, (True, True)).bands
-    P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(dofs)))
-    G = sp.csc_matrix(sp.block_diag([random.normal(size=(2, dofs)) for _ in range(frames)]))
-    lower = random.normal(-0.1, 0.1, G.shape[0])
-    n = frames * dofs
-    return BandedQP(P, 0.1 * random.normal(size=n), G, lower, np.full(len(lower), np.inf), np.full(n, -1.0), np.ones(n))
-
-
-@pytest.mark.parametrize("name", SOLVERS)
-@pytest.mark.parametrize("seed", range(3))
-def test_solvers_agree_with_a_dense_one(name: str, seed: int) -> None:
-    pytest.importorskip(SOLVERS[name][0])
-    program = banded(12, 4, seed)
-    answer = banded_solver(name)[1](program)
-    dense = qpsolvers.solve_qp(
-        program.P.toarray(), program.c, -program.G.toarray(), -program.lower, lb=program.least, ub=program.most,
-        solver="daqp",
-    )  # fmt: skip
-    assert answer.solved
-    np.testing.assert_allclose(answer.z, dense, atol=2e-4)
-
-
-def test_an_unknown_solver_is_refused() -> None:
-    with pytest.raises(wb.UnknownNameError, match="osqp"):
-        wb.motion.Trajectory(solver="osq")
-    with pytest.raises(wb.InputError, match="solver"):
-        wb.motion.Trajectory(solver=3)  # type: ignore[arg-type]
-
-
 def brought_back(
     x: np.ndarray, slowest: float, fastest: float, radius: float, least: np.ndarray | None = None
 ) -> np.ndarray:
@@ -72,7 +36,7 @@ def brought_back(
     step = Step(x, rows, np.zeros(1, dtype=np.intp), radius, 1.0, [np.zeros(0)] * frames, none_kept)
     limits = Limits(-wide if least is None else least, wide, *bounds)
     layout = lay_out(Objective(frames, np.ones(1), 0.0, DT, (False, False)), limits, step)
-    return layout.deviations(banded_solver("osqp")[1](layout.program).z, x)
+    return layout.deviations(minimise(layout.program, 1e-8, 1e-10).z, x)
 
 
 def test_a_speed_that_little_exceeds_is_brought_back_by_one_short_step() -> None:

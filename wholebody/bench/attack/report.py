@@ -5,14 +5,14 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from wholebody.bench import rows as tables
 from wholebody.bench.attack.case import KINDS, Case, Verdict
 from wholebody.bench.report import render
+from wholebody.bench.rows import Row, times
+from wholebody.bench.rows import report as tables_of
 from wholebody.bench.statistics import wilson
 from wholebody.bench.tables import write_text
 
@@ -31,55 +31,35 @@ ATTACKED = {
 }
 
 
-@dataclass(frozen=True)
-class Row:
-    """One case, as it is written down.
-
-    Attributes:
-        kind, seed, number: which case.
-        outcome: what came of it.
-        status: what the answer says of itself.
-        seconds: CPU time of the call under attack.
-        words: what was found.
-    """
-
-    kind: str
-    seed: int
-    number: int
-    outcome: str
-    status: str
-    seconds: float
-    words: str
-
-    @property
-    def slow(self) -> bool:
-        """Whether it is a solve that took longer than 5 s."""
-        return self.kind == "solve" and self.seconds > 5.0
-
-
 def row(case: Case, verdict: Verdict) -> Row:
-    """Return the line of a case."""
+    """Return the row of a case; "seconds" are of the processor, of the call under attack."""
     words = " ".join(verdict.words.split()).encode("ascii", errors="backslashreplace").decode()
-    return Row(case.kind, case.seed, case.number, verdict.outcome, verdict.status, verdict.seconds, words)
+    figures = {"seed": case.seed, "number": case.number, "outcome": verdict.outcome, "status": verdict.status or "none"}
+    return Row(case.name, case.kind, {**figures, "seconds": verdict.seconds, "words": words or "nothing"})
+
+
+def is_slow(row: Row) -> bool:
+    """Whether it is a solve that took longer than 5 s."""
+    return row.tool == "solve" and bool(row["seconds"] > 5.0)
 
 
 def report(rows: Sequence[Row], facts: dict[str, str]) -> str:
     """Return the counts as Markdown."""
     counts = []
-    for kind in (name for name in KINDS if any(one.kind == name for one in rows)):
-        found = Counter(one.outcome for one in rows if one.kind == kind)
+    for kind in (name for name in KINDS if any(one.tool == name for one in rows)):
+        found = Counter(one["outcome"] for one in rows if one.tool == kind)
         outcomes = {name: found[name] for name in ("right", "refused", "gave up", "wrong")}
         most = 100.0 * wilson(found["wrong"], found.total())[1]
-        counts.append(tables.Row(ATTACKED[kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most}))
-    times = []
+        counts.append(Row(ATTACKED[kind], kind, {"cases": found.total(), **outcomes, "wrong at most %": most}))
+    spans = []
     for status in ("solved", "unreachable", "infeasible", "stalled"):
-        spent = np.array([1e3 * one.seconds for one in rows if one.kind == "solve" and one.status == status])
+        spent = np.array([1e3 * one["seconds"] for one in rows if one.tool == "solve" and one["status"] == status])
         if len(spent):
-            figures = {"count": len(spent), **tables.times(spent), "longest ms": float(spent.max())}
-            times.append(tables.Row("solves that end", status, figures))
-    seeds = ", ".join(map(str, sorted({one.seed for one in rows})))
-    notes = [f"Solves that took more than 5 s: {sum(one.slow for one in rows)}.", f"Seed {seeds}."]
-    return tables.report("What was attacked:", {"Cases": counts, "Times of solves": times}, facts, notes)
+            figures = {"count": len(spent), **times(spent), "longest ms": float(spent.max())}
+            spans.append(Row("solves that end", status, figures))
+    seeds = ", ".join(map(str, sorted({one["seed"] for one in rows})))
+    notes = [f"Solves that took more than 5 s: {sum(map(is_slow, rows))}.", f"Seed {seeds}."]
+    return tables_of("What was attacked:", {"Cases": counts, "Times of solves": spans}, facts, notes)
 
 
 def keep(case: Case, verdict: Verdict, folder: Path) -> None:
@@ -92,12 +72,12 @@ def keep(case: Case, verdict: Verdict, folder: Path) -> None:
 def index(rows: Sequence[Row], folder: Path) -> None:
     """Write the list of failures, alike ones together, the most frequent kind of wrong answers first."""
     alike: dict[tuple[str, str], list[Row]] = {}
-    for one in (one for one in rows if one.slow or one.outcome == "wrong"):
-        alike.setdefault((one.kind, _signature(one.words) if one.outcome == "wrong" else "slow"), []).append(one)
+    for one in (one for one in rows if is_slow(one) or one["outcome"] == "wrong"):
+        alike.setdefault((one.tool, _signature(one["words"]) if one["outcome"] == "wrong" else "slow"), []).append(one)
     lines = ["# Failures", "Each folder has a repeat.py that repeats its failure: `python FOLDER/repeat.py`."]
     for (kind, _), found in sorted(alike.items(), key=lambda item: (KINDS.index(item[0][0]), -len(item[1]))):
-        names = ", ".join(Case(one.seed, one.number, one.kind).name for one in found[:5])
-        lines.append(f"- **{kind}**, {len(found)} times: {found[0].words} ({found[0].seconds:.2f} s): {names}")
+        names = ", ".join(one.case for one in found[:5])
+        lines.append(f"- **{kind}**, {len(found)} times: {found[0]['words']} ({found[0]['seconds']:.2f} s): {names}")
     write_text(folder / "README.md", "\n\n".join(lines) + "\n")
 
 

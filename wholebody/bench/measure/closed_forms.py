@@ -14,7 +14,7 @@ from wholebody.bench.measure.drops import GRAVITY
 from wholebody.bench.measure.throws import DT
 from wholebody.bench.rows import Row
 from wholebody.dynamics.rigid_bodies import RigidBodies
-from wholebody.dynamics.settings import SKIN
+from wholebody.dynamics.step_program import SKIN
 
 FAR = 5.0  # m: from the hand that a scene needs
 LOW = -2.0  # m: height of the floor

@@ -31,11 +31,12 @@ PAPER = tuple(
 """Table 2 of Schmidl and Lin, on a processor of 1.7 GHz."""
 
 
-def frame_rows(case: str, tool: str, columns: Mapping[str, Any]) -> list[Row]:
-    """A row for each frame, from columns (frames,) by name."""
-    count = len(next(iter(columns.values())))
+def _run(case: str, tool: str, figures: Mapping[str, Figure], columns: Mapping[str, Any]) -> tuple[Row, list[Row]]:
+    """A row of a run, and a row for each of its frames from columns (frames,) by name."""
     lists = {name: np.asarray(column).tolist() for name, column in columns.items()}
-    return [Row(case, tool, {"frame": k, **{name: column[k] for name, column in lists.items()}}) for k in range(count)]
+    frames = [dict(zip(lists, each, strict=True)) for each in zip(*lists.values(), strict=True)]
+    rows = [Row(case, tool, {"frame": number, **frame}) for number, frame in enumerate(frames)]
+    return Row(case, tool, {"frames": len(rows), **figures}), rows
 
 
 def _spent(milliseconds: Array, name: str = "") -> dict[str, Figure]:
@@ -56,21 +57,16 @@ def _jerk(values: Array) -> float:
 
 def drag_rows(task: str, drag: Dragged, judged: DragJudgement) -> tuple[Row, list[Row]]:
     """A drag and its frames: "deepest" is of frames, start and end, "between" a bound on the ways between them."""
-    frames = frame_rows(
-        task,
-        drag.method,
-        {
-            "ms": 1e3 * drag.seconds,
-            "CPU ms": 1e3 * drag.cpu_seconds,
-            "iterations": drag.iterations,
-            "left mm": 1e3 * judged.error,
-            "deepest mm": 1e3 * judged.depth[1 : len(drag) + 1],
-            "between mm": 1e3 * judged.between,
-        },
-    )
+    columns = {
+        "ms": 1e3 * drag.seconds,
+        "CPU ms": 1e3 * drag.cpu_seconds,
+        "iterations": drag.iterations,
+        "left mm": 1e3 * judged.error,
+        "deepest mm": 1e3 * judged.depth[1 : len(drag) + 1],
+        "between mm": 1e3 * judged.between[: len(drag)],
+    }
     end = drag.end.assessment
     figures: dict[str, Figure] = {
-        "frames": len(drag),
         **_spent(1e3 * drag.seconds),
         "CPU mean ms": 1e3 * float(drag.cpu_seconds.mean()),
         "iterations": float(drag.iterations.mean()),
@@ -84,7 +80,7 @@ def drag_rows(task: str, drag: Dragged, judged: DragJudgement) -> tuple[Row, lis
         "jerk": _jerk(judged.jerk),
         "end": drag.end.status,
     }
-    return Row(task, drag.method, figures), frames
+    return _run(task, drag.method, figures, columns)
 
 
 def is_clean(drag: Row) -> bool:
@@ -94,29 +90,24 @@ def is_clean(drag: Row) -> bool:
 
 def loop_rows(scene: str, run: Recording, judged: Judgement) -> tuple[Row, list[Row]]:
     """A run of the frame loop and its frames; joints and iterations are counted as Schmidl and Lin count them."""
-    frames = frame_rows(
-        scene,
-        run.overlap,
-        {
-            "ms": 1e3 * run.seconds,
-            "CPU ms": 1e3 * run.cpu_seconds,
-            "queries ms": 1e3 * run.contact_seconds,
-            "IK ms": 1e3 * run.solve_seconds,
-            "iterations": run.iterations,
-            "joints": run.joints,
-            "pairs": run.pairs,
-            "tracked pairs": judged.tracked_pairs,
-            "deepest mm": 1e3 * judged.depth,
-            "tracked deepest mm": 1e3 * judged.tracked_depth,
-            "joints off rad": judged.distance,
-            "root off mm": 1e3 * judged.root_distance,
-            "note": run.notes,
-        },
-    )
+    columns = {
+        "ms": 1e3 * run.seconds,
+        "CPU ms": 1e3 * run.cpu_seconds,
+        "queries ms": 1e3 * run.contact_seconds,
+        "IK ms": 1e3 * run.solve_seconds,
+        "iterations": run.iterations,
+        "joints": run.joints,
+        "pairs": run.pairs,
+        "tracked pairs": judged.tracked_pairs,
+        "deepest mm": 1e3 * judged.depth,
+        "tracked deepest mm": 1e3 * judged.tracked_depth,
+        "joints off rad": judged.distance,
+        "root off mm": 1e3 * judged.root_distance,
+        "note": run.notes,
+    }
     late = [after for _, after in judged.returns]
     seconds = float(run.seconds.sum())
     figures: dict[str, Figure] = {
-        "frames": len(run),
         **_spent(1e3 * run.seconds),
         **_spent(1e3 * run.cpu_seconds, "CPU"),
         "joints": float(run.joints.mean()),
@@ -138,7 +129,7 @@ def loop_rows(scene: str, run: Recording, judged: Judgement) -> tuple[Row, list[
         "back after frames": "never" if -1 in late else max(late, default=0),
         "frames with a note": sum(map(bool, run.notes)),
     }
-    return Row(scene, run.overlap, figures), frames
+    return _run(scene, run.overlap, figures, columns)
 
 
 def is_held(run: Row) -> bool:
@@ -191,7 +182,6 @@ def world_rows(
     touching = np.array(pairs) > 0
     figures: dict[str, Figure] = {
         "bodies": len(frames[-1].placements),
-        "frames": len(frames),
         **_spent(spent),
         "with drawing mean ms": float((spent + drawn).mean()),
         "joints": float(np.mean(columns["joints"])),
@@ -205,7 +195,7 @@ def world_rows(
         "energy J, first": columns["energy J"][0],
         "last": columns["energy J"][-1],
     }
-    return Row(scene, overlap, figures), frame_rows(scene, overlap, columns)
+    return _run(scene, overlap, figures, columns)
 
 
 def world_report(rows: Sequence[Row], facts: Mapping[str, str]) -> str:

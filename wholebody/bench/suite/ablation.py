@@ -182,21 +182,17 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
     from wholebody.methods.qp import method as qp
     from wholebody.methods.qp import multistart, sqp
     from wholebody.methods.qp.feasibility import Feasibility
-    from wholebody.methods.qp.funnel import Funnel
-    from wholebody.methods.qp.multipliers import Multipliers
     from wholebody.methods.qp.working_set import WorkingSet
     from wholebody.terms import linearisation
 
-    search, descent = multistart.Search, sqp.SQP
+    search, descent = multistart.Multistart, sqp.SQP
     return {
-        "the funnel narrows": (Funnel, "narrow", lambda self, before, after: None),
-        "watchdog": (descent, "_promises", lambda self, here, there: False),
+        "watchdog": (descent, "_is_worth_watching", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
-        "Lagrangian in the judgement of steps": (Multipliers, "lagrangian", lambda self, measure, rows: measure),
+        "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),
         "supporting planes": (linearisation, "term_planes", lambda terms, counts, state: None),
         "second derivatives of contacts": (descent, "_bent", lambda self, here: here.at),
-        "stalled descents give up the measures": (sqp, "stalls", lambda history, tolerance: False),
         "warm start from the last active set": (WorkingSet, "hot", property(lambda self: False)),
         "seeds of arms": (qp, "from_seeds", lambda *given: None),
         "before contact": (multistart, "before_contact", lambda *given: iter(())),
@@ -204,11 +200,11 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
         "turning on to the other limit": (Feasibility, "_turned_on", lambda self, here, program, step, wrapped: None),
         "contradictions of goals": (multistart, "contradictions", lambda problem, workspace: ()),
         "hooked hands": (multistart, "hooked_hands", lambda problem, state, start: iter(())),
-        "leaving contacts that cancel": (search, "_leave_cancelling", lambda self: None),
-        "relaxed probes": (search, "_relaxed_probes", lambda self, starts: iter(())),
+        "leaving contacts that cancel": (multistart, "posture_apart", lambda problem, workspace, q: None),
+        "relaxed probes": (search, "_relaxed", lambda self, start: None),
         "test of out of reach": (search, "_known_out_of_reach", lambda self, q: False),
-        "closest posture to goals that are not met": (search, "_come_nearest", lambda self: None),
-        "closest posture among things": (search, "_near_best", lambda self: None),
+        "closest posture to goals that are not met": (search, "_find_closest", lambda self: None),
+        "closest posture among things": (search, "_closest_from_best", lambda self: None),
     }
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from wholebody.cli.bench.comparing import compare
-from wholebody.cli.bench.counts import ablation
 from wholebody.cli.bench.hard_cases import attack, stability
-from wholebody.cli.bench.measuring import motion, robots, scaling, solve, step, world
+from wholebody.cli.bench.measuring import ablation, motion, robots, scaling, solve, step, world
 from wholebody.cli.bench.published import export, judge
 from wholebody.cli.command import Group
 

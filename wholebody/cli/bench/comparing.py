@@ -67,19 +67,18 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.held_out:
         return _held_out(arguments)
     from rich.console import Console
-    from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
     from wholebody.base.batches import threads
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison
     from wholebody.bench.suite.compare.advice import advice
     from wholebody.bench.suite.compare.report import PAGE, publish
+    from wholebody.cli.tables import progress_bar
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
     console = Console()
-    columns = (TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn(), TextColumn("left"))
-    with Progress(*columns, TimeRemainingColumn(), console=console) as bar:
+    with progress_bar(counted=False) as bar:
         task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
 
         def tell(progress: comparison.Progress) -> None:
@@ -88,15 +87,9 @@ def compare(arguments: argparse.Namespace) -> int:
         store = comparison.run(settings, arguments.out, jobs, arguments.cluster, tell)
         where = f"the dask cluster {arguments.cluster}" if arguments.cluster else "this machine"
         given = publish(
-            settings,
-            store,
-            arguments.out,
-            _facts(f"{jobs} on {where}"),
-            missing(),
-            arguments.update_docs,
+            settings, store, arguments.out, _facts(f"{jobs} on {where}"), missing(), arguments.update_docs,
             lambda what: bar.update(task, description=f"making {what}"),
-        )
-        bar.update(task, completed=1.0, total=1.0, description="done")
+        )  # fmt: skip
     for sentence in advice(given.results, given.rows):
         console.print("- " + sentence.replace("**", "").replace("`", ""), highlight=False, markup=False)
     console.print(f"wrote {arguments.out / PAGE}", highlight=False, soft_wrap=True)

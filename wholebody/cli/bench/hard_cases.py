@@ -116,7 +116,7 @@ or no end within a minute. What ended before Ctrl-C is written.""",
 def attack(arguments: argparse.Namespace) -> int:
     """Attack; 1 where something was wrong."""
     from wholebody.bench.attack import report, running
-    from wholebody.bench.attack.report import Row
+    from wholebody.bench.rows import Row
 
     _check(arguments)
     earlier = [one for path in arguments.also for one in read_rows(path, Row)[1]]
@@ -125,24 +125,24 @@ def attack(arguments: argparse.Namespace) -> int:
     try:
         for case, verdict in running.attack(_cases(arguments), arguments.jobs, running.for_seconds(arguments.seconds)):
             rows.append(report.row(case, verdict))
-            if rows[-1].outcome == "wrong":
-                print(f"WRONG: {case.kind} {case.number}: {rows[-1].words}", flush=True)
+            if rows[-1]["outcome"] == "wrong":
+                print(f"WRONG: {case.kind} {case.number}: {rows[-1]['words']}", flush=True)
             elif len(rows) % 200 == 0:
-                print(f"{len(rows)} cases, {sum(one.outcome == 'wrong' for one in rows)} wrong", flush=True)
-            if rows[-1].outcome == "wrong" or rows[-1].slow:
+                print(f"{len(rows)} cases, {sum(one['outcome'] == 'wrong' for one in rows)} wrong", flush=True)
+            if rows[-1]["outcome"] == "wrong" or report.is_slow(rows[-1]):
                 report.keep(case, verdict, arguments.out)
     except KeyboardInterrupt:
         interrupted = True
     rows += earlier
     if not rows:
         raise InputError("no case ended; give more --seconds")
-    rows.sort(key=lambda one: (one.seed, one.number))
+    rows.sort(key=lambda one: (one["seed"], one["number"]))
     facts = machine()
     report.index(rows, arguments.out)
     publish(
         "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
     )
-    return 130 if interrupted else int(any(one.outcome == "wrong" for one in rows))  # exit code after Ctrl-C
+    return 130 if interrupted else int(any(one["outcome"] == "wrong" for one in rows))  # exit code after Ctrl-C
 
 
 def _check(arguments: argparse.Namespace) -> None:

@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world`, `robots`: what things cost and achieve."""
+"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world`, `robots`, `ablation`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -319,3 +319,22 @@ def robots(arguments: argparse.Namespace) -> None:
         told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
         print(f"{row.case}: {told}", flush=True)
     publish_page("robots.md", page(found, facts, reaches), arguments)
+
+
+@measuring(
+    "ablation",
+    "what each constant and mechanism of a method is worth, in counts",
+    "Change one constant or switch one mechanism off at a time, and count answers that differ.",
+    option("--method", default="qp", choices=("qp", "newton", "ccd"), help="(default: qp)"),
+    count("--count", None, "problems of every set (default: 6, 1 with --quick)"),
+)
+def ablation(arguments: argparse.Namespace) -> None:
+    """Measure and report."""
+    from wholebody.bench.suite import ablation
+
+    method, facts = arguments.method, machine()
+    given = ablation.problems(arguments.count or (1 if arguments.quick else 6), method)
+    whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
+    text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
+    name = f"ablation-{method}"
+    publish(name, text, arguments, facts=facts, tables={name: rows})

@@ -28,22 +28,22 @@ of how hard it is. The same sets, number and seed give the same files. They are 
 def export(arguments: argparse.Namespace) -> None:
     """Export."""
     from rich.console import Console
-    from rich.progress import Progress
 
     from wholebody.bench.suite.problem_sets.registry import CASES, SETS, problem_set
     from wholebody.bench.suite.published.export import export
+    from wholebody.cli.tables import progress_bar
 
     sets = [problem_set(name) for name in dict.fromkeys(arguments.sets or SETS)]
     per_set = arguments.per_set or CASES
     if arguments.seed < 0:
         raise InputError(f"--seed is {arguments.seed}; give 0 or more")
-    console = Console()
-    with Progress(console=console) as bar:
+    with progress_bar() as bar:
         task = bar.add_task("writing", total=per_set * len(sets))
         index = export(
             sets, per_set, arguments.seed, arguments.folder, lambda name: bar.update(task, advance=1, description=name)
         )
-    console.print(f"wrote {per_set * len(sets)} problems, listed in {index}", highlight=False, soft_wrap=True)
+    wrote = f"wrote {per_set * len(sets)} problems, listed in {index}"
+    Console().print(wrote, highlight=False, soft_wrap=True)
 
 
 @command(

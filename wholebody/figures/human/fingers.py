@@ -7,7 +7,7 @@ here the thumb's metacarpal moves too.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -104,6 +104,20 @@ def finger_angles(shape: str, side: str | None = None) -> dict[str, float]:
     return {
         f"{which}_{joint}": math.radians(angle) for which in sides for joint, angle in finger_degrees(degrees).items()
     }
+
+
+def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
+    """Angles of the joints of fingers from which hands take a bar by a power grip, radians; nothing without sides.
+
+    Fingers that bend at their roots first lay their first parts on the bar before it meets the palm. Of a hook the
+    roots are nearly straight. First the thumb is left out, then it is that of a fist, which lies over the fingers.
+    """
+    hook, fist = ({name: angle for side in sides for name, angle in finger_angles(shape, side).items()}
+                  for shape in ("hook", "fist"))  # fmt: skip
+    fingers = {name: angle for name, angle in hook.items() if "thumb" not in name}
+    if fingers:
+        yield fingers
+        yield fingers | {name: angle for name, angle in fist.items() if "thumb" in name}
 
 
 def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:

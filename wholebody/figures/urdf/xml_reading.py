@@ -16,10 +16,6 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
-MOST_BYTES = 64 * 2**20
-"""Largest file that is accepted as a description of a robot."""
-
-
 A_TURN = 2.0 * math.pi
 """Radians: roll, pitch and yaw beyond this were probably meant in degrees."""
 
@@ -37,7 +33,8 @@ def read_xml(path: Path, kind: str) -> Element:
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
     """
-    data = read_bytes(path, kind, MOST_BYTES)
+    # largest file that is accepted as a description of a robot.
+    data = read_bytes(path, kind, (64 * 2**20))
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:

@@ -25,8 +25,6 @@ if TYPE_CHECKING:
     from wholebody.geometry.continuous.swept_depth import Depths, SweptDepth
 
 
-ALLOWED_OVERLAP = 5e-4  # m: overlap that is allowed between two postures; half of the thinnest plate that counts
-HALVINGS = 3  # of a motion before doubtful pairs are swept
 OVERLAP = 2e-4  # m: overlap during a motion that is ignored; smaller than the width of any piece
 INSIDE = 1e-4  # m: overlap at the end of a motion that is ignored
 GRAZE = 5e-4  # m: a motion that gets deeper than this is blocked; held soles overlap a little between two postures
@@ -161,7 +159,8 @@ def passes_through(queries: Queries, before: QueryResult, after: QueryResult, q0
         return False
     moved = moved[~_passing_by(queries, before, after, q0, q1, moved)]
     doubtful = _not_separated(table, before, after, moved)
-    return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, HALVINGS)
+    # of a motion before doubtful pairs are swept
+    return bool(len(doubtful)) and _halved(queries, before, after, q0, q1, doubtful, 3)
 
 
 def _halved(
@@ -252,5 +251,6 @@ def _not_separated(table: PairTable, before: QueryResult, after: QueryResult, do
     """The pairs that no plane separates before and after."""
     if not len(doubtful):
         return doubtful
-    left: Indices = doubtful[~separated(table, before, after, doubtful, ALLOWED_OVERLAP)]
+    # m: overlap that is allowed between two postures; half of the thinnest plate that counts
+    left: Indices = doubtful[~separated(table, before, after, doubtful, 5e-4)]
     return left

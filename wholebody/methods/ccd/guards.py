@@ -1,23 +1,127 @@
 """Guards: joints that have left a reach cone or a range of motion are brought back, or else stay at their last values.
 
-Cones and ranges that share joints, those of a shoulder or of a leg, are kept together.
+Cones and ranges that share joints, those of a shoulder or of a leg, are kept together. The cones are those of
+`wholebody.figures.reach_cones`, the ranges those of `ranges`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
-from wholebody.methods.ccd.cones import cone_guards
-from wholebody.methods.ccd.limbs import Limbs
+from wholebody.figures.reach_cones import ReachCone
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, rotated
 from wholebody.methods.ccd.ranges import range_guards
+from wholebody.methods.ccd.sweep import Aims
 
-ROUNDS = 2  # over the parts of a guard: to bring a limb back into one may take it out of another
-HALVINGS = 20  # of the motion back to the last values inside, to a millionth of it
+Direction = tuple[float, float, float]
+
+
+class Kept(NamedTuple):
+    """What descents keep.
+
+    Attributes:
+        fixed: Pinocchio's indices of joints that must not move, not even to resolve overlap.
+        cones: names of the reach cones; None for all of the figure's.
+        ranges: names of the ranges of motion.
+    """
+
+    fixed: frozenset[int] = frozenset()
+    cones: tuple[str, ...] | None = None
+    ranges: tuple[str, ...] = ()
+
+
+NOTHING_FIXED = Kept()
+
+
+class Polygon:
+    """A reach cone on plain floats: the test of a direction, and the nearest direction inside."""
+
+    def __init__(self, cone: ReachCone) -> None:
+        """Copy the planes of the cone."""
+        following = np.roll(cone.vertices, -1, axis=0)
+        slices = np.cross(cone.visible, cone.vertices)
+        self._middle: Direction = _three(cone.visible)
+        self._wedges = [
+            (_three(slice_), _three(after), _three(edge))
+            for slice_, after, edge in zip(slices, np.roll(slices, -1, axis=0), cone.boundaries, strict=True)
+        ]
+        self._edges = [
+            (_three(normal), _three(start), _three(end), _three(np.cross(normal, start)), _three(np.cross(end, normal)))
+            for normal, start, end in zip(cone.boundaries, cone.vertices, following, strict=True)
+        ]
+
+    def contains(self, direction: Direction) -> bool:
+        """Whether a unit direction is inside: find the wedge that contains it, then test the wedge's edge."""
+        x, y, z = direction
+        for (a, b, c), (d, e, f), (g, h, i) in self._wedges:
+            if a * x + b * y + c * z >= 0.0 > d * x + e * y + f * z:
+                return g * x + h * y + i * z >= 0.0
+        g, h, i = self._wedges[0][2]
+        return g * x + h * y + i * z >= 0.0
+
+    def nearest(self, direction: Direction) -> Direction:
+        """The nearest direction inside to a unit direction outside, a little inside of the edge."""
+        x, y, z = direction
+        inward = 1e-6  # margin inside the cone, as a share of the distance to its middle; larger than rounding
+        best, found = -2.0, direction
+        for (a, b, c), start, end, (d, e, f), (g, h, i) in self._edges:
+            height = a * x + b * y + c * z
+            px, py, pz = x - height * a, y - height * b, z - height * c
+            length = (px * px + py * py + pz * pz) ** 0.5
+            within = d * px + e * py + f * pz >= 0.0 and g * px + h * py + i * pz >= 0.0
+            candidates: Sequence[Direction] = (start, end)
+            if within and length > inward:
+                candidates = ((px / length, py / length, pz / length),)
+            for candidate in candidates:
+                cosine = candidate[0] * x + candidate[1] * y + candidate[2] * z
+                if cosine > best:
+                    best, found = cosine, candidate
+        mx, my, mz = self._middle
+        px, py, pz = found[0] + inward * mx, found[1] + inward * my, found[2] + inward * mz
+        length = (px * px + py * py + pz * pz) ** 0.5
+        return px / length, py / length, pz / length
+
+
+class ConeGuard:
+    """Keeps one limb in its cone while the nodes of some limbs move.
+
+    A limb that has left its cone is projected to the nearest direction inside (Wilhelms and Van Gelder 2001): the
+    joints of the ball joint turn, each to its best, until the limb points there.
+
+    Attributes:
+        nodes: the nodes that turn the limb in its cone; none if these limbs do not turn it.
+    """
+
+    def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
+        """Find the nodes between the cone's reference frame and the limb."""
+        cone = figure.cones[name]
+        self._polygon, self._axis, self._limbs = Polygon(cone.cone), np.asarray(cone.axis, dtype=float), limbs
+        self._limb, self._base = (CarriedFrame(limbs, figure.frame_id(frame)) for frame in (cone.limb, cone.reference))
+        self.nodes = limbs.between(self._base.node, self._limb.node)
+
+    def holds(self, data: Any) -> bool:
+        """Whether the limb is in its cone at the joint placements of Pinocchio's data."""
+        return self._polygon.contains(_three((self._limb.rotation(data) @ self._axis) @ self._base.rotation(data)))
+
+    def read(self, q: Array, data: Any) -> None:
+        """Read what the limbs do not move from `data` at the posture q (nq,); call `limbs.read` first."""
+        self._limb.read(data)
+        self._base.read(data)
+
+    def inside(self) -> bool:
+        """Whether the limb is in its cone, after `limbs.forward`."""
+        return self._polygon.contains(self._base.seen(*self._limb.direction(*self._axis)))
+
+    def turn_back(self) -> None:
+        """Turn the joints of the limb to the nearest direction of its cone, and call `limbs.forward`."""
+        nearest = self._polygon.nearest(self._base.seen(*self._limb.direction(*self._axis)))
+        target, local = self._base.direction(*nearest), rotated(self._limb.placement, *self._axis)
+        Aims(self._limbs, [self._limb.node], [local], [target], [False]).sweep_until(self.nodes, self.inside)
 
 
 class Part(Protocol):
@@ -64,7 +168,7 @@ class Guard:
         """
         if self._remember():
             return True
-        for _ in range(ROUNDS):
+        for _ in range(2):  # to bring a limb back into one may take it out of another
             for part in self.parts:
                 if not part.inside():
                     part.turn_back()
@@ -87,7 +191,7 @@ class Guard:
         """Move from the last values inside as far towards the present ones as all parts allow."""
         wanted = self._limbs.values[self._rows]
         inside, outside = 0.0, 1.0
-        for _ in range(HALVINGS):
+        for _ in range(20):  # to a millionth of the motion
             middle = 0.5 * (inside + outside)
             self._blend(last, wanted, middle)
             if self._inside():
@@ -101,11 +205,22 @@ class Guard:
         self._limbs.forward()
 
 
-def guards(figure: Figure, limbs: Limbs, cones: Sequence[str] | None = None, ranges: Sequence[str] = ()) -> list[Guard]:
-    """Guards of the cones and ranges that these limbs can leave; `cones` None for all cones of the figure."""
+def guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[Guard]:
+    """Guards of the kept cones and ranges that these limbs can leave."""
     groups: list[list[Part]] = []
-    for part in (*cone_guards(figure, limbs, cones), *range_guards(figure, limbs, ranges)):
+    for part in (*cone_guards(figure, limbs, kept), *range_guards(figure, limbs, kept.ranges)):
         sharing = [group for group in groups if any(set(part.nodes) & set(other.nodes) for other in group)]
         groups = [group for group in groups if group not in sharing]
         groups.append([*(other for group in sharing for other in group), part])
     return [Guard(limbs, group) for group in groups]
+
+
+def cone_guards(figure: Figure, limbs: Limbs, kept: Kept) -> list[ConeGuard]:
+    """The kept cones that these limbs can leave."""
+    made = [ConeGuard(figure, limbs, name) for name in (figure.cones if kept.cones is None else kept.cones)]
+    return [guard for guard in made if guard.nodes]
+
+
+def _three(vector: Any) -> Direction:
+    x, y, z = vector.tolist()
+    return x, y, z

@@ -7,7 +7,8 @@ nodes and does not move is a part of the later node's placement.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Hashable, Iterable
 from functools import lru_cache
 from math import atan2, cos, inf, sin
 from typing import Any
@@ -15,15 +16,17 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base.arrays import Array
-from wholebody.methods.ccd import limbs_kernel
-from wholebody.methods.ccd.limbs_kernel import OBLIQUE, SLIDE, X, Y, Z
+from wholebody.base.arrays import Array, Indices
+from wholebody.base.compiled import compiled
 
 Placement = tuple[float, ...]
 """Twelve floats: the rotation row by row, then the translation."""
 
 WORLD: Placement = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
 SAME = 1e-12  # an axis or a rotation nearer than this to a simple one is replaced by the simple one
+
+X, Y, Z, OBLIQUE, SLIDE = range(5)
+"""What a joint does: turn about an axis of its own frame (either way round), about any other, or slide."""
 
 
 class Limbs:
@@ -38,10 +41,11 @@ class Limbs:
         lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
         parents: (n,) parent node of each; -1 is the world.
         places: (n, 12) placement of each in its parent's frame before it moves, as in `frames`.
-        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE of `limbs_kernel`.
+        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE.
         signs: (n,) -1 where a joint turns about the negative axis.
         axes: (n, 3) unit axis in the joint's own frame.
         paths: for each node, the nodes that move it, including itself, from the tip inwards.
+        plans: of sweeps, by what is carried and which nodes move.
     """
 
     def __init__(self, model: pin.Model, joints: Iterable[int]) -> None:
@@ -60,6 +64,7 @@ class Limbs:
         self.frames, self.lines = np.tile(np.array(WORLD), (count + 1, 1)), np.zeros((count, 6))
         self.parents = np.array([self.carrier(model.parents[joint]) for joint in self.joints], dtype=np.intp)
         self.paths: list[tuple[int, ...]] = []
+        self.plans: dict[Hashable, Any] = {}
         for node, parent in enumerate(self.parents.tolist()):
             self.paths.append((node, *self.paths[parent]) if parent >= 0 else (node,))
         kinds = [_kind(model.joints[joint]) for joint in self.joints]
@@ -164,16 +169,10 @@ class CarriedFrame:
 
 @lru_cache(maxsize=1)
 def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or loaded from the cache; called before a solve, not during it."""
+    """This module, after its loop is compiled or loaded from the cache; called before a solve, not during it."""
     none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
-    three, six, twelve = np.zeros((0, 3)), np.zeros((0, 6)), np.zeros((0, 12))
-    limbs_kernel.forward(places, twelve, places, none, three, none, twelve, six)
-    limbs_kernel.sweep(six, places, none, none, none, three, three, none, places, places, places, places)
-    limbs_kernel.distance(three, three, none)
-    points = np.zeros(0, dtype=bool)
-    limbs_kernel.carry(twelve, places, three, points, three)
-    limbs_kernel.greatest_error(three, three, points)
-    return limbs_kernel
+    forward(places, np.zeros((0, 12)), places, none, np.zeros((0, 3)), none, np.zeros((0, 12)), np.zeros((0, 6)))
+    return sys.modules[__name__]
 
 
 def movable(model: pin.Model, joint: int) -> bool:
@@ -225,3 +224,72 @@ def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:
         if abs(value) > 1.0 - SAME:
             return kind, 1.0 if value > 0.0 else -1.0, (x, y, z)
     return OBLIQUE, 1.0, (x, y, z)
+
+
+@compiled()
+def forward(
+    parents: Indices,
+    places: Array,
+    kinds: Indices,
+    signs: Array,
+    axes: Array,
+    values: Array,
+    frames: Array,
+    lines: Array,
+) -> None:
+    """Compute frames and lines from values.
+
+    Args:
+        parents: (n,) node that each hangs on; -1 is the world.
+        places: (n, 12) rotation from the parent, row by row, and translation.
+        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE.
+        signs: (n,) -1 where the joint turns about the negative axis.
+        axes: (n, 3) unit axis in the joint's own frame.
+        values: (n,) radians or metres.
+        frames: (n + 1, 12) written: placements, the last being the world.
+        lines: (n, 6) written: unit axis and origin of each node.
+    """
+    for k in range(len(parents)):
+        base, place, frame, line = frames[parents[k]], places[k], frames[k], lines[k]
+        for row in range(3):
+            a, b, c = base[3 * row], base[3 * row + 1], base[3 * row + 2]
+            for column in range(3):
+                frame[3 * row + column] = a * place[column] + b * place[3 + column] + c * place[6 + column]
+            frame[9 + row] = base[9 + row] + (a * place[9] + b * place[10] + c * place[11])
+        kind, value = kinds[k], signs[k] * values[k]
+        if kind < OBLIQUE:
+            co, si = cos(value), sin(value)
+            after, before = (kind + 1) % 3, (kind + 2) % 3  # the axes that turn, in the order of a right-handed turn
+            for row in range(3):
+                line[row] = signs[k] * frame[3 * row + kind]
+                one, other = frame[3 * row + after], frame[3 * row + before]
+                frame[3 * row + after] = co * one + si * other
+                frame[3 * row + before] = co * other - si * one
+        else:
+            for row in range(3):
+                line[row] = 0.0
+                for column in range(3):
+                    line[row] += frame[3 * row + column] * axes[k, column]
+            if kind == SLIDE:
+                for row in range(3):
+                    frame[9 + row] += value * line[row]
+            else:
+                co, si = cos(value), sin(value)
+                for column in range(3):
+                    x, y, z = frame[column], frame[3 + column], frame[6 + column]
+                    x, y, z = turned(line, co, si, x, y, z)
+                    frame[column], frame[3 + column], frame[6 + column] = x, y, z
+        for row in range(3):
+            line[3 + row] = frame[9 + row]
+
+
+@compiled(inner=True)
+def turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A vector turned about a line's unit axis (Rodrigues)."""
+    ux, uy, uz = line[0], line[1], line[2]
+    along = (1.0 - co) * (ux * x + uy * y + uz * z)
+    return (
+        co * x + si * (uy * z - uz * y) + along * ux,
+        co * y + si * (uz * x - ux * z) + along * uy,
+        co * z + si * (ux * y - uy * x) + along * uz,
+    )

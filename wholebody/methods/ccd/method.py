@@ -15,9 +15,8 @@ from wholebody.base.checks import posture
 from wholebody.base.fields import Checked
 from wholebody.geometry.continuous.passing_through import last_free
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.ccd.overlap_resolution.frames import PERTURBATIONS
-from wholebody.methods.ccd.overlap_resolution.resolver import TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.reaching import Reach
+from wholebody.methods.ccd.resolver import PERTURBATIONS, TOLERANCE, OverlapResolver
 from wholebody.methods.ccd.terms import Request, read
 from wholebody.methods.conclusion import Ending
 from wholebody.methods.contradictions import NEAREST, Contradiction, contradictions, least_left
@@ -29,10 +28,6 @@ from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 
-DISTURBANCES = (0.0, 0.05, 0.2, 0.6)  # rad: of the first starts, from the present posture; later ones begin anywhere
-ROUNDS = 6  # alternations of reaching and overlap resolution, from one start
-ON_THE_WAY = 1e-3  # m, rad: tolerance of the goals in frames of a motion before its end
-HALVINGS = 12  # of the motion back to the start, to a 4000th of it
 SHARE = 0.5  # of the tolerance, to which goals are met and overlap is removed, so that the assessment agrees
 
 
@@ -75,7 +70,7 @@ class CCD(Checked, Descends):
             ends after four seconds of processor time.
     """
 
-    on_the_way = ON_THE_WAY
+    on_the_way = 1e-3  # m, rad
     tolerance: Annotated[float, CCD_TOLERANCE] = 1e-4
     iterations: Iterations = 400
     restarts: Restarts = 12
@@ -149,11 +144,11 @@ class _Shared:
 
     def ready(self, request: Request, control: Control) -> tuple[Reach, OverlapResolver]:
         """Both, made anew if the request moves or keeps something else than the last one."""
-        key = (request.joints, request.fixed, request.cones, request.ranges)
+        key = (request.joints, request.kept)
         if key != self._key:
-            self._key, kept = key, (request.fixed, request.cones, request.ranges)
+            self._key = key
             self._reach = Reach(self._scene.figure, request, control)
-            self._resolver = OverlapResolver(self._scene, self.workspace, None, *kept)
+            self._resolver = OverlapResolver(self._scene, self.workspace, request.kept)
         self._reach.begin(request, control)
         return self._reach, self._resolver
 
@@ -197,7 +192,8 @@ class _Search:
         for attempt in range(1, 1 + self._method.restarts):
             if self._ends(best) or self._cannot_gain(best):
                 break
-            size = DISTURBANCES[attempt] if attempt < len(DISTURBANCES) else inf
+            near = (0.0, 0.05, 0.2, 0.6)  # rad: from the present posture; later starts are anywhere
+            size = near[attempt] if attempt < len(near) else inf
             trial = self._attempt(self._reach.disturbed(start, size, self._rng), free, "restart")
             if trial.better(best, self._tolerance):
                 best = trial
@@ -231,7 +227,7 @@ class _Search:
     def _attempt(self, q: Array, free: Array | None, note: str) -> _Trial:
         """Reach and resolve overlap in alternation, until goals and clearances are met, or neither step gains."""
         best: _Trial | None = None
-        for turn in range(ROUNDS):
+        for turn in range(6):
             before = q
             q, reached = self._reach.run(q, SHARE * self._method.tolerance, self._method.iterations)
             self.sweeps += reached.sweeps
@@ -241,7 +237,7 @@ class _Search:
                 q, left = self._resolver.resolve(q, self._rng)
                 trial = _Trial(q, self._resolver.deepest, self._error(q), reached.converged)
             if left and free is not None:
-                back = last_free(self._problem.scene.model, free, q, self._resolver.query, HALVINGS)
+                back = last_free(self._problem.scene.model, free, q, self._resolver.query, 12)  # halvings: to a 4000th
                 self._resolver.query(back)
                 trial = _Trial(back, self._resolver.deepest, self._error(back), True)
             step = float(np.abs(pin.difference(self._problem.scene.model, before, q)).max(initial=0.0))

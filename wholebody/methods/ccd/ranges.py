@@ -15,11 +15,10 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, floats, seen_from
-from wholebody.methods.ccd.sweep import Aims, sweep
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, floats, rotated, seen_from
+from wholebody.methods.ccd.sweep import Aims
 
 INWARD = 1e-9  # margin inside a range, as a share of an ellipse and in radians of a twist; larger than rounding
-SWEEPS = 12  # over the joints that turn a limb: more than two are needed only where one of them is at its limit
 ROUNDING = 1e-12  # rad
 AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -153,17 +152,11 @@ class TwistGuard:
 
     def turn_back(self) -> None:
         """Turn the limb about its long axis, whose direction decides the bound, and call `limbs.forward`."""
-        limbs, limb = self._limbs, self._limb
+        limb = self._limb
         back = pin.exp3(np.array([0.0, 0.0, -self._part.sign * (self._excess() + INWARD)]))
         targets = [limb.direction(*column) for column in back.T.tolist()]
-        for _ in range(SWEEPS):
-            aims = Aims()
-            for axis, target in zip(AXES, targets, strict=True):
-                aims.add(limb.node, limb.direction(*axis), target, direction=True)
-            sweep(limbs, aims, aims.plan(limbs, self.nodes))
-            limbs.forward()
-            if self.inside():
-                return
+        local = [rotated(limb.placement, *axis) for axis in AXES]
+        Aims(self._limbs, [limb.node] * 3, local, targets, [False] * 3).sweep_until(self.nodes, self.inside)
 
     def _excess(self) -> float:
         """The twist beyond its bound, radians; negative inside."""

@@ -12,16 +12,10 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.methods.ccd.guards import guards
-from wholebody.methods.ccd.limbs import Limbs, Placement, compiled_kernel, floats, moved, rotated
-from wholebody.methods.ccd.sweep import Aims, sweep
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, moved, rotated
+from wholebody.methods.ccd.sweep import Aims
 from wholebody.methods.ccd.terms import GoalPlace, Request
 from wholebody.methods.control import Control
-
-LEVER = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
-NOWHERE = (0.0, 0.0, 0.0)
-AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-WINDOW = 25  # sweeps over which progress is judged: near a goal convergence is linear, and sometimes slow
-PROGRESS = 0.97  # the descent ends if a window leaves more than this share of the error
 
 
 class Reached(NamedTuple):
@@ -32,46 +26,25 @@ class Reached(NamedTuple):
     converged: bool
 
 
-class _Goals:
-    """The points and axes of all goals with their targets, each in the frame of the node that carries it.
+def _aims(limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> Aims:
+    """The points and axes of all goals with their targets, where `data` has the joints that these limbs do not move.
 
     A goal's place comes first, then its three axes. Places have the weight of their goal, axes half of it: the squared
     distances of three axes from themselves turned by a small angle add up to twice its square.
-
-    Attributes:
-        aims: as sweeps take them.
     """
-
-    def __init__(self, model: Any, limbs: Limbs, data: Any, goals: Sequence[GoalPlace]) -> None:
-        """Take the goals, with joints that these limbs do not move where `data` has them."""
-        self.aims, self._frames, self._kernel = Aims(), limbs.frames, compiled_kernel()
-        nodes, local = [], []
-        for goal in goals:
-            frame = model.frames[goal.frame]
-            joint = int(frame.parentJoint)
-            node, placed = limbs.carrier(joint), data.oMi[joint] * frame.placement
-            at = data.oMi[limbs.joints[node]].actInv(placed) if node >= 0 else pin.SE3.Identity()
-            stand: Placement = floats(at)
-            if goal.place is not None:
-                nodes.append(node)
-                local.append(moved(stand, *goal.offset))
-                self.aims.add(node, NOWHERE, goal.place, weight=goal.weight)
-            if goal.rotation is not None:
-                for axis, wanted in zip(AXES, goal.rotation.T, strict=True):
-                    nodes.append(node)
-                    local.append(rotated(stand, *axis))
-                    self.aims.add(node, NOWHERE, wanted, weight=0.5 * LEVER * LEVER * goal.weight, direction=True)
-        self._nodes, self._local = np.array(nodes, dtype=np.intp), np.array(local, dtype=float).reshape(-1, 3)
-        self._points = self.aims.points
-
-    def carry(self) -> None:
-        """Update the present values."""
-        self._kernel.carry(self._frames, self._nodes, self._local, self._points, self.aims.here)
-
-    @property
-    def error(self) -> float:
-        """Largest remaining distance or angle."""
-        return float(self._kernel.greatest_error(self.aims.here, self.aims.there, self._points))
+    lever = 0.3  # m per radian: weight of orientation against position; about the length of a forearm
+    rows: list[tuple[int, Any, Any, bool, float]] = []
+    for goal in goals:
+        carried = CarriedFrame(limbs, goal.frame)
+        carried.read(data)
+        if goal.place is not None:
+            rows.append((carried.node, moved(carried.placement, *goal.offset), goal.place, True, goal.weight))
+        if goal.rotation is not None:
+            for axis, wanted in zip(np.eye(3).tolist(), goal.rotation.T, strict=True):
+                weight = 0.5 * lever * lever * goal.weight
+                rows.append((carried.node, rotated(carried.placement, *axis), wanted, False, weight))
+    nodes, local, there, points, weights = zip(*rows, strict=True) if rows else ((), (), (), (), ())
+    return Aims(limbs, nodes, local, there, points, weights)
 
 
 class Reach:
@@ -82,11 +55,11 @@ class Reach:
         self._model = figure.model
         self.begin(request, control)
         self.limbs = Limbs(figure.model, request.joints)
-        self._guards = guards(figure, self.limbs, request.cones, request.ranges)
+        self._guards = guards(figure, self.limbs, request.kept)
         self._data = figure.model.createData()
 
     def begin(self, request: Request, control: Control) -> None:
-        """Begin a run for the goals of a request with the same joints, cones and ranges."""
+        """Begin a run for the goals of a request that moves and keeps the same joints."""
         self._goals, self._control = request.goals, control
 
     def run(self, q: Array, tolerance: float, most: int) -> tuple[Array, Reached]:
@@ -99,24 +72,22 @@ class Reach:
         for guard in self._guards:
             guard.read(q, self._data)
             guard.keep()
-        goals = _Goals(self._model, limbs, self._data, self._goals)
-        goals.carry()
-        aims = goals.aims
-        steps = aims.plan(limbs)
-        error, last = goals.error, inf
-        sweeps, converged = 0, not len(steps.nodes)
+        aims = _aims(limbs, self._data, self._goals)
+        plan = aims.plan()
+        error, last = aims.error, inf
+        sweeps, converged = 0, not len(plan.nodes)
         while error > tolerance and sweeps < most and not converged and not self._control.over:
-            if sweeps % WINDOW == 0:
-                converged = error > PROGRESS * last
+            if sweeps % 25 == 0:  # near a goal convergence is linear, and sometimes slow
+                converged = error > 0.97 * last
                 last = error
                 if converged:
                     break
-            change = sweep(limbs, aims, steps)
+            change = aims.sweep(plan)
             limbs.forward()
             for guard in self._guards:
                 guard.keep()
-            goals.carry()
-            error = goals.error
+            aims.carry()
+            error = aims.error
             sweeps += 1
             converged = change < 1e-9
         limbs.write(q)

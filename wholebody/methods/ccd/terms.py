@@ -12,6 +12,7 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.state import State, joint_support
 from wholebody.geometry.placement import placement
 from wholebody.methods.base import UnsupportedTermError
+from wholebody.methods.ccd.guards import Kept
 from wholebody.methods.ccd.limbs import movable
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
@@ -20,8 +21,6 @@ from wholebody.tasks.hold import Hold
 from wholebody.tasks.inputs import target_rotation
 from wholebody.tasks.point import Point
 from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
-
-HELD = 1e-6  # m, rad: a hold that is met to this at the start is kept by joints that do not move
 
 
 @dataclass(frozen=True)
@@ -50,16 +49,12 @@ class Request:
     Attributes:
         goals: the goals.
         joints: Pinocchio's indices of the joints that move for the goals.
-        fixed: joints that must not move, not even to resolve overlap.
-        cones: names of the reach cones to keep.
-        ranges: names of the ranges of motion to keep.
+        kept: what must not move, cones and ranges.
     """
 
     goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
-    fixed: frozenset[int]
-    cones: tuple[str, ...]
-    ranges: tuple[str, ...]
+    kept: Kept
 
 
 def read(problem: Problem, state: State | None = None) -> Request:
@@ -74,7 +69,7 @@ def read(problem: Problem, state: State | None = None) -> Request:
     reader.others()
     if reader.refused:
         raise UnsupportedTermError("ccd", reader.refused)
-    return Request(goals, tuple(sorted(reader.joints)), frozenset(reader.fixed), cones, ranges)
+    return Request(goals, tuple(sorted(reader.joints)), Kept(frozenset(reader.fixed), cones, ranges))
 
 
 class _Reader:
@@ -136,7 +131,7 @@ class _Reader:
             carried = carried - support[_joint(self._figure, term.relative_to)]
         if carried[_dofs(self._figure, self.joints)].any():
             self.refused.append(f"{where}, which the joints that reach move too")
-        elif np.abs(term.value(self._state.update(self._problem.start))).max() > HELD:
+        elif np.abs(term.value(self._state.update(self._problem.start))).max() > 1e-6:  # m, rad
             self.refused.append(f"{where}, which is elsewhere at the start")
         self.fixed |= {int(joint) for joint in range(1, model.njoints) if _moves(self._figure, joint, carried)}
 

@@ -17,13 +17,6 @@ import numpy as np
 from wholebody.base.arrays import Array
 
 FREE = 1e12  # diagonal of an inactive inequality: it is in the pattern, but has no effect
-RELEASE = 1e-12  # an active inequality with a multiplier below minus this is released; larger = held longer
-CROSSED = 1e-9  # m or rad: predicted values below minus this make an inequality active
-TOGETHER = 0.01  # of a step: inequalities that become zero at most this much after the first become active with it
-STAYS = 1e-2  # m or rad: an active inequality whose value is larger than this is released
-FRACTION = 0.95  # of the distance to the boundary that a barrier step may move; larger = faster, nearer to it
-LEAST_BARRIER = 1e-11  # m: product of slack and multiplier at which the barrier method ends
-BARRIER_FALL = 0.15  # factor of the barrier from step to step; smaller = fewer steps, less centred
 Kind = Literal["slack", "barrier"]
 KINDS = ("slack", "barrier")
 
@@ -84,17 +77,17 @@ class SquaredSlacks:
     def correct(self, predicted: Array, multiplier: Array) -> tuple[float, bool]:
         """Set slacks to zero, or release them."""
         active = self.slack == 0.0
-        crossing = ~active & (predicted < -CROSSED)
+        crossing = ~active & (predicted < -1e-9)  # m or rad
         if crossing.any():
             way = np.full(len(active), np.inf)
             at = np.maximum(self._at[crossing], 0.0)
             way[crossing] = at / np.maximum(at - predicted[crossing], 1e-300)
             first = float(way.min())
-            self.slack[way <= first + TOGETHER] = 0.0
+            self.slack[way <= first + 0.01] = 0.0  # those that become zero soon after the first become active with it
             self._at = self._at + first * (predicted - self._at)
             return first, True
         self._at = predicted
-        leave = np.flatnonzero(active & (multiplier < -RELEASE))
+        leave = np.flatnonzero(active & (multiplier < -1e-12))
         if not len(leave):
             return 1.0, False
         if not self._releases_all:
@@ -110,7 +103,7 @@ class SquaredSlacks:
 
     def accept(self, share: float, phi: Array) -> None:
         """Slacks away from zero follow their values."""
-        active = (self.slack == 0.0) & (phi < STAYS)
+        active = (self.slack == 0.0) & (phi < 1e-2)  # m or rad: one that is farther is released
         self.slack = np.where(active, 0.0, np.sqrt(np.maximum(phi, 0.0)))
 
     def finished(self) -> bool:
@@ -144,21 +137,23 @@ class LogBarrier:
 
     def share(self) -> float:
         """As far as slacks stay positive."""
-        falling = self._slack_step < 0.0
-        ways = -FRACTION * self.slack[falling] / self._slack_step[falling]
-        return float(min(1.0, ways.min(initial=1.0)))
+        return _to_boundary(self.slack, self._slack_step)
 
     def accept(self, share: float, phi: Array) -> None:
         """Move slacks and multipliers, and lower the barrier."""
-        falling = self._multiplier_step < 0.0
-        ways = -FRACTION * self.multiplier[falling] / self._multiplier_step[falling]
         self.slack = self.slack + share * self._slack_step
-        self.multiplier = self.multiplier + min(1.0, ways.min(initial=1.0)) * self._multiplier_step
-        self.barrier = max(BARRIER_FALL * self.barrier, 0.1 * LEAST_BARRIER)
+        self.multiplier = self.multiplier + _to_boundary(self.multiplier, self._multiplier_step) * self._multiplier_step
+        self.barrier = max(0.15 * self.barrier, 1e-12)  # a faster fall takes fewer steps, which are less centred
 
     def finished(self) -> bool:
-        """Whether the barrier is below `LEAST_BARRIER`."""
-        return len(self.slack) == 0 or float((self.slack * self.multiplier).max()) <= 10.0 * LEAST_BARRIER
+        """Whether all products of slack and multiplier are small [m]."""
+        return len(self.slack) == 0 or float((self.slack * self.multiplier).max()) <= 1e-10
+
+
+def _to_boundary(values: Array, step: Array) -> float:
+    """Share of a step (k,) that keeps positive values (k,) positive: at most 0.95 of the way to the boundary."""
+    falling = step < 0.0
+    return float(min(1.0, (-0.95 * values[falling] / step[falling]).min(initial=1.0)))
 
 
 def inequalities(kind: Kind, phi: Array) -> Inequalities:

@@ -135,7 +135,7 @@ class Iteration:
                 return
             active.control.tell(TraceEntry(self.goal, self.hard, 0.0, 0.0))
             before = self._norms(self.residual)
-            far = self.goal > self.goal_tolerance and before[0] > STEPS.restore_above * trust.funnel
+            far = self.goal > self.goal_tolerance and before[0] > trust.funnel
             restore = not goals or far
             step = self._trusted_step(trust, before[0], restore, goals, measures)
             length = self.length(step)

@@ -18,16 +18,8 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.newton.linear_algebra import LinearSystem, QuasiDefinite, SingularSystemError
+from wholebody.methods.newton.settings import STEPS
 from wholebody.methods.newton.system import System
-
-DAMPING = 1e-10  # redundant equations are tolerated at this loss of accuracy
-HALVINGS = 12  # of a step that is not accepted
-BACK = 8  # most Newton steps back to the equations after a step along them
-ROUNDING = 1e-12  # relative difference of squared distances that is rounding
-FIRST_CONVEXITY = 1e-2  # share of D that is added if the second derivatives are not convex along the equations
-MORE, LESS = 4.0, 0.3  # factors on it until they are, and from one step to the next
-MOST_CONVEXITY = 1e6
-DECREASE = 1e-4  # least share of the predicted decrease of a step (Armijo)
 
 
 class Projection(NamedTuple):
@@ -63,7 +55,7 @@ def project(
         tolerance: of every equation of the KKT system.
         iterations: most iterations.
     """
-    damping = np.full(system.pattern.height, DAMPING)
+    damping = np.full(system.pattern.height, STEPS.hard_damping)
     y = np.zeros(system.pattern.height)
     residual, values = system.residual(x), system.values(x)
     errors: list[float] = []
@@ -78,20 +70,20 @@ def project(
         try:
             second = -system.curvature(x, y)[2]
             step, multiplier = algebra.solve(task, second)
-            convexity = max(FIRST_CONVEXITY, LESS * convexity) if not algebra.convex() else 0.0
-            while convexity and convexity < MOST_CONVEXITY:  # far from the answer: more of D, until it is convex
+            convexity = max(1e-2, 0.3 * convexity) if not algebra.convex() else 0.0
+            while convexity and convexity < 1e6:  # far from the answer: more of D, until it is convex
                 raised = with_values(task, weight=(1.0 + convexity) * system.weight)
                 step, multiplier = algebra.solve(raised, second)
                 if algebra.convex():
                     break
-                convexity *= MORE
+                convexity *= 4.0
         except SingularSystemError:
             break
         here, slope_along = _distance(system, x, anchor), float(gradient @ step)
-        for halving in range(HALVINGS):
+        for halving in range(12):
             length = 0.5**halving
             trial, found = _brought_back(system, algebra, task, x + length * step, 0.1 * tolerance)
-            most = here * (1.0 + ROUNDING) + DECREASE * length * slope_along
+            most = here * (1.0 + 1e-12) + 1e-4 * length * slope_along  # rounding, and Armijo's decrease
             good = np.abs(found).max(initial=0.0) <= tolerance
             if good and _distance(system, trial, anchor) <= most:
                 break
@@ -106,7 +98,7 @@ def _brought_back(
 ) -> tuple[Array, Array]:
     """The variables (7 n,) moved by Newton steps until the equations hold, and their residual there."""
     residual = system.residual(x)
-    for _ in range(BACK):
+    for _ in range(8):
         if not np.isfinite(residual).all() or np.abs(residual).max(initial=0.0) <= tolerance:
             break
         back = with_values(task, values=system.values(x), gradient=np.zeros(len(x)), residual=residual)

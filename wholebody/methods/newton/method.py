@@ -5,14 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from wholebody.base.checks import known
-from wholebody.base.fields import Checked
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.control import Control, Progress
-from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
+from wholebody.methods.inputs import check_problem
 from wholebody.methods.newton.figure_system import FigureSystem
-from wholebody.methods.newton.inequalities import Kind
-from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.multistart import Search, Settings
 from wholebody.methods.newton.terms import state_equations
 from wholebody.methods.newton.tracking import NewtonTracker
@@ -21,7 +17,7 @@ from wholebody.solution import Solution
 
 
 @dataclass(frozen=True)
-class Newton(Checked):
+class Newton(Settings):
     """Newton's method in full coordinates (Choi and Cremer 1999), for trees and closed loops alike.
 
     Every body has seven variables, every joint is an equation, and each step is the least motion that satisfies all of
@@ -42,24 +38,6 @@ class Newton(Checked):
         time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, it
             ends after four seconds of processor time.
     """
-
-    tolerance: Tolerance = 1e-5
-    iterations: Iterations = 200
-    algebra: str = "auto"
-    inequalities: Kind = "slack"
-    restarts: Restarts = 6
-    seed: Seed = 0
-    time_limit: TimeLimit = None
-
-    def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-            UnknownNameError: no such linear algebra.
-        """
-        super().__post_init__()
-        known(self.algebra, NAMES, "linear algebra")
 
     @property
     def name(self) -> str:
@@ -91,7 +69,7 @@ class Newton(Checked):
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
             active_system = FigureSystem(problem, workspace, self.algebra)
             active_system.control = control
-            search = Search(active_system, self.settings)
+            search = Search(active_system, self)
             found = search.everywhere(problem.scene.figure.clamp(problem.start))
             return search.solution(found, began)
 
@@ -106,9 +84,4 @@ class Newton(Checked):
             InputError: the problem has a term that this method has no equations for, dt is not a positive finite
                 number, or the scene changed after the problem was made.
         """
-        return NewtonTracker(problem, self.algebra, self.settings, dt, self)
-
-    @property
-    def settings(self) -> Settings:
-        """The settings of a search."""
-        return Settings(self.tolerance, self.iterations, self.restarts, self.seed, self.inequalities)
+        return NewtonTracker(problem, self, dt, self.solve)

@@ -6,32 +6,50 @@ Counts of iterations bound it, not seconds, so that the answer does not depend o
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from wholebody.assessment.posture import Assessment, assess
 from wholebody.base.arrays import Array
+from wholebody.base.checks import known
+from wholebody.base.fields import Checked
 from wholebody.base.records import with_values
 from wholebody.methods.conclusion import Ending, assessed_tolerance, concluded, meets
 from wholebody.methods.contradictions import Contradiction, contradictions, least_left
+from wholebody.methods.inputs import Iterations, Restarts, Seed, TimeLimit, Tolerance
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
 from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import Kind
+from wholebody.methods.newton.linear_algebra import NAMES
 from wholebody.methods.newton.measures import refine
 from wholebody.methods.newton.settings import STARTS
 from wholebody.methods.starts import Minima, off_limits, restarts
 from wholebody.solution import Solution, TraceEntry
 
 
-class Settings(NamedTuple):
+@dataclass(frozen=True)
+class Settings(Checked):
     """The settings of a search; see `Newton`."""
 
-    tolerance: float
-    iterations: int
-    restarts: int
-    seed: int
-    inequalities: Kind
+    tolerance: Tolerance = 1e-5
+    iterations: Iterations = 200
+    algebra: str = "auto"
+    inequalities: Kind = "slack"
+    restarts: Restarts = 6
+    seed: Seed = 0
+    time_limit: TimeLimit = None
+
+    def __post_init__(self) -> None:
+        """Check the settings.
+
+        Raises:
+            InputError: a setting out of range.
+            UnknownNameError: no such linear algebra.
+        """
+        super().__post_init__()
+        known(self.algebra, NAMES, "linear algebra")
 
     @property
     def assessed_tolerance(self) -> float:

@@ -20,10 +20,9 @@ class Steps(NamedTuple):
         largest_turn: change of Euler parameters in a step, half the radians. Larger: beyond what a linearisation says.
         amplified: motion per metre of target beyond which a step is damped: the equations are nearly singular there.
         far: m or rad: goal error from which that is tested; nearer, the measures may move more than the goals.
-        funnel: m or rad of violation allowed for a metre of goal. Larger: longer steps, more to restore.
+        funnel: m or rad of violation allowed for a metre of goal; beyond it a step only restores. Larger: longer steps.
         widest: m or rad: largest violation allowed after any step.
-        restore_above: share of the funnel from which a step only restores. Larger: fewer such steps, more damped ones.
-        narrow: factor on the funnel after such a step.
+        narrow: factor on the funnel after a step that only restores.
         gain: least ratio of actual to predicted reduction of a step.
         restored: the same for a step that only restores the constraints.
         least_progress: relative reduction below which a step counts as no progress.
@@ -46,7 +45,6 @@ class Steps(NamedTuple):
     far: float = 0.05
     funnel: float = 0.5
     widest: float = 0.5
-    restore_above: float = 0.7
     narrow: float = 0.7
     gain: float = 0.05
     restored: float = 0.2

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -13,7 +13,7 @@ from wholebody.base.checks import posture, time_step
 from wholebody.base.pool import OneAtATime
 from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT
-from wholebody.methods.base import Method, begun, judged, nearest_to
+from wholebody.methods.base import begun, judged, nearest_to
 from wholebody.methods.control import BUDGET
 from wholebody.methods.inputs import TOLERANCE, check_problem
 from wholebody.methods.newton.feasibility import FeasibilityResult, satisfy
@@ -26,8 +26,6 @@ from wholebody.scene.moving_obstacles import Collision
 from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks import StepLimit
-
-TRADED = 0.5  # greater = weights count in more frames, and light goals wait in more
 
 
 class NewtonStep(NamedTuple):
@@ -65,22 +63,23 @@ class NewtonTracker(NotCopyable):
     unswept = SHORT
     leaves_overlap = True
 
-    def __init__(self, problem: Problem, algebra: str, settings: Settings, dt: float | None, method: Method) -> None:
+    def __init__(
+        self, problem: Problem, settings: Settings, dt: float | None, solve: Callable[[Problem], Solution]
+    ) -> None:
         """Build the equations.
 
         Args:
             problem: the problem whose goals it follows.
-            algebra: name of the factorisation.
             settings: of whole solves.
             dt: seconds a frame; None for frames without a time step.
-            method: for solves with measures relative to another posture.
+            solve: the method, for solves with measures relative to another posture.
 
         Raises:
             InputError: the problem has a term that this method has no equations for, or dt is not positive and finite.
         """
         self.problem = check_problem(problem, "tracker: problem")
         self.dt = None if dt is None else time_step(dt, "dt")
-        self._algebra, self._settings, self._method = algebra, settings, method
+        self._settings, self._solve = settings, solve
         self.workspace = problem.workspace()
         self._alone = OneAtATime("tracker")
         self._lay_out()
@@ -161,11 +160,11 @@ class NewtonTracker(NotCopyable):
             state = self.workspace.state.update(q)
             errors.append(np.array([np.linalg.norm(goal.error(state)) for goal in goals]))
         even, weighted = (np.linalg.norm(by * errors[1]) / np.linalg.norm(by * errors[0]) for by in (1.0, weights))
-        return bool(1.0 - weighted < TRADED * (1.0 - even))
+        return bool(1.0 - weighted < 0.5 * (1.0 - even))
 
     def nearest(self, q: Array) -> Solution:
         """The method's answer from q (nq,), with measures relative to q."""
-        return self._method.solve(nearest_to(self.problem, q))
+        return self._solve(nearest_to(self.problem, q))
 
     def overlap_resolutions(self, q: Array) -> Sequence[Array]:
         """No postures: the steps lead out."""
@@ -196,7 +195,7 @@ class NewtonTracker(NotCopyable):
 
     def _lay_out(self) -> None:
         problem = self.problem
-        self._active_system = FigureSystem(problem, self.workspace, self._algebra)
+        self._active_system = FigureSystem(problem, self.workspace, self._settings.algebra)
         self._terms = (problem.constraints, problem.bounds, problem.measures)
 
     def _renewed(self) -> FigureSystem:

@@ -1,4 +1,4 @@
-"""From a guess of the active set to the exact answer of a quadratic program.
+"""From a guess to the exact answer of a quadratic program: by correcting active sets, else by semismooth Newton steps.
 
 With the active set fixed the program is a linear system. Eliminating x leaves one symmetric positive definite system in
 the multipliers y of the soft and active elastic rows A (Schur complement of the diagonal),
@@ -10,6 +10,11 @@ than variables, and where rows repeat each other to rounding, the system in x is
 problem of the weighted rows, by QR. The set is then corrected where signs are wrong (the primal-dual active set method,
 Hintermueller, Ito and Kunisch 2002), which ends after a few corrections when the guess was near. First-order solvers
 such as OSQP thereby end in answers exact to rounding.
+
+Correcting sets may not end. Semismooth Newton steps with an exact line search do: the objective is convex, piecewise
+quadratic and smooth, and on a piece its minimiser is a linear least squares problem. Each step goes towards that
+minimiser as far as the objective falls; along a line its derivative is piecewise linear and increasing, so the best
+step is found exactly (Nocedal and Wright 2006, section 16.7, does the same for bounds).
 """
 
 from __future__ import annotations
@@ -20,11 +25,15 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
+from wholebody.base.records import with_values
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
+from wholebody.methods.qp.settings import CORRECTIONS
 
-BOUND_TOLERANCE = 1e-11  # rad, m: an x this far outside its box counts as inside
-ROW_TOLERANCE = 1e-11  # m: likewise for elastic rows
-FULL_CORRECTIONS = 8  # corrections of everything at once, before only the worst entry is corrected at a time
+SEMISMOOTH = "semismooth newton"
+"""What `QPSolution.by` says of answers that `last_resort` found."""
+
+NOT_EXACT = "not exact"
+"""What it says of programs that nothing closed: the answer is the best that was found."""
 
 
 def guess_active_set(program: QuadraticProgram, x: Array, tolerance: float) -> ActiveSet:
@@ -44,9 +53,6 @@ def violated_set(program: QuadraticProgram) -> ActiveSet:
 def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) -> QPSolution | None:
     """Exact answer by correcting a guess of the active set.
 
-    The first few corrections put right everything that is wrong. That may go round in circles; then only the worst
-    entry is put right at a time, which is slower and surer.
-
     Args:
         program: what to solve.
         guess: where to begin.
@@ -61,17 +67,9 @@ def solve_from(program: QuadraticProgram, guess: ActiveSet, corrections: int) ->
     program.check_shapes(guess)
     x = np.empty(program.size)
     active = ActiveSet(guess.lower.copy(), guess.upper.copy(), guess.elastic.copy())
-    kernel = compiled_kernel()
-    parts = (
-        program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
-        program.elastic_weight, program.lower, program.upper,
-    )  # fmt: skip
-    elastic = len(program.least)
-    settled = kernel.primal_dual_active_set(
-        *map(np.ascontiguousarray, parts), np.arange(elastic), *active, corrections, FULL_CORRECTIONS, BOUND_TOLERANCE,
-        ROW_TOLERANCE, np.empty(kernel.work_size(program.size, len(program.target), elastic)),
-        np.empty(elastic, dtype=np.intp), x,
-    )  # fmt: skip
+    settled = compiled_kernel().primal_dual_active_set(
+        program.packed(), np.arange(len(program.least)), active, corrections, CORRECTIONS, room_for(program), x
+    )
     return QPSolution(x, active, True, 0) if settled else None
 
 
@@ -82,19 +80,66 @@ def without_gradient(program: QuadraticProgram, active: ActiveSet, target: Array
         program: what to solve.
         active: the set.
         target: (m,) targets of the soft rows, in the place of the program's.
-        work: room; see `active_set_kernel.work_size`.
+        work: room; see `room_for`.
 
     Returns:
         (n,) the minimiser, clipped to the box; None where it is not finite.
     """
     program.check_shapes(active)
-    kernel, x = compiled_kernel(), np.empty(program.size)
+    x = np.empty(program.size)
     parts = (
         program.diagonal, program.rows, target, program.weight, program.elastic, program.least,
         program.elastic_weight, program.lower, program.upper,
     )  # fmt: skip
-    finite = kernel.minimise_without_gradient(*map(np.ascontiguousarray, parts), *active, ROW_TOLERANCE, work, x)
+    finite = compiled_kernel().minimise_without_gradient(
+        *map(np.ascontiguousarray, parts), *active, CORRECTIONS.tolerance, work, x
+    )
     return x if finite else None
+
+
+def minimise(program: QuadraticProgram, start: Array, iterations: int) -> tuple[Array, ActiveSet, int]:
+    """Lower the objective by semismooth Newton steps until its minimum, or for so many iterations.
+
+    Args:
+        program: what to solve.
+        start: (n,) where to begin; it is clipped to the box.
+        iterations: most steps.
+
+    Returns:
+        x (n,) inside the box, its active set, and the number of iterations used.
+
+    Raises:
+        ValueError: the sizes of the program do not fit together.
+    """
+    x = np.array(start, dtype=float)
+    active = ActiveSet(*(np.zeros(size, dtype=bool) for size in (program.size, program.size, len(program.least))))
+    program.check_shapes(active)
+    work = np.empty(work_size(program.size, len(program.target), len(program.least)))
+    used = semismooth_kernel().minimise(program.packed(), iterations, CORRECTIONS.tolerance, active, work, x)
+    return x, active, used
+
+
+def last_resort(program: QuadraticProgram, x: Array, iterations: int) -> QPSolution:
+    """Exact answer by semismooth Newton steps where an approximate one x, shape (n,), does not lead to it.
+
+    Args:
+        program: what to solve.
+        x: (n,) where to begin.
+        iterations: what it took so far.
+    """
+    x, active, used = minimise(program, x, 300)  # the hardest programs seen took 63
+    solution = solve_from(program, active, CORRECTIONS.of_guess)
+    if solution is not None:
+        return with_values(solution, iterations=iterations + used, by=SEMISMOOTH)
+    exact = program.optimality(x) <= 1e-10
+    return QPSolution(x, active, exact, iterations + used, SEMISMOOTH if exact else NOT_EXACT)
+
+
+def room_for(program: QuadraticProgram, times: int = 1) -> Room:
+    """Room of the compiled loops for a program, and for larger ones where it is to be so many times as much."""
+    k = len(program.least)
+    work = work_size(program.size, len(program.target), k)
+    return Room(np.empty(times * work), np.empty(2 * times * k, dtype=np.intp), np.empty(times * k, dtype=bool))
 
 
 @lru_cache(maxsize=1)
@@ -102,17 +147,32 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import active_set_kernel
 
-    none, one, mask = np.zeros(0), np.ones(1), np.zeros(1, dtype=bool)
-    program = (one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, -one, one)
-    index, row = np.zeros(0, dtype=np.intp), np.zeros(0, dtype=bool)
-    work = np.empty(active_set_kernel.work_size(1, 0, 0))
-    active_set_kernel.primal_dual_active_set(
-        *program, index, mask, mask.copy(), row, 1, 1, BOUND_TOLERANCE, ROW_TOLERANCE, work, index, np.zeros(1)
-    )
+    program, active = smallest()
+    index, x = np.zeros(0, dtype=np.intp), np.zeros(1)
+    room = Room(np.empty(work_size(1, 0, 0)), index, active.elastic)
+    active_set_kernel.primal_dual_active_set(program, index, active, 1, CORRECTIONS, room, x)
     active_set_kernel.solve_growing(
-        *program, index, index, mask, mask.copy(), row, row, np.ones(6), work, np.zeros(1, dtype=np.intp), np.zeros(1)
+        *program, index, index, *active, room.chosen, index, room.work, np.array(CORRECTIONS, dtype=float), x
     )
     active_set_kernel.minimise_without_gradient(
-        one, *program[2:], mask, mask.copy(), row, ROW_TOLERANCE, work, np.zeros(1)
+        program.diagonal, *program[2:], *active, CORRECTIONS.tolerance, room.work, x
     )
+    semismooth_kernel()
     return active_set_kernel
+
+
+@lru_cache(maxsize=1)
+def semismooth_kernel() -> Any:
+    """The module of semismooth Newton steps, compiled or read back."""
+    from wholebody.methods.qp import semismooth_kernel as kernel
+
+    program, active = smallest()
+    kernel.minimise(program, 1, CORRECTIONS.tolerance, active, np.empty(work_size(1, 0, 0)), np.zeros(1))
+    return kernel
+
+
+def smallest() -> tuple[QuadraticProgram, ActiveSet]:
+    """A program of one variable without rows, with which loops are compiled."""
+    none, one, rows = np.zeros(0), np.ones(1), np.zeros((0, 1))
+    masks = (np.zeros(size, dtype=bool) for size in (1, 1, 0))
+    return QuadraticProgram(one, one, rows, none, none, rows, none, none, -one, one), ActiveSet(*masks)

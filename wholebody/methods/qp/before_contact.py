@@ -14,7 +14,7 @@ import numpy as np
 
 from wholebody.base.records import with_values
 from wholebody.methods.control import Control
-from wholebody.methods.qp.curved_reach import ENDLESS
+from wholebody.methods.qp.closest import ENDLESS
 from wholebody.methods.qp.iterates import LocalSolution
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.sqp import SQP

@@ -20,19 +20,13 @@ from wholebody.base.arrays import Array
 from wholebody.figures.description import Limits
 from wholebody.methods.control import Control
 from wholebody.methods.qp.chain_kernel import Chain, Goals, Room
-from wholebody.methods.qp.screening import Settings
+from wholebody.methods.qp.multistart import Budget
+from wholebody.methods.qp.settings import SEEDS
 from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 from wholebody.tasks.distance import SquaredDistance
 from wholebody.terms.entries import RESIDUAL, Entry, entries_of
-
-DAMPING = 1e-3  # m, rad: of the steps at the goals; less = errors vanish faster, steps near singular postures are wild
-MOST_STEPS = 60  # of a descent; those that reach their goals take 5 to 20
-SEEDS = 16  # at a time
-MOST_SEEDS = 256  # in all; more = fewer problems are left to the slower search, which is then begun later
-WORTH = 0.9  # share of the effort of an answer below which a rejected end is descended from too
-COMPARED = 8  # ends of which the one of least effort is taken; more = less effort, more time
 
 
 class Met(NamedTuple):
@@ -153,13 +147,13 @@ def goal_entries(problem: Problem) -> list[Entry] | None:
     return found
 
 
-def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, control: Control) -> Met | None:
+def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: Control) -> Met | None:
     """A posture that meets the goals with everything held: the first that is found, or of the first few the best.
 
     Args:
         problem: what is asked.
         workspace: of the run.
-        settings: of the method.
+        budget: of the method.
         control: is told of every descent.
 
     Returns:
@@ -171,26 +165,30 @@ def from_seeds(problem: Problem, workspace: Workspace, settings: Settings, contr
     limits = problem.scene.figure.limits
     with built.pool(Chains, lambda: Chains(built.model, limits)).borrow() as chains:
         chain = chains.of(frozenset(joint for entry in entries for joint in entry.integers[:2]))
-        return None if chain is None else _from_seeds(problem, chain, entries, workspace, settings, control)
+        return None if chain is None else _from_seeds(problem, chain, entries, workspace, budget, control)
 
 
 def _from_seeds(
-    problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, settings: Settings,
+    problem: Problem, chain: PlainChain, entries: list[Entry], workspace: Workspace, budget: Budget,
     control: Control,
 ) -> Met | None:  # fmt: skip
     at = problem.scene.figure.clamp(problem.start)
-    start, rng = chain.angles(at), np.random.default_rng(settings.seed)
-    distance = _distance(problem, chain, at) if settings.measures else None
+    start, rng = chain.angles(at), np.random.default_rng(budget.seed)
+    distance = _distance(problem, chain, at) if budget.measures else None
     nearest = np.array([start, np.zeros(len(start))])
     if distance is not None:
         nearest = np.array([chain.angles(distance.reference), distance.weights[chain.idx_v]])
-    more = 1 + settings.restarts_for_measure
-    enough = 1 if distance is None else COMPARED * more
-    asked = np.array([settings.tolerance, DAMPING**2, min(settings.iterations, MOST_STEPS), enough])
+    more = 1 + budget.restarts_for_measure
+    enough = 1 if distance is None else SEEDS.compared * more
+    asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
     goals, room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
-    found, trace, begun, least, blocked = np.empty((SEEDS, 4)), [], 0, np.inf, None
-    seeds = np.concatenate([[start], chain.seeds(start, rng, SEEDS - 1)]) if settings.restarts else start[None].copy()
-    while begun < (MOST_SEEDS * more if settings.restarts else 1) and not control.over:
+    found, trace, begun, least, blocked = np.empty((SEEDS.together, 4)), [], 0, np.inf, None
+    seeds = (
+        np.concatenate([[start], chain.seeds(start, rng, SEEDS.together - 1)])
+        if budget.restarts
+        else start[None].copy()
+    )
+    while begun < (SEEDS.most * more if budget.restarts else 1) and not control.over:
         taken = compiled_kernel().reach(chain.chain, goals, room, seeds, nearest, asked, found)
         begun += taken
         for left, _, _, steps in found[:taken].tolist():
@@ -200,10 +198,10 @@ def _from_seeds(
         for k in np.argsort(found[:taken, 1])[: np.isfinite(found[:taken, 1]).sum()].tolist():
             q, effort = chain.posture(seeds[k], at), float(found[k, 1])
             if _is_free(problem, workspace, q):
-                known = bool(found[k, 2]) and (distance is not None or not settings.measures)
-                return Met(q, tuple(trace), known, blocked if least < WORTH * effort else None)
+                known = bool(found[k, 2]) and (distance is not None or not budget.measures)
+                return Met(q, tuple(trace), known, blocked if least < SEEDS.worth * effort else None)
             least, blocked = (effort, q) if effort < least else (least, blocked)
-        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS)
+        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS.together)
     return None
 
 

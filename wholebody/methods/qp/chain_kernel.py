@@ -89,7 +89,9 @@ def reach(chain: Chain, goals: Goals, room: Room, seeds: Array, nearest: Array, 
         How many seeds were taken.
     """
     tolerance, most, enough = asked[0], int(asked[2]), asked[3]
-    weighed = nearest[1].any()
+    weighed = False
+    for weight in nearest[1]:
+        weighed = weighed or weight > 0.0
     for k in range(len(seeds)):
         q = seeds[k]
         steps = _descend(chain, goals, room, q, tolerance, asked[1], most)
@@ -135,7 +137,8 @@ def _descend(
             return count
         before = left
         if count % 4 == 0:
-            if left > 0.6 * marked:  # given up: another seed gets there sooner
+            # Given up: another seed gets there sooner. Where errors are small, a singular posture is near.
+            if left > 0.6 * marked and left > 0.02:
                 return count
             marked = left
         rows_of(chain, goals, room)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 
 SWEEPS = 30  # over all rows in one projection, at most
@@ -73,6 +73,60 @@ def solve(system: Array, right: Array) -> bool:
         for p in range(i):
             right[p] -= system[i, p] * right[i]
     return True
+
+
+@compiled(inner=True, error_model="numpy")
+def sort(values: Array, order: Indices) -> None:
+    """Put the places of values (k,) into `order` (k,), the least first; equal ones stay in order.
+
+    By insertion: they are few, and most of them are in order.
+    """
+    for place in range(len(order)):
+        back = place - 1
+        while back >= 0 and values[order[back]] > values[place]:
+            order[back + 1] = order[back]
+            back -= 1
+        order[back + 1] = place
+
+
+@compiled(inner=True, error_model="numpy")
+def least_squares(table: Array, size: int, x: Array) -> None:
+    """Write into x (n,) what minimises |A x - b|^2 + |R x - c|^2, by Householder's QR.
+
+    `table` (size + n, n + 1) holds A and b, then R and c with an upper triangular R; it is overwritten. Rows of A in
+    the order of their lengths, the longest first, are factorised stably row by row (Cox and Higham 1998).
+    """
+    columns = len(x)
+    work = np.empty(columns + 1)
+    for c in range(columns):
+        last = size + c + 1  # the rows of R below have nothing in this column yet
+        square = 0.0
+        for r in range(c, last):
+            square += table[r, c] * table[r, c]
+        norm = -np.sqrt(square) if table[c, c] > 0.0 else np.sqrt(square)
+        head = table[c, c] - norm  # Householder's vector: this, and the column below
+        scale = -1.0 / (norm * head)
+        for d in range(c + 1, columns + 1):
+            work[d] = head * table[c, d]
+        for r in range(c + 1, last):
+            entry = table[r, c]
+            if entry != 0.0:
+                for d in range(c + 1, columns + 1):
+                    work[d] += entry * table[r, d]
+        for d in range(c + 1, columns + 1):
+            work[d] *= scale
+            table[c, d] -= head * work[d]
+        for r in range(c + 1, last):
+            entry = table[r, c]
+            if entry != 0.0:
+                for d in range(c + 1, columns + 1):
+                    table[r, d] -= entry * work[d]
+        table[c, c] = norm
+    for c in range(columns - 1, -1, -1):
+        total = table[c, columns]
+        for d in range(c + 1, columns):
+            total -= table[c, d] * x[d]
+        x[c] = total / table[c, c]
 
 
 @compiled()

@@ -17,6 +17,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.figures.state import has_free_root
+from wholebody.methods.qp.settings import ESCAPE
 from wholebody.terms.linearisation import PackedLinearisation
 
 ROOT, PLACES = 3, 6  # coordinates of a free root's position, and with its rotation
@@ -32,13 +33,6 @@ WAYS = (
     (-1, 1, 0),
     (-1, -1, 0),
 )
-RANDOM = 150  # more starts; more = free postures are missed less, and a frame that has none costs more
-FARTHEST = 1.0  # m, rad: of a random start, where no bound is nearer
-WITHIN = 0.02  # m: pairs nearer than this are parted; farther ones cost more and may come in the way of a step
-GAP = 3e-4  # m: to which pairs are parted; a round is exact to first order only
-ROUNDS = 25  # from one start, at most
-WORTH = 0.95  # share of the depth that a round must leave at most, or else it is weak
-WEAK = 3  # rounds from one start that may be weak; larger is slower and finds more
 
 
 class ProjectionRows(NamedTuple):
@@ -59,7 +53,7 @@ class ProjectionRows(NamedTuple):
 
 def projection_rows(at: PackedLinearisation, rows: Array, room: Array) -> ProjectionRows:
     """Rows of a posture: its contacts, and constraints with their rows (k, nv) and room (k,)."""
-    gaps = at.gap - np.minimum(at.clearance, GAP)
+    gaps = at.gap - np.minimum(at.clearance, ESCAPE.gap)
     return ProjectionRows(
         -float(at.contacts.distance.min(initial=0.0)), np.concatenate([at.jacobian[len(at.value) :], rows]),
         np.concatenate([gaps, room]), at.box,
@@ -78,13 +72,13 @@ def free_end(model: pin.Model, q: Array, out: float, rows_at: Callable[[Array], 
     project, box = compiled_kernel().project, rows_at(q).box.copy()
     for start in _starts(model, box):
         gone, least, weak = start, np.inf, 0
-        for _ in range(ROUNDS):
+        for _ in range(ESCAPE.rounds):
             here = np.asarray(pin.integrate(model, q, gone))
             at = rows_at(here)
             if at.depth <= out:
                 return here
-            weak += at.depth > WORTH * least
-            if weak == WEAK:
+            weak += at.depth > ESCAPE.worth * least
+            if weak == ESCAPE.weak:
                 break
             least = min(least, at.depth)
             gone = gone.copy()
@@ -101,9 +95,9 @@ def _starts(model: pin.Model, box: Array) -> Iterator[Array]:
             begun = np.zeros(model.nv)
             begun[:ROOT] = [0.0 if sign == 0 else box[max(sign, 0), axis] for axis, sign in enumerate(way)]
             yield begun
-    low, high = np.clip(box, -FARTHEST, FARTHEST)
+    low, high = np.clip(box, -ESCAPE.farthest, ESCAPE.farthest)
     rng, places = np.random.default_rng(0), PLACES if free else 0
-    for _ in range(RANDOM):
+    for _ in range(ESCAPE.random):
         begun = rng.uniform(low, high)
         begun[places:] *= rng.uniform()
         yield begun

@@ -1,46 +1,107 @@
-"""The minimiser of a quadratic program with its active set fixed, as compiled loops: see `active_set`."""
+"""The minimiser of a program on the face of an active set, as compiled loops: see `active_set`."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
-from wholebody.methods.qp.dense_kernel import add, dot, gram, solve
+from wholebody.methods.qp.dense_kernel import add, dot, gram, least_squares, solve, sort
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
 
 
-@compiled(error_model="numpy")
+class Face(NamedTuple):
+    """Rows that count with an active set fixed, and room for their system.
+
+    Attributes:
+        stacked: (m + k, n) the soft rows and the pushing elastic ones.
+        right: (m + k,) what they are to be.
+        compliance: (m + k,) their inverse weights.
+        multiplier: (m + k,) becomes weight times residual of each.
+        gradient: (n,) becomes the derivative of the objective by x.
+        reached: (k,) values of the elastic rows at x.
+        scaled, table, inverse, trial: room; (m + k, n), (m + k)^2, (n,) and (n,).
+    """
+
+    stacked: Array
+    right: Array
+    compliance: Array
+    multiplier: Array
+    gradient: Array
+    reached: Array
+    scaled: Array
+    table: Array
+    inverse: Array
+    trial: Array
+
+
+@compiled(inner=True, forceinline=True)
+def face(work: Array, n: int, m: int, k: int) -> Face:
+    """Room for the faces of a program with n variables, m soft and k elastic rows, within `work`; see `Room`."""
+    most = m + k
+    first, second, third = most * n, 2 * most * n, 2 * most * n + most * most
+    fourth = third + 3 * most
+    last = fourth + k
+    return Face(
+        work[:first].reshape((most, n)),
+        work[third:][:most],
+        work[third + most :][:most],
+        work[third + 2 * most :][:most],
+        work[last + n :][:n],
+        work[fourth:last],
+        work[first:second].reshape((most, n)),
+        work[second:third],
+        work[last:][:n],
+        work[last + 2 * n :][:n],
+    )
+
+
+@compiled(inner=True, error_model="numpy", forceinline=True)
+def stack_soft(program: QuadraticProgram, own: Face) -> None:
+    """Let the soft rows be the first of a face."""
+    rows, target, weight = program.rows, program.target, program.weight
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    for r in range(len(target)):
+        compliance[r] = 1.0 / weight[r]
+        right[r] = target[r]
+        for i in range(rows.shape[1]):
+            stacked[r, i] = rows[r, i]
+
+
+@compiled(inner=True, error_model="numpy", forceinline=True)
+def stack_elastic(program: QuadraticProgram, pushes: Indices, own: Face) -> None:
+    """Let these elastic rows follow."""
+    target, elastic, least, elastic_weight = program.target, program.elastic, program.least, program.elastic_weight
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    first = len(target)
+    for count in range(len(pushes)):
+        j = pushes[count]
+        for i in range(elastic.shape[1]):
+            stacked[first + count, i] = elastic[j, i]
+        right[first + count] = least[j]
+        compliance[first + count] = 1.0 / elastic_weight[j]
+
+
+@compiled(error_model="numpy", forceinline=True)
 def minimise_on_face(
-    diagonal: Array,
-    linear: Array,
-    lower: Array,
-    upper: Array,
-    at_lower: Mask,
-    at_upper: Mask,
-    stacked: Array,
-    right: Array,
-    compliance: Array,
-    size: int,
-    row_tolerance: float,
-    scaled: Array,
-    table: Array,
-    inverse: Array,
-    trial: Array,
-    multiplier: Array,
-    gradient: Array,
-    x: Array,
+    program: QuadraticProgram, active: ActiveSet, own: Face, size: int, tolerance: float, x: Array
 ) -> bool:
-    """Minimiser x (n,) with some bounds held and some rows counted, which may be out of the other bounds.
+    """Minimiser x (n,) with the bounds of an active set held and the first `size` rows of a face counted.
 
-    `stacked` (size or more, n), `right` and `compliance` (size or more,) are the soft and the pushing elastic rows,
-    what they are to be and their inverse weights. `scaled` (n or more, n), `table` (n^2 or more,), `inverse` and
-    `trial` (n,) are room. `multiplier` (size or more,) becomes weight times residual of each row, `gradient` (n,) the
-    derivative by x. Residuals off by more than `row_tolerance` are computed by the other system.
+    It may be out of the other bounds. Residuals off by more than the tolerance are computed by the other system.
 
     Returns:
         Whether x is finite.
     """
+    diagonal, lower, upper = program.diagonal, program.lower, program.upper
+    at_lower, at_upper = active.lower, active.upper
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    multiplier, gradient, scaled = own.multiplier, own.gradient, own.scaled
+    table, inverse, trial = own.table, own.inverse, own.trial
     n = len(x)
+    linear = program.linear
     for i in range(n):
         held = at_lower[i] or at_upper[i]
         x[i] = lower[i] if at_lower[i] else (upper[i] if at_upper[i] else 0.0)
@@ -64,14 +125,11 @@ def minimise_on_face(
                 add(multiplier[r], stacked[r], trial)
             for i in range(n):
                 trial[i] = x[i] - inverse[i] * trial[i]
-            worst = 0.0
             for r in range(size):
                 left = abs(dot(stacked[r], trial) - right[r] - compliance[r] * multiplier[r])
-                if not left <= worst:
-                    worst = left
-            in_columns = not worst <= row_tolerance
+                in_columns = in_columns or not left <= tolerance
     if in_columns:
-        _minimise_in_columns(stacked, right, compliance, size, diagonal, linear, inverse, x, multiplier)
+        _minimise_in_columns(program, own, size, x)
     for r in range(size):
         add(multiplier[r], stacked[r], gradient)
     finite = True
@@ -84,50 +142,24 @@ def minimise_on_face(
 
 
 @compiled(inner=True, error_model="numpy")
-def _minimise_in_columns(
-    stacked: Array,
-    right: Array,
-    compliance: Array,
-    size: int,
-    diagonal: Array,
-    linear: Array,
-    inverse: Array,
-    x: Array,
-    multiplier: Array,
-) -> None:
+def _minimise_in_columns(program: QuadraticProgram, own: Face, size: int, x: Array) -> None:
     """Minimiser on a face with more rows than variables, by Householder's QR of the weighted rows.
 
     The free entries of x minimise |W^1/2 (A x - b)|^2 + |D^1/2 x + D^-1/2 g|^2. The rows stand in the order of their
-    weights, for which the factorisation is stable row by row (Cox and Higham 1998): heavy rows lose no digits to light
-    ones, nor light ones to heavy.
-
-    Args:
-        stacked: (size or more, n) rows A.
-        right: (size or more,) b.
-        compliance: (size or more,) inverse weights.
-        size: how many rows count.
-        diagonal: (n,) D.
-        linear: (n,) g.
-        inverse: (n,) 1 / D of the free variables, 0 of the held ones.
-        x: (n,) with the held entries; the free ones are filled in.
-        multiplier: (size or more,) is filled with the weight times the residual of each row.
+    weights: heavy rows lose no digits to light ones, nor light ones to heavy.
     """
-    n = len(x)
+    diagonal, linear = program.diagonal, program.linear
+    stacked, right, compliance = own.stacked, own.right, own.compliance
+    multiplier, inverse = own.multiplier, own.inverse
     free = inverse.nonzero()[0]
-    columns = len(free)
-    order = np.arange(size)
-    for place in range(1, size):  # few weights, and most of them in order: cheaper than a general sort, and stable
-        own, back = order[place], place - 1
-        while back >= 0 and compliance[order[back]] > compliance[own]:
-            order[back + 1] = order[back]
-            back -= 1
-        order[back + 1] = own
-    table = np.zeros((size + columns, columns + 1))
+    columns, order = len(free), np.empty(size, dtype=np.intp)
+    sort(compliance, order)
+    table, part = np.zeros((size + columns, columns + 1)), np.empty(columns)
     for place in range(size):
         r = order[place]
         root = 1.0 / np.sqrt(compliance[r])
         total = right[r]
-        for i in range(n):
+        for i in range(len(x)):
             if inverse[i] == 0.0:
                 total -= stacked[r, i] * x[i]
         for c in range(columns):
@@ -137,38 +169,8 @@ def _minimise_in_columns(
         root = np.sqrt(diagonal[free[c]])
         table[size + c, c] = root
         table[size + c, columns] = -linear[free[c]] / root
-    work = np.empty(columns + 1)
+    least_squares(table, size, part)
     for c in range(columns):
-        last = size + c + 1  # the rows of D below have nothing in this column yet
-        square = 0.0
-        for r in range(c, last):
-            square += table[r, c] * table[r, c]
-        norm = -np.sqrt(square) if table[c, c] > 0.0 else np.sqrt(square)
-        head = table[c, c] - norm  # Householder's vector: this, and the column below
-        scale = -1.0 / (norm * head)
-        for d in range(c + 1, columns + 1):
-            work[d] = head * table[c, d]
-        for r in range(c + 1, last):
-            entry = table[r, c]
-            if entry != 0.0:
-                for d in range(c + 1, columns + 1):
-                    work[d] += entry * table[r, d]
-        for d in range(c + 1, columns + 1):
-            work[d] *= scale
-            table[c, d] -= head * work[d]
-        for r in range(c + 1, last):
-            entry = table[r, c]
-            if entry != 0.0:
-                for d in range(c + 1, columns + 1):
-                    table[r, d] -= entry * work[d]
-        table[c, c] = norm
-    for c in range(columns - 1, -1, -1):
-        total = table[c, columns]
-        for d in range(c + 1, columns):
-            total -= table[c, d] * x[free[d]]
-        x[free[c]] = total / table[c, c]
+        x[free[c]] = part[c]
     for r in range(size):
-        total = -right[r]
-        for i in range(n):
-            total += stacked[r, i] * x[i]
-        multiplier[r] = total / compliance[r]
+        multiplier[r] = (dot(stacked[r], x) - right[r]) / compliance[r]

@@ -26,23 +26,17 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.rows import Violation
+from wholebody.methods.qp.settings import FEASIBILITY, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.sqp import stalls
-from wholebody.methods.qp.subproblem import BOX, Subproblem, Violation
+from wholebody.methods.qp.subproblem import Subproblem
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Lineariser
 
-STEP = 0.2  # rad, m: most that a degree of freedom moves in a program; larger = fewer programs, limbs jump over others
-LEAST_STEP = 1e-3  # rad, m: of the box; smaller = slower to end where steps go to and fro
-DAMPING = 0.05  # share of the squared error, as in `sqp`; less = dozens of bounds hold a step, and programs are dear
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
 SHORTEST = 0.3  # after a step to where a term of one's own is not finite
-WITHIN = 0.1  # m: pairs nearer than this get rows
-DIRECTIONS_LATER = 2.5e-3  # share of their weight that directions have while places come first
-PLACED = 0.01  # m: places nearer than this are reached, and directions count
-WIDE = 5.0  # rad: range from which a joint may be taken from one limit to the other
 AT_LIMIT = 1e-6  # rad
 
 
@@ -89,14 +83,18 @@ class Feasibility:
 
     def _attempt(self, start: Array, directions: Mask, later: bool, count: int) -> LocalSolution:
         """One of them: with or without places first; `count` programs were solved before."""
-        weight = np.where(directions & later, DIRECTIONS_LATER, 1.0)
+        weight = np.where(directions & later, FEASIBILITY.directions_later, 1.0)
         working_set = WorkingSet(self.solver)
-        here, box, last = self._iterate_at(start), STEP, np.zeros(self.lineariser.state.model.nv)
+        here, box, last = self._iterate_at(start), FEASIBILITY.step, np.zeros(self.lineariser.state.model.nv)
         history: list[float] = []
         wrapped: set[int] = set()
         while here.violation.worst > self.tolerance and count < self.iterations and not self.control.over:
             error = here.rows.soft_error[: here.rows.goals]
-            if later and here.violation.elastic <= PLACED and np.linalg.norm(error[~directions]) <= PLACED:
+            if (
+                later
+                and here.violation.elastic <= FEASIBILITY.placed
+                and np.linalg.norm(error[~directions]) <= FEASIBILITY.placed
+            ):
                 later, weight, history = False, np.ones(len(error)), []
             history.append(_merit(here.violation, float(np.sqrt((weight * error) @ error))))
             count += 1
@@ -104,23 +102,27 @@ class Feasibility:
             step = working_set.solve(program, here.rows.key).x
             stuck = float(np.abs(step).max(initial=0.0)) <= self.tolerance**2 or stalls(history, self.tolerance)
             if stuck and later:
-                later, weight, history, box = False, np.ones(len(error)), [], STEP
+                later, weight, history, box = False, np.ones(len(error)), [], FEASIBILITY.step
                 continue
             if stuck:
                 q = self._turned_on(here, program, step, wrapped)
                 there = None if q is None else self._moved(q)
                 if there is None:
                     return _end(here, True, count)
-                here, history, box = there, [], STEP
+                here, history, box = there, [], FEASIBILITY.step
                 last = np.zeros_like(step)
                 working_set.reset()
                 self._record(here, 2.0 * np.pi, "turned on")
                 continue
-            box = max(SHORTER * box, LEAST_STEP) if float(step @ last) < 0.0 else min(LONGER * box, STEP)
+            box = (
+                max(SHORTER * box, FEASIBILITY.least_step)
+                if float(step @ last) < 0.0
+                else min(LONGER * box, FEASIBILITY.step)
+            )
             last = step
             there = self._moved(np.asarray(pin.integrate(self.lineariser.state.model, here.at.q, step)))
             if there is None:
-                if box < LEAST_STEP:
+                if box < FEASIBILITY.least_step:
                     return _end(here, False, count)
                 box, last = SHORTEST * min(box, float(np.abs(step).max())), np.zeros_like(step)
                 continue
@@ -134,7 +136,13 @@ class Feasibility:
         soft_weight[: rows.goals] *= weight
         none = np.zeros(len(rows.soft_error))
         return self.subproblem.program(
-            here.at, with_values(rows, soft_weight=soft_weight), box / BOX, None, DAMPING, none, False
+            here.at,
+            with_values(rows, soft_weight=soft_weight),
+            box / PROGRAM.box,
+            None,
+            FEASIBILITY.damping,
+            none,
+            False,
         )
 
     def _directions(self, q: Array) -> Mask:
@@ -162,7 +170,7 @@ class Feasibility:
         move = there - q[limits.idx_q]
         allowed = (move >= here.at.lower[limits.idx_v] - AT_LIMIT) & (move <= here.at.upper[limits.idx_v] + AT_LIMIT)
         range_ = limits.upper - limits.lower
-        wide = (range_ > WIDE) & (range_ < 2.0 * np.pi) & np.isin(limits.idx_v, turning)
+        wide = (range_ > FEASIBILITY.wide) & (range_ < 2.0 * np.pi) & np.isin(limits.idx_v, turning)
         for index in np.argsort(-np.abs(pushed)).tolist():
             if ((high | low) & allowed & wide)[index] and index not in wrapped:
                 wrapped.add(index)
@@ -180,9 +188,9 @@ class Feasibility:
             return None
 
     def _iterate_at(self, q: Array) -> Iterate:
-        at = self.lineariser.at(q, WITHIN, planes=True)
+        at = self.lineariser.at(q, FEASIBILITY.within, planes=True)
         rows = self.subproblem.rows(at)
-        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, WITHIN))
+        return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, FEASIBILITY.within))
 
     def _record(self, here: Iterate, step: float, what: str) -> None:
         violation = here.violation
@@ -197,3 +205,11 @@ def _merit(violation: Violation, goal: float) -> float:
 
 def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:
     return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+
+
+def stalls(history: list[float], tolerance: float) -> bool:
+    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
+    if len(history) <= FEASIBILITY.patience or history[-1] <= 100.0 * tolerance:
+        return False
+    before = min(history[: -FEASIBILITY.patience])
+    return min(history[-FEASIBILITY.patience :]) > before - min(FEASIBILITY.slow * before, FEASIBILITY.progress)

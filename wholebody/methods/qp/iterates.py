@@ -8,11 +8,33 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.methods.qp.funnel import PredictedReduction
-from wholebody.methods.qp.multipliers import Multipliers
-from wholebody.methods.qp.subproblem import Rows, Violation
+from wholebody.methods.qp.rows import Multipliers, Rows, Violation
+from wholebody.methods.qp.settings import DESCENT
 from wholebody.methods.qp.tangential import Parts
 from wholebody.terms.linearisation import Linearisation
+
+
+class StepAcceptance(NamedTuple):
+    """How a step did.
+
+    Attributes:
+        accepted: whether it is taken.
+        good: whether it brought about what was foreseen.
+        poor: whether it brought much less.
+        by: "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led.
+    """
+
+    accepted: bool
+    good: bool
+    poor: bool
+    by: str
+
+
+class PredictedReduction(NamedTuple):
+    """What a program foresees of its step: how much less violation, and how much less of the measures."""
+
+    violation: float
+    measure: float
 
 
 class LocalSolution(NamedTuple):
@@ -61,3 +83,53 @@ class Step(NamedTuple):
     answer: Array
     predicted: PredictedReduction
     multipliers: Multipliers | None
+
+
+def judge(
+    before: tuple[float, float], after: tuple[float, float], predicted: PredictedReduction, width: float | None
+) -> StepAcceptance:
+    """Judge a step.
+
+    Far from the goals it must lessen the violation. Near, it must lessen the measures and stay inside a funnel, the
+    violation that is allowed meanwhile (Gould and Toint 2010, whose funnel narrows).
+
+    Args:
+        before: violation and measures before it; near the goals the Lagrangian stands for the measures.
+        after: and after it.
+        predicted: what was foreseen.
+        width: of the funnel; None where the measures do not count.
+    """
+    inside = width is not None and before[0] <= width
+    lead = inside and predicted.measure > DESCENT.switch * before[0] ** 2
+    ways = [("goal", before[0] - after[0], predicted.violation, predicted.violation > 0.0)]
+    if lead and width is not None:
+        ways.insert(0, ("measure", before[1] - after[1], predicted.measure, after[0] <= width))
+    for by, gain, foreseen, allowed in ways:
+        if allowed and gain >= DESCENT.worth * foreseen:
+            return StepAcceptance(True, gain >= DESCENT.good * foreseen, gain < DESCENT.poor * foreseen, by)
+    return StepAcceptance(False, False, False, "rejected measure" if lead else "rejected")
+
+
+def held(local: LocalSolution, tolerance: float) -> bool:
+    """Whether what must hold does where a descent ended."""
+    return broken(local) <= tolerance
+
+
+def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
+    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
+    met = one.violation.worst <= tolerance
+    if met != (other.violation.worst <= tolerance):
+        return met
+    for left, right, alike in (
+        (broken(one), broken(other), 0.05 * tolerance),
+        (one.violation.goal, other.violation.goal, tolerance),
+    ):
+        left, right = max(left, tolerance), max(right, tolerance)
+        if abs(left - right) > max(alike, 1e-5 * min(left, right)):
+            return left < right
+    return one.measure < other.measure
+
+
+def broken(local: LocalSolution) -> float:
+    """By how much what must hold is missed where a descent ended [m, rad]."""
+    return max(local.violation.hold, local.violation.elastic)

@@ -12,8 +12,7 @@ from wholebody.methods.conclusion import Ending, concluded, meets
 from wholebody.methods.control import Control, Progress
 from wholebody.methods.inputs import BUDGET, Iterations, Restarts, Seed, TimeLimit, Tolerance, check_problem
 from wholebody.methods.qp.chain import from_seeds
-from wholebody.methods.qp.multistart import Search
-from wholebody.methods.qp.screening import Settings
+from wholebody.methods.qp.multistart import Budget, Multistart
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.solvers.registry import make_solver
 from wholebody.methods.qp.tracking import QPTracker
@@ -103,18 +102,18 @@ class QP(Checked):
         """
         check_problem(problem, "QP.solve: problem")
         began = time.perf_counter()
-        settings = Settings(
+        budget = Budget(
             self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
             self.restarts_for_measure,
         )  # fmt: skip
         with problem.borrow() as workspace, Control(self.time_limit, progress) as control:
-            met = from_seeds(problem, workspace, settings, control)
+            met = from_seeds(problem, workspace, budget, control)
             known = met is not None and met.stationary and met.blocked is None
             judgement = assess(problem, met.q) if met is not None and known else None
             if met is not None and judgement is not None and meets(judgement, self.tolerance):
                 ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
             else:
-                search = Search(problem, workspace, self._qp_solver(), settings, control)
+                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
                 begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
                 best = search.run(begin, None if met is None else met.blocked)
                 ending = Ending(

@@ -11,20 +11,20 @@ gives way last.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from wholebody.base.arrays import Array, Mask
+from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.records import with_values
 
 MOST = 1e30
 """Sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite."""
 
 
-@dataclass(frozen=True)
-class QuadraticProgram:
-    """Data of one program in n variables.
+class QuadraticProgram(NamedTuple):
+    """Data of one program in n variables; compiled loops take it as it is.
 
     Attributes:
         diagonal: (n,) D, positive.
@@ -61,6 +61,10 @@ class QuadraticProgram:
         ):
             raise ValueError(f"a program of {n} variables, {m} soft and {k} elastic rows has parts of other sizes")
 
+    def packed(self) -> QuadraticProgram:
+        """The program in arrays without gaps, as compiled loops take it."""
+        return self if all(part.flags.c_contiguous for part in self) else type(self)(*map(np.ascontiguousarray, self))
+
     @property
     def is_computable(self) -> bool:
         """Whether its numbers can be computed with: finite ones, also squared, of weights above 0, a box in order.
@@ -83,10 +87,9 @@ class QuadraticProgram:
 
     def with_elastic(self, chosen: Mask) -> QuadraticProgram:
         """The program with the chosen ones of its elastic rows, (k,) of bool."""
-        return QuadraticProgram(
-            self.diagonal, self.linear, self.rows, self.target, self.weight, self.elastic[chosen],
-            self.least[chosen], self.elastic_weight[chosen], self.lower, self.upper,
-        )  # fmt: skip
+        return with_values(
+            self, elastic=self.elastic[chosen], least=self.least[chosen], elastic_weight=self.elastic_weight[chosen]
+        )
 
     def value(self, x: Array) -> float:
         """Objective at x, shape (n,)."""
@@ -138,6 +141,26 @@ class ActiveSet(NamedTuple):
         )
 
 
+class Room(NamedTuple):
+    """Room of the compiled loops for a program with k elastic rows.
+
+    Attributes:
+        work: see `work_size`.
+        places: (2 k or more,).
+        chosen: (k or more,).
+    """
+
+    work: Array
+    places: Indices
+    chosen: Mask
+
+
+def work_size(variables: int, soft: int, elastic: int) -> int:
+    """Floats that `face_kernel.face` lays out for a program of so many variables, soft rows and elastic rows."""
+    rows = soft + elastic
+    return 2 * rows * variables + rows * rows + 3 * rows + elastic + 3 * variables
+
+
 class QPSolution(NamedTuple):
     """Answer to a program.
 
@@ -155,3 +178,59 @@ class QPSolution(NamedTuple):
     exact: bool
     iterations: int
     by: str = ""
+
+
+class Scaling(NamedTuple):
+    """How solvers get a program.
+
+    Attributes:
+        x: what it is multiplied by, so that its entries are as large as the residuals.
+        heaviest: scale of a row at most, squared; larger = heavy rows closer, light ones later.
+        inactive: least value of slots without a row: never active, and no other kind of row than those in use.
+        infinite: what a solver takes for infinite.
+    """
+
+    x: float = 100.0
+    heaviest: float = 1e5
+    inactive: float = -1e3
+    infinite: float = 1e30
+
+
+class SplitForm(NamedTuple):
+    """Objective and rows over z of size n + m + k.
+
+    Attributes:
+        diagonal: (n + m + k,) diagonal Hessian.
+        linear: (n + m + k,).
+        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I], dense.
+        lower, upper: (m + k,) bounds of the rows.
+        box_lower, box_upper: (n + m + k,) bounds of z; infinite for r and s.
+    """
+
+    diagonal: Array
+    linear: Array
+    matrix: Array
+    lower: Array
+    upper: Array
+    box_lower: Array
+    box_upper: Array
+
+
+class SparseForm(NamedTuple):
+    """The same over a fixed pattern of A = [I 0 0; T -I 0; C 0 I], column by column, with the box among its rows.
+
+    Attributes:
+        hessian, gradient: (n + m + slots,) diagonal of P, and q.
+        values: entries of A.
+        lower, upper: (n + m + slots,) bounds of its rows.
+        starts: (n + 1,) where each column begins in `places`.
+        places: rows of the pattern of T.
+    """
+
+    hessian: Array
+    gradient: Array
+    values: Array
+    lower: Array
+    upper: Array
+    starts: NDArray[np.int64]
+    places: NDArray[np.int64]

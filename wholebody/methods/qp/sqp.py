@@ -20,34 +20,18 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
-from wholebody.methods.qp.funnel import WIDTH, Funnel, PredictedReduction, StepAcceptance
-from wholebody.methods.qp.iterates import Iterate, LocalSolution, Step
-from wholebody.methods.qp.multipliers import multipliers_of
+from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import ERROR_CLAMP, Subproblem
+from wholebody.methods.qp.subproblem import Subproblem, lagrangian, multipliers_of
 from wholebody.methods.qp.tangential import Extrapolation, parts_of
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
 
-FIRST_RADIUS = 0.3  # rad, m: of the trust region; larger = fewer iterations in the open, more rejected ones in clutter
-LARGEST_RADIUS = 0.8
 LEAST_RADIUS = 1e-7
-FULL_STEP_DAMPING = (0.5, 2.0)  # shares of the squared error; the second after a rejected step, none after two
-FULL_STEP_GAIN = 0.05  # share of the violation that a step must take away, or full steps end
-LEAST_WITHIN = 0.05  # m: pairs nearer than what a step asks for get rows, and at least those nearer than this
-MOST_WITHIN = 0.12  # m: but none farther apart than this; more is slower, less means more steps that meet things unseen
-WITHIN_STEP = 1.0  # m per rad of the last step: nor farther than this; more rows, or more that is met unseen
-SLOW = 0.1  # share of the violation that must go in PATIENCE iterations, else only the nearest posture is sought
-PATIENCE = 6
-PROGRESS = 0.1  # m, rad: or as much, whatever is left: steps are bounded, and far goals take many
-UNIMPROVED = 4  # postures that fit and save less than ten tolerances of the measure: then it ends
-RENEWALS = 2  # times that a descent with small steps begins anew with long ones before it is taken for settled
-RESTORABLE = 0.03  # m, rad: violation that the next step is trusted to repair
-LEAST_GAIN, LEAST_GAIN_ALONE = 1e-3, 1e-7  # least share of the violation to gain, with measures and without
 BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
-NEAR_MET = 1e-4  # m, rad: goals this near to being met are met by the method of multipliers
 
 
 @dataclass
@@ -65,7 +49,6 @@ class SQP:
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
             posture that fits is the end.
-        early_exit: whether to end where the violation hardly lessens for a while although measures do not count.
         full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
             steps are rejected or gain little; else for a piece of it.
         control: what may end it.
@@ -80,30 +63,27 @@ class SQP:
     trace: list[TraceEntry] = field(default_factory=list)
     note: str = ""
     measures: bool = True
-    early_exit: bool = False
     full_step: bool = False
     control: Control = field(default_factory=lambda: Control(np.inf))
 
     def __post_init__(self) -> None:
         """Begin with a wide trust region and nothing remembered."""
-        self._radius, self._measures, self._full_step = FIRST_RADIUS, self.measures, self.full_step
-        self._damping = FULL_STEP_DAMPING[0] if self.full_step else 0.0
+        self._radius, self._full_step = DESCENT.first_radius, self.full_step
+        self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
-        self._anchor: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
+        self._watched: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
-        self._kept: Iterate | None = None  # best posture that fits, and how many since were hardly better
-        self._unimproved = 0
+        self._kept: Iterate | None = None  # best posture that fits
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
         """Descend from a posture within limits, shape (nq,)."""
         here = self._iterate_at(start)
-        self._funnel = Funnel(here.violation.total)
+        self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
         self._keep(here)  # a start that fits is an answer, should the descent end early
-        history: list[float] = []
-        count, converged, renewals = 0, False, RENEWALS
+        count, converged = 0, False
         while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
                 converged = True
@@ -116,51 +96,29 @@ class SQP:
                 None if self._full_step else self._pull,
                 self._damping,
                 self._shift,
-                self._measures,
+                self.measures,
             )
             answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
             if self._settled(here, step):
-                if self._radius < FIRST_RADIUS and renewals:  # small steps alone are no sign of an optimum
-                    renewals -= 1
-                    self._radius, self._damping, self._full_step = FIRST_RADIUS, 0.0, False
-                    continue
-                converged = True
-                break
-            if self._unimproved >= UNIMPROVED:
                 converged = True
                 break
             there = self._advance(here, program, step)
             if there is not None:
                 here = there
                 self._keep(here)
-                history.append(here.violation.total)
-                if stalls(history, self.tolerance):
-                    if self.early_exit and not self._measures:
-                        break
-                    if self._measures:
-                        self._measures, history = False, []
-                        self._ahead.reset()
-                elif self.measures and not self._measures and here.violation.worst <= 10.0 * self.tolerance:
-                    self._measures = True
-            elif self._anchor is not None:
-                here, self._anchor = self._anchor, None
+            elif self._watched is not None:
+                here, self._watched = self._watched, None
             elif self._radius < LEAST_RADIUS:
                 converged = True
                 break
-        if self._anchor is not None:
-            here = self._anchor
+        here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
     def _keep(self, here: Iterate) -> None:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
-        if here.violation.worst > self.tolerance or not self._measures:
-            return
-        worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
-        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
-        self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
 
@@ -174,20 +132,20 @@ class SQP:
         The Hessian of the Lagrangian (Nocedal and Wright 2006, section 18.1), its positive part.
         """
         planes = here.at.planes
-        if planes is None or self._tension is None or not len(planes.bend) or not self._measures:
+        if planes is None or self._tension is None or not len(planes.bend) or not self.measures:
             return here.at
         pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
 
     @property
     def _pull(self) -> float:
-        return ERROR_CLAMP * self._radius * self._stretch
+        return PROGRAM.error_clamp * self._radius * self._stretch
 
     def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
         """What the answer of a program is to bring; near the goals, what its two parts are."""
         x, parts, flat, multipliers = answer.x, None, False, None
-        if self._measures and here.violation.total <= WIDTH:
-            parts = parts_of(program, answer, self._shift, self._working_set)
+        if self.measures and here.violation.total <= DESCENT.width:
+            parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
@@ -211,11 +169,11 @@ class SQP:
         held = max(violation.hold, violation.elastic) <= self.tolerance
         worth = max(
             0.05 * self.tolerance,
-            (LEAST_GAIN if self._measures else LEAST_GAIN_ALONE) * violation.total if held else 0.0,
+            (DESCENT.least_gain if self.measures else DESCENT.least_gain_alone) * violation.total if held else 0.0,
         )
         if violation.worst > self.tolerance and predicted.violation > worth:
             return False
-        if not self._measures or step.flat:
+        if not self.measures or step.flat:
             return True
         still = float(np.abs(step.dq).max(initial=0.0)) <= 10.0 * self.tolerance
         return still or predicted.measure <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
@@ -240,12 +198,12 @@ class SQP:
             self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        promising = not acceptance.accepted and self._promises(here, there)
-        if (acceptance.accepted or promising) and self._jumps(here, there):
-            acceptance, promising = StepAcceptance(False, False, False, "blocked"), False
-        self._record(there, "tentative" if promising else acceptance.by)
-        if promising:
-            self._anchor = here
+        watched = not acceptance.accepted and self._is_worth_watching(here, there)
+        if (acceptance.accepted or watched) and self._jumps(here, there):
+            acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
+        self._record(there, "tentative" if watched else acceptance.by)
+        if watched:
+            self._watched = here
             self._ahead.reset()
             self._shift = np.zeros_like(self._shift)
             return there
@@ -257,8 +215,8 @@ class SQP:
     def _reject(self, longest: float, by: str) -> None:
         """Ask for less after a step whose longest entry is this was rejected."""
         if self._full_step:
-            self._full_step = self._damping < FULL_STEP_DAMPING[1]
-            self._damping = FULL_STEP_DAMPING[1] if self._full_step else 0.0
+            self._full_step = self._damping < DESCENT.full_step_damping[1]
+            self._damping = DESCENT.full_step_damping[1] if self._full_step else 0.0
             return
         self._stretch = 1.0
         self._radius = 0.3 * min(longest, self._radius)
@@ -275,33 +233,24 @@ class SQP:
         What would be left of the rows' violation after the program's own answer, because the measures pull, is asked
         for in the next one (method of multipliers).
         """
-        if self._full_step and there.violation.total > (1.0 - FULL_STEP_GAIN) * here.violation.total:
+        if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
             self._full_step, self._damping = False, 0.0
-        if acceptance.by == "goal":
-            self._funnel.narrow(here.violation.total, there.violation.total)
         if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
             if not self._full_step:
                 self._damping *= 0.3
-            if there.longest > 0.5 * self._radius or here.violation.left > ERROR_CLAMP * self._radius:
-                self._radius = min(2.0 * self._radius, LARGEST_RADIUS)
+            if there.longest > 0.5 * self._radius or here.violation.left > PROGRAM.error_clamp * self._radius:
+                self._radius = min(2.0 * self._radius, DESCENT.largest_radius)
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
+        self._watched = None
         if step.parts is not None and not step.flat:
             self._ahead.record(step.parts, way, way is not step.dq)
-        self._anchor = None
         asked = len(self._shift)
         residual = program.rows[:asked] @ step.answer - program.target[:asked]
-        self._shift = residual if np.abs(residual).max(initial=0.0) < NEAR_MET else np.zeros_like(residual)
+        self._shift = residual if np.abs(residual).max(initial=0.0) < DESCENT.near_met else np.zeros_like(residual)
         return there
-
-    def _promises(self, here: Iterate, there: Iterate) -> bool:
-        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
-        if self._anchor is not None or not self._measures:
-            return False
-        broken = max(there.violation.elastic, there.violation.hold)
-        return there.violation.goal < here.violation.goal and broken < RESTORABLE
 
     def _jumps(self, here: Iterate, there: Iterate) -> bool:
         return passes_through(self.lineariser.workspace, here.placed, there.placed, here.at.q, there.at.q)
@@ -316,31 +265,40 @@ class SQP:
             return None
 
     def _iterate_at(self, q: Array, longest: float = np.inf) -> Iterate:
-        within = max(LEAST_WITHIN, min(ERROR_CLAMP * self._radius, WITHIN_STEP * longest, MOST_WITHIN))
+        within = max(
+            DESCENT.least_within,
+            min(
+                PROGRAM.error_clamp * self._radius,
+                DESCENT.within_step * longest,
+                DESCENT.most_within,
+            ),
+        )
         at = self.lineariser.at(q, within, planes=self.offset is None)
         rows = self.subproblem.rows(at)
         if self.offset is not None:
             rows.soft_error[: rows.goals] -= self.offset
         return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
+    def _is_worth_watching(self, here: Iterate, there: Iterate) -> bool:
+        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
+        if self._watched is not None or not self.measures:
+            return False
+        broken = max(there.violation.elastic, there.violation.hold)
+        return there.violation.goal < here.violation.goal and broken < DESCENT.restorable
+
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
         """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
-        predicted = step.predicted
-        if self._anchor is not None:
-            predicted = with_values(
-                predicted, violation=max(0.1 * predicted.violation, 1e-3 * self._anchor.violation.total)
-            )
-        before = here if self._anchor is None else self._anchor
+        predicted, before = step.predicted, here
+        if self._watched is not None:
+            before = self._watched
+            least = max(0.1 * predicted.violation, 1e-3 * before.violation.total)
+            predicted = with_values(predicted, violation=least)
         measures = [
-            one.at.measure if step.multipliers is None else step.multipliers.lagrangian(one.at.measure, one.rows)
+            one.at.measure if step.multipliers is None else lagrangian(step.multipliers, one.at.measure, one.rows)
             for one in (before, there)
         ]
-        return self._funnel.judge(
-            (before.violation.total, measures[0]),
-            (there.violation.total, measures[1]),
-            predicted,
-            self._measures,
-        )
+        values = (before.violation.total, measures[0]), (there.violation.total, measures[1])
+        return judge(*values, predicted, self._width if self.measures else None)
 
     def _record(self, there: Iterate, what: str) -> None:
         note = f"{self.note}: {what}" if self.note else what
@@ -355,11 +313,3 @@ class SQP:
             )
         )
         self.control.tell(self.trace[-1])
-
-
-def stalls(history: list[float], tolerance: float) -> bool:
-    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
-    if len(history) <= PATIENCE or history[-1] <= 100.0 * tolerance:
-        return False
-    before = min(history[:-PATIENCE])
-    return min(history[-PATIENCE:]) > before - min(SLOW * before, PROGRESS)

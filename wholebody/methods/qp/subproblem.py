@@ -7,7 +7,7 @@ Because the programs are solved exactly, the order is kept to rounding whatever 
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,85 +16,22 @@ from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.methods.qp.quadratic_program import QuadraticProgram
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.rows import (
+    Multipliers,
+    Rows,
+    Terms,
+    Violation,
+    step_size,
+)
+from wholebody.methods.qp.settings import PROGRAM, WEIGHTS
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation
 from wholebody.terms.planes import TermPlanes
 
-PROXIMAL_SHARE = 0.01  # share of the curvature left where measures do not count: they still say which joints move
-GOAL_FORCE = 1e4  # 1/m: what a goal pulls with, however far it is; far above what measures pull with
-GOAL_WEIGHTS = (1e4, 1e8)  # 1/m^2, 1/rad^2: least and greatest weight of a goal row
-HOLD_WEIGHT = 1e10  # equalities give way by 1e-6 m to the pull of a goal out of reach
-ELASTIC_WEIGHT = 1e10  # and so do contacts
-ERROR_CLAMP = 0.4  # m per rad of radius: of a goal farther away, or a deeper overlap, one step asks for this much
-BOX = 2.0  # radii: the box around a step, which seldom holds it; asking for little keeps programs easy instead
-HOLD_SHARE = 3.0  # what a metre of hold counts against a metre of goal when a step is judged
-ELASTIC_SHARE = 10.0  # and a metre of overlap; above any ratio at which overlap could buy goal
-FORCE = np.array([GOAL_FORCE, *GOAL_WEIGHTS, HOLD_WEIGHT])
-"""What the compiled loops take of the above."""
-
-LEAST_SHARE = 1e-3  # of the largest goal weight: goals that weigh less count as this much, or they would not be met
-HEAVIEST_CURVATURE = 5e3  # 1/rad^2: heavier measures are scaled to this; above it they would hold goals back
-MOST_ROWS = 4096  # more than one contact ever has
 PLANE_KEYS = -(1 << 40)  # keys of supporting planes are below this, out of the way of all others
-LEVER = 1.0  # m: of a limb; larger = more damping of every joint while a goal is out of reach
-LEAST_CURVATURE = 1e-3  # share of the largest curvature that a degree of freedom has which no measure speaks for
 
 _NONE = np.zeros(0)
-
-
-class Violation(NamedTuple):
-    """How far a posture is from what is asked: metres and radians.
-
-    Attributes:
-        goal: norm of the goal errors, each times the root of its weight's share of the largest.
-        hold: norm of the equality constraints' errors.
-        elastic: sum of the violations of clearances and inequalities.
-        left: norm of the goal errors, without weights.
-    """
-
-    goal: float
-    hold: float
-    elastic: float
-    left: float
-
-    @property
-    def total(self) -> float:
-        """One figure, in which overlap counts most."""
-        return self.goal + HOLD_SHARE * self.hold + ELASTIC_SHARE * self.elastic
-
-    @property
-    def worst(self) -> float:
-        """What is compared with the tolerance."""
-        return max(self.left, self.hold, self.elastic)
-
-
-class Rows(NamedTuple):
-    """A linearisation sorted into soft rows (goals, then equalities) and elastic ones (inequalities, then gaps).
-
-    Attributes:
-        soft: (m, nv) goals' and equalities' rows.
-        soft_error: (m,) their errors.
-        soft_weight: (m,) their weights.
-        goals: how many of them are goals'.
-        elastic: (k, nv) rows of inequalities and gaps.
-        elastic_violation: (k,) by how much they are violated; negative where they hold with room to spare.
-        contact: (k,) rows of one contact share its number; the worst of them counts.
-        contacts: how many numbers there are.
-        key: (k,) names a row from one linearisation to the next.
-        elastic_weight: (k,) their weights; None where all have `ELASTIC_WEIGHT`.
-    """
-
-    soft: Array
-    soft_error: Array
-    soft_weight: Array
-    goals: int
-    elastic: Array
-    elastic_violation: Array
-    contact: NDArray[np.intp]
-    contacts: int
-    key: NDArray[np.intp]
-    elastic_weight: Array | None = None
 
 
 def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
@@ -103,16 +40,14 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     The gap itself counts, and is violated wherever a plane is.
     """
     count = len(planes.value)
-    weights = np.append(rows.soft_weight[: rows.goals], HOLD_WEIGHT)
+    weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
     return with_values(
         rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
         elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
         contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),
         key=np.concatenate([rows.key, PLANE_KEYS - planes.key]),
-        elastic_weight=np.concatenate(
-            [np.full(len(rows.elastic), ELASTIC_WEIGHT), weights[np.minimum(planes.row, rows.goals)]]
-        ),
+        elastic_weight=np.concatenate([rows.elastic_weight, weights[np.minimum(planes.row, rows.goals)]]),
     )
 
 
@@ -120,10 +55,7 @@ class Subproblem:
     """Builds programs for one problem.
 
     Attributes:
-        goal_share: (g,) weights of the goals' rows, as shares of the largest.
-        kind: (c,) of each constraint's value: whether it is an equality (0), has a lower bound (1), an upper bound (2),
-            both (3) or none (-1).
-        bound: (2, c) lower and upper bounds of the values.
+        terms: the terms' rows, with the goals' weights.
         one_sided: number of the inequalities.
     """
 
@@ -148,12 +80,12 @@ class Subproblem:
         self._lower = np.concatenate(lower) if lower else np.zeros(0)
         self._upper = np.concatenate(upper) if upper else np.zeros(0)
         goal_weight = np.concatenate(weight) if weight else np.zeros(0)
-        self.goal_share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), LEAST_SHARE)
+        share = np.maximum(goal_weight / goal_weight.max(initial=1e-300), PROGRAM.least_share)
         self.scale = 1.0
         """What measures are multiplied by, so that heavy ones do not outweigh goals."""
         heaviest = sum((m.weight * m.curvature(state) for m in problem.measures), np.zeros(state.model.nv))
-        if heaviest.max(initial=0.0) > HEAVIEST_CURVATURE:
-            self.scale = HEAVIEST_CURVATURE / float(heaviest.max())
+        if heaviest.max(initial=0.0) > PROGRAM.heaviest_curvature:
+            self.scale = PROGRAM.heaviest_curvature / float(heaviest.max())
         self._equal = np.flatnonzero(self._lower == self._upper)
         self.equalities = [int((low == high).sum()) for low, high in zip(lower, upper, strict=True)]
         """How many rows of each constraint are equalities."""
@@ -161,8 +93,8 @@ class Subproblem:
         high = (self._lower != self._upper) & np.isfinite(self._upper)
         self.one_sided = int(low.sum() + high.sum())
         neither = (self._lower != self._upper) & ~low & ~high
-        self.kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
-        self.bound = np.array([self._lower, self._upper]).reshape(2, -1)
+        kind = np.where(neither, -1, low + 2 * high).astype(np.intp)
+        self.terms = Terms(kind, np.array([self._lower, self._upper]).reshape(2, -1), share, np.array(WEIGHTS))
         self._kernel = compiled_kernel()
 
     def rows(self, at: Linearisation) -> Rows:
@@ -175,30 +107,29 @@ class Subproblem:
         self.check_rows(goals, len(at.value))
         nv, soft, elastic = len(at.gradient), goals + len(self._equal), self.one_sided + len(at.gap)
         soft_rows, soft_values = np.empty((soft, nv)), np.empty((2, soft))
-        elastic_rows, violated = np.empty((elastic, nv)), np.empty(elastic)
+        elastic_rows, elastic_values = np.empty((elastic, nv)), np.empty((2, elastic))
         labels = np.empty((2, elastic), dtype=np.intp)
         self._kernel.sort_rows(
             at.goal_error, at.goal_jacobian, at.value, at.value_jacobian, at.gap, at.gap_jacobian, at.gap_contact,
-            at.clearance, at.contacts.number, self.kind, self.bound, self.goal_share, FORCE, MOST_ROWS, soft_rows,
-            soft_values, elastic_rows, violated, labels,
+            at.clearance, at.contacts.number, *self.terms, soft_rows, soft_values, elastic_rows, elastic_values, labels,
         )  # fmt: skip
-        contacts = self.one_sided + len(at.contacts.distance)
         rows = Rows(
-            soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, violated, labels[0], contacts, labels[1],
+            soft_rows, soft_values[0], soft_values[1], goals, elastic_rows, elastic_values[0], labels[0],
+            self.one_sided + len(at.contacts.distance), labels[1], elastic_values[1],
         )  # fmt: skip
         return rows if at.planes is None else _with_planes(rows, at.planes)
 
     def soft_row(self, row: NDArray[np.intp]) -> NDArray[np.intp]:
         """The soft rows of rows (k,) that are counted with the goals' before all values'; they are equalities."""
-        goals = len(self.goal_share)
+        goals = len(self.terms.share)
         return np.where(row < goals, row, goals + np.searchsorted(self._equal, row - goals))
 
     def check_rows(self, goals: int, values: int) -> None:
         """Raise InputError where goals and constraints have other numbers of rows than when this was set up."""
-        if goals != len(self.goal_share) or values != len(self.kind):
+        if goals != len(self.terms.share) or values != len(self.terms.kind):
             raise InputError(
-                f"goals and constraints have {goals} and {values} rows here, and had {len(self.goal_share)} "
-                f"and {len(self.kind)} at the start; give each term one number of rows at all postures"
+                f"goals and constraints have {goals} and {values} rows here, and had {len(self.terms.share)} "
+                f"and {len(self.terms.kind)} at the start; give each term one number of rows at all postures"
             )
 
     def violation(self, rows: Rows, displacement: Array | None = None) -> Violation:
@@ -206,8 +137,8 @@ class Subproblem:
         way = _NONE if displacement is None else displacement
         return Violation(
             *self._kernel.violation(
-                rows.soft_error, rows.soft, rows.elastic_violation, rows.elastic, rows.contact, self.goal_share,
-                np.empty(rows.contacts), way,
+                rows.soft, rows.soft_error, rows.elastic, rows.elastic_violation, rows.contact, rows.contacts,
+                self.terms.share, way,
             )
         )  # fmt: skip
 
@@ -251,33 +182,53 @@ class Subproblem:
         """
         squares = at.squares if measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature
-        numbers = np.array(
-            [self.scale, LEAST_CURVATURE, PROXIMAL_SHARE, radius, 0.0 if pull is None else pull, damping, LEVER]
-            + [BOX * radius, ERROR_CLAMP * radius, gain]
-        )
-        columns = np.empty((4, len(at.gradient)))
-        target, least = np.empty(len(rows.soft_error)), np.empty(len(rows.elastic_violation))
-        self._kernel.program(
-            at.gradient, curvature, at.lower, at.upper, rows.soft_error, rows.soft_weight,
-            rows.goals, rows.elastic_violation, shift,
-            measures, pull is not None, numbers, columns, target, least,
+        step = step_size(self.scale, radius, 0.0 if pull is None else pull, damping, gain, measures)
+        soft, columns = np.array([rows.soft_error, rows.soft_weight, shift]), np.empty((4, len(at.gradient)))
+        least = np.empty(len(rows.elastic_violation))
+        self._kernel.fill_program(
+            np.array([at.gradient, curvature]), np.array([at.lower, at.upper]), rows.goals, soft,
+            rows.elastic_violation, step, columns, least,
         )  # fmt: skip
-        soft, weight = rows.soft, rows.soft_weight
-        if len(squares):
-            soft, target = np.vstack([soft, squares]), np.concatenate([target, np.zeros(len(squares))])
-            weight = np.concatenate([weight, np.full(len(squares), self.scale / gain)])
-        return QuadraticProgram(
-            diagonal=columns[0],
-            linear=columns[1],
-            rows=soft,
-            target=target,
-            weight=weight,
-            elastic=rows.elastic,
-            least=least,
-            elastic_weight=np.full(len(least), ELASTIC_WEIGHT) if rows.elastic_weight is None else rows.elastic_weight,
-            lower=columns[2],
-            upper=columns[3],
+        target = soft[2]
+        program = QuadraticProgram(
+            columns[0], columns[1], rows.soft, target, rows.soft_weight, rows.elastic, least, rows.elastic_weight,
+            columns[2], columns[3],
+        )  # fmt: skip
+        if not len(squares):
+            return program
+        return with_values(
+            program,
+            rows=np.vstack([rows.soft, squares]),
+            target=np.concatenate([target, np.zeros(len(squares))]),
+            weight=np.concatenate([rows.soft_weight, np.full(len(squares), self.scale / gain)]),
         )
+
+
+def multipliers_of(program: QuadraticProgram, answer: QPSolution, rows: Rows, scale: float) -> Multipliers:
+    """The multipliers of a program.
+
+    Args:
+        program: of a step.
+        answer: its answer.
+        rows: that it was made of.
+        scale: what measures are multiplied by in it.
+    """
+    m, x = len(rows.soft_error), answer.x
+    soft = program.weight[:m] * (program.rows[:m] @ x - program.target[:m]) / scale
+    violated = np.where(answer.active.elastic, program.least - program.elastic @ x, 0.0)
+    return Multipliers(soft, program.elastic_weight * violated / scale, rows.key)
+
+
+def lagrangian(multipliers: Multipliers, measure: float, rows: Rows) -> float:
+    """L at a posture with these measures and rows; elastic rows that are not there any more add nothing.
+
+    A posture that misses its goals has lower measures than one that meets them, and the next step will take that back.
+    So near the goals two postures compare by L(q) = m(q) + y' c(q) + z' v(q), with the measures m, the errors c of the
+    soft rows, the violations v of the elastic ones, less than zero where they hold with room to spare, and the
+    multipliers y, z of the program between them (Nocedal and Wright 2006, chapter 12).
+    """
+    work: float = compiled_kernel().work(*multipliers, rows.soft_error, rows.key, rows.elastic_violation)
+    return measure + work
 
 
 @lru_cache(maxsize=1)
@@ -285,20 +236,18 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import subproblem_kernel
 
-    none, rows, index, pair = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp), np.zeros((2, 0))
-    one, number = np.ones(1), np.ones(10)
+    none, matrix, index = np.zeros(0), np.zeros((0, 1)), np.zeros(0, dtype=np.intp)
+    two, labels = np.zeros((2, 0)), np.zeros((2, 0), dtype=np.intp)
     subproblem_kernel.sort_rows(
-        none, rows, none, rows, none, rows, index, none, index, index, pair, none, FORCE, MOST_ROWS, rows, pair, rows,
-        none, np.zeros((2, 0), dtype=np.intp),
+        none, matrix, none, matrix, none, matrix, index, none, index, index, two, none, np.array(WEIGHTS), matrix, two,
+        matrix, two, labels,
     )  # fmt: skip
-    subproblem_kernel.violation(none, rows, none, rows, index, none, none, none)
-    subproblem_kernel.program(
-        one, one, one, one, none, none, 0, none, none, True, True, number, np.ones((4, 1)), none, none
+    subproblem_kernel.violation(matrix, none, matrix, none, index, 0, none, none)
+    step = step_size(1.0, 1.0, 1.0, 1.0, 1.0, True)
+    subproblem_kernel.fill_program(
+        np.ones((2, 1)), np.ones((2, 1)), 0, np.zeros((3, 0)), none, step, np.ones((4, 1)), none
     )
-    subproblem_kernel.multipliers(rows, none, none, rows, none, none, np.zeros(0, dtype=bool), one, 1.0, none, none)
     subproblem_kernel.work(none, none, index, none, index, none)
-    one_joint = np.zeros(1, dtype=np.intp)
-    subproblem_kernel.motion(
-        one, np.zeros((1, 6)), one_joint, one_joint, one_joint, np.zeros((1, 4, 3)), one, np.zeros((1, 6))
-    )
+    three = np.zeros(3)
+    subproblem_kernel.add_kinematic_hessian(matrix, np.zeros((0, 6)), none, three, three, three)
     return subproblem_kernel

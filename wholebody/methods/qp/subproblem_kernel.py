@@ -4,14 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
+from wholebody.methods.qp.dense_kernel import dot, sort
+from wholebody.methods.qp.rows import LinearRows, Rows, StepSize, Terms
+from wholebody.methods.qp.settings import Weights
+
+MOST_ROWS = 4096  # more than one contact ever has
 
 
 @compiled()
 def sort_rows(
-    goal_error: Array,
-    goal_jacobian: Array,
+    error: Array,
+    error_jacobian: Array,
     value: Array,
     value_jacobian: Array,
     gap: Array,
@@ -22,271 +27,238 @@ def sort_rows(
     kind: Indices,
     bound: Array,
     share: Array,
-    force: Array,
-    most_rows: int,
+    weights: Array,
     soft: Array,
     soft_values: Array,
     elastic: Array,
-    violated: Array,
+    elastic_values: Array,
     labels: Indices,
 ) -> None:
-    """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them.
+    """`fill_rows` for a call from Python, which gives the parts of `LinearRows`, of `Terms` and of `Rows`.
 
-    The first nine arguments are the linearisation's, `number` being that of its contacts. `kind` (c,) says of each
-    value whether it is an equality (0), has a lower bound (1), an upper bound (2) or both (3); `bound` (2, c) are the
-    bounds. `share` (g,) are the goals' shares of the largest weight, `force` the force of all goals with these weights,
-    the least and the largest factor of their weights and the weight of equalities. A contact has fewer rows than
-    `most_rows`. The other arguments are room: `soft_values` (2, m) for errors and weights, `labels` (2, k) for contacts
-    and keys.
+    Records of as many arrays would take twice as long as the call.
     """
-    nv, goals, values = soft.shape[1], len(goal_error), len(value)
-    square = 0.0
+    there = LinearRows(error, error_jacobian, value, value_jacobian, gap, gap_jacobian, gap_contact, clearance, number)
+    rows = rows_in(soft, soft_values, elastic, elastic_values, labels, len(error), 0)
+    fill_rows(there, Terms(kind, bound, share, weights), rows)
+
+
+@compiled(inner=True, forceinline=True)
+def rows_in(
+    soft: Array, soft_values: Array, elastic: Array, elastic_values: Array, labels: Indices, goals: int, contacts: int
+) -> Rows:
+    """`Rows` in arrays: (2, m) errors and weights, (2, k) violations and weights, (2, k) contacts and keys."""
+    return Rows(
+        soft, soft_values[0], soft_values[1], goals, elastic, elastic_values[0], labels[0], contacts, labels[1],
+        elastic_values[1],
+    )  # fmt: skip
+
+
+@compiled(inner=True, forceinline=True)
+def fill_rows(there: LinearRows, given: Terms, rows: Rows) -> None:
+    """Sort the rows of a linearisation into soft and elastic ones, as `Rows` has them, whose arrays are filled."""
+    errors, values, gaps, clearance = there.error, there.value, there.gap, there.clearance
+    error_jacobian, value_jacobian, gap_jacobian = there.error_jacobian, there.value_jacobian, there.gap_jacobian
+    number, gap_contact, kind, bound, share = there.number, there.gap_contact, given.kind, given.bound, given.share
+    elastic_weight, nv = rows.elastic_weight, rows.soft.shape[1]
+    weights = Weights(given.weights[0], given.weights[1], given.weights[2], given.weights[3], given.weights[4])
+    soft, soft_error, soft_weight, elastic = rows.soft, rows.soft_error, rows.soft_weight, rows.elastic
+    violated, contact, key = rows.elastic_violation, rows.contact, rows.key
+    goals, square = len(errors), 0.0
     for r in range(goals):
-        square += (share[r] * goal_error[r]) ** 2
-    pull = min(max(force[0] / max(np.sqrt(square), 1e-12), force[1]), force[2])
+        square += (share[r] * errors[r]) ** 2
+    pull = min(max(weights.force / max(np.sqrt(square), 1e-12), weights.least), weights.most)
     for r in range(goals):
-        soft_values[0, r], soft_values[1, r] = goal_error[r], pull * share[r]
+        soft_error[r], soft_weight[r] = errors[r], pull * share[r]
         for i in range(nv):
-            soft[r, i] = goal_jacobian[r, i]
+            soft[r, i] = error_jacobian[r, i]
     row = goals
-    for c in range(values):
+    for c in range(len(values)):
         if kind[c] == 0:
-            soft_values[0, row], soft_values[1, row] = value[c] - bound[0, c], force[3]
+            soft_error[row], soft_weight[row] = values[c] - bound[0, c], weights.hold
             for i in range(nv):
                 soft[row, i] = value_jacobian[c, i]
             row += 1
     row = 0
     for side in range(2):
-        for c in range(values):
+        sign = 1.0 if side == 0 else -1.0
+        for c in range(len(values)):
             if kind[c] == 3 or kind[c] == side + 1:
-                sign = 1.0 if side == 0 else -1.0
-                violated[row] = sign * (bound[side, c] - value[c])
-                labels[0, row], labels[1, row] = row, -1 - row
+                violated[row] = sign * (bound[side, c] - values[c])
+                contact[row], key[row], elastic_weight[row] = row, -1 - row, weights.elastic
                 for i in range(nv):
                     elastic[row, i] = sign * value_jacobian[c, i]
                 row += 1
-    first, contacts = row, len(number)
-    place = 0
-    for r in range(len(gap)):
+    first, count, place = row, len(number), 0
+    for r in range(len(gaps)):
         c = gap_contact[r]
-        if r >= contacts:
-            place = place + 1 if r > contacts and gap_contact[r - 1] == c else 1
-        violated[first + r] = clearance[r] - gap[r]
-        labels[0, first + r], labels[1, first + r] = first + c, number[c] * most_rows + place
+        if r >= count:
+            place = place + 1 if r > count and gap_contact[r - 1] == c else 1
+        violated[first + r] = clearance[r] - gaps[r]
+        contact[first + r], key[first + r] = first + c, number[c] * MOST_ROWS + place
         for i in range(nv):
             elastic[first + r, i] = gap_jacobian[r, i]
+        elastic_weight[first + r] = weights.elastic
 
 
 @compiled()
 def violation(
-    soft_error: Array,
     soft: Array,
-    violated: Array,
+    soft_error: Array,
     elastic: Array,
+    violations: Array,
     contact: Indices,
+    contacts: int,
     share: Array,
-    worst: Array,
     displacement: Array,
 ) -> tuple[float, float, float, float]:
-    """The figures of `Violation` after a displacement: (nv,), or empty for none; `worst` (contacts,) is room.
+    """The figures of `Violation` after a displacement: (nv,), or empty for none.
 
-    Elastic rows of the contact -1 do not count.
+    `share` (g,) are the goals' weights. Elastic rows of the contact -1 do not count.
     """
     goals, moves = len(share), len(displacement) > 0
-    goal, hold, left, total = 0.0, 0.0, 0.0, 0.0
+    goal, hold, left, total, worst = 0.0, 0.0, 0.0, 0.0, np.zeros(contacts)
     for r in range(len(soft_error)):
         error = soft_error[r]
         if moves:
-            for i in range(len(displacement)):
-                error += soft[r, i] * displacement[i]
+            error += dot(soft[r], displacement)
         if r < goals:
             goal += share[r] * error * error
             left += error * error
         else:
             hold += error * error
-    worst[:] = 0.0
-    for r in range(len(violated)):
-        violation = violated[r]
+    for r in range(len(violations)):
+        violated = violations[r]
         if moves:
-            for i in range(len(displacement)):
-                violation -= elastic[r, i] * displacement[i]
+            violated -= dot(elastic[r], displacement)
         if contact[r] >= 0:
-            worst[contact[r]] = max(worst[contact[r]], violation)
+            worst[contact[r]] = max(worst[contact[r]], violated)
     for c in range(len(worst)):
         total += worst[c]
     return np.sqrt(goal), np.sqrt(hold), total, np.sqrt(left)
 
 
 @compiled()
-def program(
-    gradient: Array,
-    curvature: Array,
-    lower: Array,
-    upper: Array,
-    soft_error: Array,
-    soft_weight: Array,
-    goals: int,
-    violated: Array,
-    shift: Array,
-    measures: bool,
-    pulls: bool,
-    numbers: Array,
-    columns: Array,
-    target: Array,
-    least: Array,
+def fill_program(
+    measure: Array, box: Array, goals: int, soft: Array, violations: Array, size: Array, columns: Array, least: Array
 ) -> None:
-    """The numbers of a program that are not rows, as `Subproblem.program` says.
+    """Fill in the numbers of a program that are not rows or weights, as `Subproblem.program` says.
 
-    `numbers` are the scale of the measures, the least share of the largest curvature, the proximal share, the radius,
-    the pull, the damping, the lever, the size of the box, the largest violation asked for and the gain. `columns` (4,
-    nv) is room for diagonal, linear, lower and upper; `target` (m,) and `least` (k,) are room too.
+    Args:
+        measure: (2, nv) gradient and curvature of the measures.
+        box: (2, nv) bounds of the step.
+        goals: number of their rows.
+        soft: (3, m) errors and weights of the soft rows, and what is added to the errors; the last become the targets.
+        violations: (k,) of the elastic rows.
+        size: (11,) the fields of `StepSize`.
+        columns: (4, nv) become diagonal, linear, lower and upper.
+        least: (k,) become the least values of the elastic rows.
     """
-    nv = len(gradient)
-    scale, floor_share, proximal, radius = numbers[0], numbers[1], numbers[2], numbers[3]
-    pull, damping, lever, box, most, gain = numbers[4], numbers[5], numbers[6], numbers[7], numbers[8], numbers[9]
-    largest = 0.0
-    for i in range(nv):
-        largest = max(largest, scale * curvature[i])
-    floor = largest * floor_share
+    step = StepSize(
+        size[0], size[1], size[2], size[3], size[4], size[5] > 0.0, size[6], size[7], size[8], size[9], size[10]
+    )
+    gradient, curvature = measure[0], measure[1]
+    soft_error, soft_weight, target = soft[0], soft[1], soft[2]
+    diagonal, linear, lower, upper = columns[0], columns[1], columns[2], columns[3]
+    largest, square, farthest, heaviest_error = 0.0, 0.0, 0.0, 0.0
+    for i in range(box.shape[1]):
+        largest = max(largest, step.scale * curvature[i])
+    floor = largest * step.least_curvature
     if floor == 0.0:
         floor = 1.0
-    square, heaviest, farthest, heaviest_error = 0.0, 0.0, 0.0, 0.0
     for r in range(goals):
         farthest = max(farthest, abs(soft_error[r]))
-    factor = pull / farthest if pulls and farthest > pull else 1.0
-    for r in range(len(target)):
+    factor = step.pull / farthest if 0.0 < step.pull < farthest else 1.0
+    for r in range(len(soft_error)):
         error = soft_error[r]
         if r < goals:
             square += soft_weight[r] * error * error
             error *= factor
-            heaviest = max(heaviest, soft_weight[r])
             heaviest_error = max(heaviest_error, soft_weight[r] * abs(error))
-        target[r] = -(error + shift[r])
-    for i in range(nv):
-        entry = max(scale * curvature[i], floor)
-        columns[1, i] = scale * gradient[i] if measures else 0.0
-        columns[0, i] = max(entry / gain if measures else proximal * entry, abs(columns[1, i]) / radius)
-        columns[2, i] = min(max(lower[i], -box), box)
-        columns[3, i] = min(max(upper[i], -box), box)
-    if pulls:
-        for i in range(nv):
-            columns[0, i] += damping * lever * heaviest_error
+        target[r] = -(error + target[r])
+    for i in range(box.shape[1]):
+        entry = max(step.scale * curvature[i], floor)
+        linear[i] = step.scale * gradient[i] if step.measures else 0.0
+        entry = entry / step.gain if step.measures else step.proximal * entry
+        diagonal[i] = max(entry, abs(linear[i]) / step.radius)
+        lower[i] = min(max(box[0, i], -step.box), step.box)
+        upper[i] = min(max(box[1, i], -step.box), step.box)
+    if step.pull > 0.0:
+        for i in range(box.shape[1]):
+            diagonal[i] += step.damping * step.lever * heaviest_error
     else:
         # half way between joints that move alike, which takes the fewest steps, and as the measures would have them
-        middle = _middle(columns[0])
-        for i in range(nv):
-            columns[0, i] += damping * square * np.sqrt(columns[0, i] / middle)
-    for r in range(len(least)):
-        least[r] = min(violated[r], most)
+        middle = _middle(diagonal)
+        for i in range(box.shape[1]):
+            diagonal[i] += step.damping * square * np.sqrt(diagonal[i] / middle)
+    for r in range(len(violations)):
+        least[r] = min(violations[r], step.overlap)
 
 
 @compiled(inner=True)
 def _middle(values: Array) -> float:
     """Entry that half of the values (n,) are less than."""
-    ordered = values.copy()
-    for place in range(1, len(values)):
-        own, back = ordered[place], place - 1
-        while back >= 0 and ordered[back] > own:
-            ordered[back + 1] = ordered[back]
-            back -= 1
-        ordered[back + 1] = own
-    return float(ordered[len(values) // 2])
-
-
-@compiled()
-def multipliers(
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    pushing: Mask,
-    x: Array,
-    scale: float,
-    soft_multiplier: Array,
-    elastic_multiplier: Array,
-) -> None:
-    """Write the multipliers of a program's first soft rows and of its elastic ones, as `Multipliers` has them.
-
-    The arguments up to `elastic_weight` are the program's; `x` (n,) is its answer with the elastic rows that push (k,),
-    and `scale` what measures are multiplied by. The last two, (m,) and (k,), are written.
-    """
-    for r in range(len(soft_multiplier)):
-        residual = -target[r]
-        for i in range(len(x)):
-            residual += rows[r, i] * x[i]
-        soft_multiplier[r] = weight[r] * residual / scale
-    for j in range(len(elastic_multiplier)):
-        violated = 0.0
-        if pushing[j]:
-            violated = least[j]
-            for i in range(len(x)):
-                violated -= elastic[j, i] * x[i]
-        elastic_multiplier[j] = elastic_weight[j] * violated / scale
+    order = np.empty(len(values), dtype=np.intp)
+    sort(values, order)
+    return float(values[order[len(values) // 2]])
 
 
 @compiled()
 def work(
-    soft_multiplier: Array,
-    elastic_multiplier: Array,
-    key: Indices,
-    soft_error: Array,
-    key_there: Indices,
-    violated: Array,
+    soft: Array, elastic: Array, key: Indices, soft_error: Array, there: Indices, elastic_violation: Array
 ) -> float:
-    """Sum of the multipliers times the errors (m,) and the violations (k,) of a posture.
+    """Sum of multipliers times the errors (m,) and the violations of a posture.
 
-    Elastic rows are those with the same keys; the ones that `key_there` (k,) has not add nothing.
+    `soft` (m,), `elastic` and `key` (k,) are those of `Multipliers`. Elastic rows of the posture are those with the
+    same keys, `there`; the ones that are not there add nothing.
     """
     total = 0.0
     for r in range(len(soft_error)):
-        total += soft_multiplier[r] * soft_error[r]
+        total += soft[r] * soft_error[r]
     for j in range(len(key)):
-        if elastic_multiplier[j] != 0.0:
-            for other in range(len(key_there)):
-                if key_there[other] == key[j]:
-                    total += elastic_multiplier[j] * violated[other]
+        if elastic[j] != 0.0:
+            for other in range(len(there)):
+                if there[other] == key[j]:
+                    total += elastic[j] * elastic_violation[other]
                     break
     return total
 
 
 @compiled()
-def motion(
-    displacement: Array,
-    columns: Array,
-    column_joint: Indices,
-    parents: Indices,
-    joint: Indices,
-    placement: Array,
-    reach: Array,
-    twist: Array,
-) -> tuple[float, float]:
-    """Longest way of any point of any piece [m], and largest turn [rad], to first order.
+def add_kinematic_hessian(
+    total: Array, columns: Array, support: Array, point: Array, force: Array, moment: Array
+) -> None:
+    """Add the second derivative of force times place and moment times angle to a total.
 
-    `displacement` (n,) is spread over the `columns` (n, 6) of the joint Jacobian, which belong to `column_joint` (n,);
-    `parents` (njoints,) are the joints' parents; the pieces are carried by `joint` (p,), stand at `placement` (p, 4, 3)
-    and reach `reach` (p,) from there. `twist` (njoints, 6) is room.
+    Args:
+        total: (n, n) symmetric; it is changed.
+        columns: (n, 6) of the joint Jacobian at the world's origin: linear, then angular velocity.
+        support: (n,) nonzero for columns that move the point.
+        point: (3,) where the force pulls, metres.
+        force: (3,) what it pulls with.
+        moment: (3,) what turns the body.
     """
-    twist[:] = 0.0
-    for k in range(len(columns)):
-        for i in range(6):
-            twist[column_joint[k], i] += columns[k, i] * displacement[k]
-    for j in range(1, len(parents)):
-        for i in range(6):
-            twist[j, i] += twist[parents[j], i]
-    longest, most = 0.0, 0.0
-    for p in range(len(joint)):
-        if joint[p] == 0:
+    n = total.shape[0]
+    px, py, pz = point
+    fx, fy, fz = force
+    mx, my, mz = moment
+    for k in range(n):
+        if support[k] == 0.0:
             continue
-        own = twist[joint[p]]
-        shift, turn = 0.0, 0.0
-        for i in range(3):
-            j, k = (i + 1) % 3, (i + 2) % 3
-            speed = own[i] + own[3 + j] * placement[p, 3, k] - own[3 + k] * placement[p, 3, j]
-            shift += speed * speed
-            turn += own[3 + i] * own[3 + i]
-        turn = np.sqrt(turn)
-        most = max(most, turn)
-        longest = max(longest, np.sqrt(shift) + (turn * reach[p] if turn > 0.0 else 0.0))
-    return longest, most
+        wx, wy, wz = columns[k, 3], columns[k, 4], columns[k, 5]
+        moved_x = columns[k, 0] + wy * pz - wz * py
+        moved_y = columns[k, 1] + wz * px - wx * pz
+        moved_z = columns[k, 2] + wx * py - wy * px
+        for j in range(k + 1):
+            if support[j] == 0.0:
+                continue
+            ux, uy, uz = columns[j, 3], columns[j, 4], columns[j, 5]
+            bent = (
+                (fy * uz - fz * uy) * moved_x
+                + (fz * ux - fx * uz) * moved_y
+                + (fx * uy - fy * ux) * moved_z
+                + 0.5 * ((my * uz - mz * uy) * wx + (mz * ux - mx * uz) * wy + (mx * uy - my * ux) * wz)
+            )
+            total[j, k] += bent
+            if j != k:
+                total[k, j] += bent

@@ -21,11 +21,10 @@ import numpy as np
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
 from wholebody.methods.acceleration import STRETCH, Anderson
+from wholebody.methods.qp.active_set import without_gradient
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
-from wholebody.methods.qp.working_set import WorkingSet
+from wholebody.methods.qp.settings import DESCENT
 
-ALONG = 3.0  # tangential parts: how far to go where steps grow; larger = faster down, rejected more often
-ROOM = 1e-3  # rad, m: a bound that is nearer holds the normal part too
 SHORTER, LONGER = 1.0 / 3.0, 2.0  # factors of the longest extrapolation after one was rejected, and taken
 
 
@@ -36,7 +35,7 @@ class Parts(NamedTuple):
     tangential: Array
 
 
-def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, working_set: WorkingSet) -> Parts | None:
+def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, work: Array) -> Parts | None:
     """The parts of the answer of a program; None where its face has no normal part.
 
     Where the answer went to a bound that was some way off, it is the measures that pull there. The way to that bound
@@ -46,19 +45,22 @@ def parts_of(program: QuadraticProgram, answer: QPSolution, shift: Array, workin
         program: of a step.
         answer: its answer.
         shift: (s,) what the method of multipliers added to the first errors; it makes up for g, which n does not have.
-        working_set: that found the answer.
+        work: room; see `active_set.room_for`.
     """
     target = program.target.copy()
     target[: len(shift)] += shift
     active, normal = answer.active, None
-    lower, upper = active.lower & (program.lower >= -ROOM), active.upper & (program.upper <= ROOM)
+    lower, upper = (
+        active.lower & (program.lower >= -DESCENT.room),
+        active.upper & (program.upper <= DESCENT.room),
+    )
     left = (active.lower & ~lower) | (active.upper & ~upper)
     if left.any():
-        normal = working_set.without_gradient(program, with_values(active, lower=lower, upper=upper), target)
+        normal = without_gradient(program, with_values(active, lower=lower, upper=upper), target, work)
         if normal is not None and not ((program.lower < normal) & (normal < program.upper))[left].all():
             normal = None
     if normal is None:
-        normal = working_set.without_gradient(program, active, target)
+        normal = without_gradient(program, active, target, work)
     return None if normal is None else Parts(normal, answer.x - normal)
 
 
@@ -84,7 +86,7 @@ class Extrapolation:
             if self._longest <= 1.0:  # not looked at twice
                 self._as_plain = True
                 return None
-            fast = min(ALONG, self._longest) * plain
+            fast = min(DESCENT.along, self._longest) * plain
         return np.clip(parts.normal + fast, program.lower, program.upper)
 
     def record(self, parts: Parts, way: Array, extrapolated: bool) -> None:

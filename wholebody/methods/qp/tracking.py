@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 
 import numpy as np
 import pinocchio as pin
@@ -17,12 +16,13 @@ from wholebody.base.records import with_values
 from wholebody.geometry.continuous.passing_through import SHORT, is_free
 from wholebody.methods.base import Method, begun, goal_error, nearest_to
 from wholebody.methods.inputs import TOLERANCE, check_problem
-from wholebody.methods.qp.escaping import WITHIN, ProjectionRows, free_end, projection_rows
+from wholebody.methods.qp.escaping import ProjectionRows, free_end, projection_rows
 from wholebody.methods.qp.escaping import compiled_kernel as compiled_escape
+from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.steps import FrameStep, QPStep
-from wholebody.methods.qp.turning import INSIDE, OFF, UNSEEN, Turning, foreseen, least_unseen, unseen_by_rows
+from wholebody.methods.qp.turning import foreseen, least_unseen, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
@@ -30,19 +30,6 @@ from wholebody.scene.workspace import NotCopyable
 from wholebody.solution import Solution
 from wholebody.tasks.bounds import StepLimit, allowed, at_speeds, clipped
 from wholebody.terms.linearisation import PackedLinearisation
-
-LEAST_WITHIN = 0.06  # m beyond the clearance: pairs nearer than this get rows
-LARGEST_WITHIN = 0.5
-HEADROOM = 2.5  # pairs within this many times the last step's motion get rows, so that the next may be longer
-SPARE = 10.0  # times what turning brings nearer, roughly: a step that leaves all pairs more room is not looked at
-MIDWAY = 4.0  # times that much and more at the end is too much half way too, where a straight way bows by a quarter
-CORRECTIONS = 3  # programs that ask again for what turning brought nearer, before the step is cut
-CUTS = 6  # times that a step is halved before it is given up
-OF_A_FRAME = 1e-4  # m, rad: to which the goals of a frame are met
-PROGRAMS = (3, 6)  # most of a frame, and where less than `OF_A_FRAME` is asked for; more = nearer to goals that turn
-BRAKED = 1e-6  # m, rad: what must hold is missed by more where joints brake for their limits: they do not then
-OUT = 5e-5  # m: overlap with what came into the figure that is left; half of what counts as an overlap
-WORTH = 0.5  # share of the error that another program must leave at most for one more to follow
 
 
 class QPTracker(NotCopyable):
@@ -84,11 +71,10 @@ class QPTracker(NotCopyable):
         self.dt, self._method, self._minimising = time_step(dt, "dt"), method, minimising
         solver.load()  # not in the middle of a drag
         compiled_escape()
-        self._working_set, self._query_distance = WorkingSet(solver), LEAST_WITHIN
+        self._working_set, self._query_distance = WorkingSet(solver), TRACKING.least_within
         self._alone = OneAtATime("tracker")
         self.workspace = problem.workspace()
         self._distance = np.full(len(self.workspace.table.pairs), np.inf)  # room of `_nearer`
-        self._turning = Turning(self.workspace)
         self._left: Array | None = None
         self._begun = False
         self._set_up()
@@ -125,15 +111,16 @@ class QPTracker(NotCopyable):
 
         Args:
             q: (nq,) posture of the frame before.
-            tolerance: of the goals, metres and radians, and of holds where it is less than `OF_A_FRAME`, the default.
+            tolerance: of the goals, metres and radians, and of holds where it is less than 1e-4, the
+                default.
 
         Raises:
             InputError: as for `step`.
         """
-        enough = OF_A_FRAME if tolerance is None else TOLERANCE(tolerance, "tolerance")
-        exact = enough < OF_A_FRAME
+        enough = TRACKING.of_a_frame if tolerance is None else TOLERANCE(tolerance, "tolerance")
+        exact = enough < TRACKING.of_a_frame
         # a bound on speeds is one of the way of a whole frame
-        most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else PROGRAMS[exact]
+        most = 1 if any(isinstance(bound, StepLimit) for bound in self.problem.bounds) else TRACKING.programs[exact]
         last, error, way = self.step(q), np.inf, np.inf
         if last.path:
             return FrameStep(last.q, len(last.path) - 1, last.collisions, last.path)
@@ -142,7 +129,7 @@ class QPTracker(NotCopyable):
             longest, way = way, float(np.abs(last.displacement).max(initial=0.0))
             # what is held is missed by the square of a step, and each runs ahead of that as the one before was curved
             curved = exact and max(longest, way) ** 2 > enough
-            if not curved and (error <= enough or error > WORTH * before):
+            if not curved and (error <= enough or error > TRACKING.worth * before):
                 return FrameStep(last.q, spent)
             here, last = last.q, self.step(last.q, measures=False)
             if not is_free(self.workspace, q, last.q, SHORT):
@@ -179,7 +166,7 @@ class QPTracker(NotCopyable):
                 workspace.place(motion.placements(following))
             else:
                 following, depth = share, self._overlap(here)
-                if depth <= OUT or depth > WORTH * before or len(steps) > MOST_SHARES:
+                if depth <= TRACKING.out or depth > TRACKING.worth * before or len(steps) > MOST_SHARES:
                     break
                 before = depth
             self._left = None if most is None else most - pin.difference(model, q, here)
@@ -187,7 +174,9 @@ class QPTracker(NotCopyable):
             steps.append(self._step(here, measures and following > share))
             path.append((following, clipped(model, q, steps[-1].q, most)))
         self._left = None
-        free = None if depth <= OUT or motion.still else free_end(model, q, OUT, self._projection_rows)
+        free = (
+            None if depth <= TRACKING.out or motion.still else free_end(model, q, TRACKING.out, self._projection_rows)
+        )
         if free is not None and self._lineariser.undefined(free) is None:
             path = [(0.0, q), (1.0, free)]
         self._program.take(self.dt)
@@ -201,7 +190,7 @@ class QPTracker(NotCopyable):
 
     def _projection_rows(self, q: Array) -> ProjectionRows:
         """What stands around a posture (nq,), with all things where they are."""
-        at = self._unbraked(self._lineariser.packed(q, WITHIN))
+        at = self._unbraked(self._lineariser.packed(q, ESCAPE.within))
         return projection_rows(at, *self._program.bounded(at))
 
     def _unbraked(self, at: PackedLinearisation) -> PackedLinearisation:
@@ -220,25 +209,28 @@ class QPTracker(NotCopyable):
         program = self._program
         at = self._linearised(q)
         answer = program.solve(at, measures)
-        if self._left is None and answer.missed > BRAKED:
+        if self._left is None and answer.missed > TRACKING.braked:
             answer = program.solve(self._unbraked(at), measures)  # what must hold comes before soft stops
         motion = answer.motion
-        if motion > 0.5 * self._query_distance and answer.worst > UNSEEN:
+        if motion > 0.5 * self._query_distance and answer.worst > TRACKING.unseen:
             # something came in fast: to get out of its way, one must look as far as one has to go
-            self._query_distance = min(HEADROOM * motion, LARGEST_WITHIN)
+            self._query_distance = min(TRACKING.headroom * motion, TRACKING.largest_within)
             at = self._linearised(q)
             answer = program.solve(at, measures)
             motion = answer.motion
         share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
         displacement = answer.x.copy() if share == 1.0 else share * answer.x
-        following, curved = None, share * motion * (share * answer.turn + OFF)  # roughly, and rather too much
-        if curved > INSIDE and answer.spare < 0.5 * SPARE * curved:
+        following, curved = (
+            None,
+            share * motion * (share * answer.turn + TRACKING.off),
+        )  # roughly, and rather too much
+        if curved > TRACKING.inside and answer.spare < 0.5 * TRACKING.spare * curved:
             bent = 0.0
             if curved > least_unseen(answer.asked):
-                bent = self._turning.linearisation_error(at, program.rows(at), displacement)
+                bent = program.turning.linearisation_error(at, program.rows, displacement)
             if bent > 0.0:
-                displacement, share, following = self._corrected(at, displacement, share, bent > MIDWAY)
-        self._query_distance = min(max(LEAST_WITHIN, HEADROOM * motion), LARGEST_WITHIN)
+                displacement, share, following = self._corrected(at, displacement, share, bent > TRACKING.midway)
+        self._query_distance = min(max(TRACKING.least_within, TRACKING.headroom * motion), TRACKING.largest_within)
         if following is None:
             following = pin.integrate(self.workspace.model, q, displacement)
             program.ended(following, displacement, share == 1.0)
@@ -257,7 +249,7 @@ class QPTracker(NotCopyable):
 
     def _cut(self, q: Array, displacement: Array, share: float) -> tuple[Array, float, Array]:
         """The part of a step from q (nq,) that ends where all terms of one's own are finite; none if there is none."""
-        for _ in range(CUTS):
+        for _ in range(TRACKING.cuts):
             displacement, share = 0.5 * displacement, 0.5 * share
             following = np.asarray(pin.integrate(self.workspace.model, q, displacement))
             if self._lineariser.undefined(following) is None:
@@ -280,8 +272,8 @@ class QPTracker(NotCopyable):
         """
         contacts, asked = at.contacts, at.clearance[: len(at.contacts.distance)]
         began, unseen = np.minimum(contacts.distance, asked), unseen_by_rows(asked)
-        rows, groups = self._program.rows(at), None
-        for _ in range(CORRECTIONS):
+        rows, groups = self._program.rows, None
+        for _ in range(TRACKING.corrections):
             short, q = self._shortfall(
                 at, displacement, np.maximum(began, foreseen(rows, asked, displacement)), began, midway
             )
@@ -289,13 +281,13 @@ class QPTracker(NotCopyable):
                 return displacement, share, q
             groups = np.zeros(rows.contacts) if groups is None else groups
             groups[rows.contacts - len(short) :] += short
-            program = self._program.program()
-            again = self._working_set.solve(replace(program, least=program.least + groups[rows.contact]), rows.key)
+            program = self._program.program
+            again = self._working_set.solve(with_values(program, least=program.least + groups[rows.contact]), rows.key)
             self.workspace.state.update(at.q)  # where motion begins
-            motion, _ = self._program.motion(at, again.x)
+            motion, _ = self._program.turning.motion(at, again.x)
             share = min(1.0, 0.5 * self._query_distance / max(motion, 1e-12))
             displacement = share * again.x
-        for _ in range(CUTS):
+        for _ in range(TRACKING.cuts):
             short, q = self._shortfall(at, displacement, began, began, midway)
             if not (short > unseen).any():
                 return displacement, share, q
@@ -319,7 +311,7 @@ class QPTracker(NotCopyable):
 
     def _nearer(self, at: PackedLinearisation, q: Array, kept: Array) -> Array:
         """By how much each contact (k,) is nearer at a posture (nq,) than the distances (k,) it should keep."""
-        near = self.workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + UNSEEN)
+        near = self.workspace.near(q, float(np.maximum.reduce(at.clearance, initial=0.0)) + TRACKING.unseen)
         after = self._distance
         after[near.number] = near.distance
         short: Array = np.maximum(kept - after[at.contacts.number], 0.0)

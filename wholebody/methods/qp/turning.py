@@ -13,32 +13,38 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.geometry.contact_rows import BAND, LEVER_DISTANCE
-from wholebody.methods.qp.subproblem import Rows
+from wholebody.methods.qp.rows import Rows
+from wholebody.methods.qp.settings import TRACKING
 from wholebody.scene.workspace import Workspace
 from wholebody.terms.linearisation import PackedLinearisation
 
-ROOM = 2.0  # times what a pair may get nearer by turning: with more room after a step it is not looked at
-OFF = 6e-3  # rad: by which coal's normal may be off, as it stops within 1e-6 m of the distance
-
-UNSEEN = 1e-4  # m: by which turning may bring things nearer than the linearisation says without being looked after
-INSIDE = 5e-6  # m: the same of pairs whose clearance is less; beside coal's accuracy, so that none ends inside
-
 
 class Turning:
-    """Bounds what the steps of one run turn nearer."""
+    """How the pieces of one run move in a step, and a bound on what it turns nearer."""
 
     def __init__(self, workspace: Workspace) -> None:
         """Take the pieces of a workspace, whose state is where the steps begin."""
-        self._workspace, table = workspace, workspace.table
+        state, self._workspace, table = workspace.state, workspace, workspace.table
         self._kernel = compiled_kernel()
         points = [swept.points for swept in table.swept]
-        self._reach = np.array(
-            [np.linalg.norm(own, axis=1).max() if len(own) else reach
-             for own, reach in zip(points, table.reach, strict=True)]
-        ).reshape(-1)  # fmt: skip
-        self._point = np.array([len(own) == 1 for own in points], dtype=bool)
-        self._twists = np.empty((3, workspace.model.njoints, 6))
-        self._lengths = np.array([ROOM, BAND, LEVER_DISTANCE, OFF, INSIDE, UNSEEN])
+        reach = [np.linalg.norm(own, axis=1).max() if len(own) else reach
+                 for own, reach in zip(points, table.reach, strict=True)]  # fmt: skip
+        point = np.array([len(own) == 1 for own in points], dtype=bool)
+        self._swept = np.array([reach, point], dtype=float).reshape(2, -1)
+        self._lengths = np.array([
+            TRACKING.room, BAND, LEVER_DISTANCE, TRACKING.off, TRACKING.inside, TRACKING.unseen,
+        ])  # fmt: skip
+        place = state.spread(np.arange(state.model.nv, dtype=float)).astype(np.intp)
+        self.joints = np.concatenate([place, state.column_joint, state.parents, table.joint])
+        self.twists = np.empty((3, workspace.model.njoints, 6))
+
+    def motion(self, at: PackedLinearisation, displacement: Array) -> tuple[float, float]:
+        """Longest way of any point of any piece, metres, and largest turn, to first order in the displacement (nv,)."""
+        way, turn = self._kernel.motion(
+            displacement, self._workspace.state.columns, self.joints, at.contacts.placements,
+            self._workspace.table.reach, self.twists,
+        )  # fmt: skip
+        return way, turn
 
     def linearisation_error(self, at: PackedLinearisation, rows: Rows, displacement: Array) -> float:
         """Largest share of `unseen_by_rows` by which a pair that may end too near can be nearer than its rows say.
@@ -51,13 +57,11 @@ class Turning:
         Returns:
             0 where every pair keeps its distance to that, and more than 1 where one may not.
         """
-        state, contacts = self._workspace.state, at.contacts
-        count = len(contacts.distance)
+        contacts = at.contacts
         share: float = self._kernel.linearisation_error(
-            state.spread(displacement), state.columns, state.column_joint, state.parents, self._workspace.table.joint,
-            self._reach, self._point, contacts.placements, contacts.pair, contacts.distance, contacts.normal,
-            at.clearance[:count], displacement, rows.elastic, rows.elastic_violation, rows.contact,
-            rows.contacts - count, self._lengths, self._twists,
+            displacement, self._workspace.state.columns, self.joints, contacts.placements, self._swept, self._lengths,
+            self.twists, contacts.pair, contacts.distance, contacts.normal, at.clearance, rows.elastic,
+            rows.elastic_violation, rows.contact, rows.contacts - len(contacts.distance),
         )  # fmt: skip
         return share
 
@@ -67,24 +71,24 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp import turning_kernel
 
-    none, index = np.zeros(0), np.zeros(0, dtype=np.intp)
+    none, index, columns, places = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((1, 6)), np.zeros((0, 4, 3))
+    joints, twists = np.zeros(3, dtype=np.intp), np.zeros((3, 1, 6))
+    turning_kernel.motion(np.zeros(1), columns, joints, places, none, twists)
     turning_kernel.linearisation_error(
-        np.zeros(1), np.zeros((6, 1)).T, np.zeros(1, dtype=np.intp), np.zeros(1, dtype=np.intp), index, none,
-        np.zeros(0, dtype=bool), np.zeros((0, 4, 3)), np.zeros((0, 2), dtype=np.intp), none,
-        np.zeros((0, 3)), none, np.zeros(1), np.zeros((0, 1)), none, index, 0, np.zeros(6),
-        np.zeros((3, 1, 6)),
+        np.zeros(1), columns, joints, places, np.zeros((2, 0)), np.ones(6), twists, index.reshape(0, 2), none,
+        np.zeros((0, 3)), none, np.zeros((0, 1)), none, index, 0,
     )  # fmt: skip
     return turning_kernel
 
 
 def least_unseen(asked: float) -> float:
     """The least of `unseen_by_rows` where at least this distance is asked of all contacts."""
-    return min(max(asked, INSIDE), UNSEEN)
+    return min(max(asked, TRACKING.inside), TRACKING.unseen)
 
 
 def unseen_by_rows(asked: Array) -> Array:
     """By how much each contact (k,) may end nearer than its rows say, where this distance (k,) is asked of it."""
-    unseen: Array = np.minimum(np.maximum(asked, INSIDE), UNSEEN)
+    unseen: Array = np.minimum(np.maximum(asked, TRACKING.inside), TRACKING.unseen)
     return unseen
 
 

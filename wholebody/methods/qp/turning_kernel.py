@@ -1,35 +1,83 @@
-"""Whether a step turns some pair nearer than its rows foresee, as compiled loops: see `turning`."""
+"""How the pieces of a step move, and whether it turns some pair nearer than its rows foresee: see `turning`."""
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from wholebody.base.arrays import Array, Indices, Mask
+from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 from wholebody.methods.qp.dense_kernel import dot
+from wholebody.methods.qp.rows import Bodies, Seen
+
+
+@compiled()
+def motion(
+    displacement: Array, columns: Array, joints: Indices, placement: Array, reach: Array, twists: Array
+) -> tuple[float, float]:
+    """`moved` for a call from Python; see `bodies_in` for all but the displacement (nv,)."""
+    return moved(displacement, bodies_in(columns, joints, placement, reach, twists))
+
+
+@compiled(inner=True, forceinline=True)
+def bodies_in(columns: Array, joints: Indices, placement: Array, reach: Array, twists: Array) -> Bodies:
+    """`Bodies` whose integers are one array: place and joint of each column, parents of joints, joints of pieces."""
+    wide, pieces = len(columns), len(reach)
+    return Bodies(
+        columns, joints[:wide], joints[wide : 2 * wide], joints[2 * wide : len(joints) - pieces],
+        joints[len(joints) - pieces :], placement, reach, twists,
+    )  # fmt: skip
+
+
+@compiled(inner=True, forceinline=True)
+def moved(displacement: Array, bodies: Bodies) -> tuple[float, float]:
+    """Longest way of any point of any piece [m], and largest turn [rad], to first order in a displacement (nv,)."""
+    places, column_joint, joint = bodies.place, bodies.column_joint, bodies.joint
+    placement, reach = bodies.placement, bodies.reach
+    columns, parents, twist = bodies.columns, bodies.parents, bodies.twists[0]
+    twist[:] = 0.0
+    for k in range(len(columns)):
+        j, share = column_joint[k], displacement[places[k]]
+        for i in range(6):
+            twist[j, i] += columns[k, i] * share
+    for j in range(1, len(parents)):
+        for i in range(6):
+            twist[j, i] += twist[parents[j], i]
+    longest, most = 0.0, 0.0
+    for p in range(len(joint)):
+        if joint[p] == 0:
+            continue
+        own, place = twist[joint[p]], placement[p, 3]
+        shift, turn = 0.0, 0.0
+        for i in range(3):
+            j, k = (i + 1) % 3, (i + 2) % 3
+            speed = own[i] + own[3 + j] * place[k] - own[3 + k] * place[j]
+            shift += speed * speed
+            turn += own[3 + i] * own[3 + i]
+        turn = np.sqrt(turn)
+        most = max(most, turn)
+        longest = max(longest, np.sqrt(shift) + (turn * reach[p] if turn > 0.0 else 0.0))
+    return longest, most
 
 
 @compiled()
 def linearisation_error(
     displacement: Array,
     columns: Array,
-    column_joint: Indices,
-    parents: Indices,
-    joint: Indices,
-    reach: Array,
-    point: Mask,
+    joints: Indices,
     placement: Array,
+    swept: Array,
+    lengths: Array,
+    twists: Array,
     pair: Indices,
     distance: Array,
     normal: Array,
     asked: Array,
-    step: Array,
     elastic: Array,
     violation: Array,
     contact: Indices,
     first: int,
-    lengths: Array,
-    twists: Array,
 ) -> float:
     """Largest share of what is unseen by which a pair that may end too near can be nearer than its rows say.
 
@@ -41,95 +89,103 @@ def linearisation_error(
     points at the plane brings it nearer, and what lies along it as far as the plane turns meanwhile.
 
     Args:
-        displacement: (n,) spread over the columns.
-        columns: (n, 6) of the joint Jacobian at the world's origin.
-        column_joint: (n,) the joint of each column.
-        parents: (njoints,) of the joints.
-        joint: (pieces,) that carries each piece.
-        reach: (pieces,) of the swept points of each piece about its place; infinite for a half-space.
-        point: (pieces,) whether a piece has a single swept point, so that its turn does not matter.
-        placement: (pieces, 4, 3) see `Contacts.placements`.
-        pair: (k, 2) pieces of the contacts.
-        distance: (k,) of the contacts.
-        normal: (k, 3) from the first piece of each to the second.
-        asked: (k,) clearances.
-        step: (nv,) the displacement.
-        elastic: (r, nv) elastic rows.
-        violation: (r,) what they are violated by before it.
-        contact: (r,) label of the contact of each row.
-        first: label of the first contact.
-        lengths: room within which a pair counts, in times of what it may be nearer by; how much farther than the
-            witness point the points without rows are; how far beyond its clearance a pair is at most for this to hold;
-            by how many radians its normal may be off; least and largest that is unseen.
+        displacement: (nv,) of the step.
+        columns: see `Bodies`, as `placement` and `twists`.
+        joints: see `bodies_in`.
+        placement: (p, 4, 3).
+        swept: (2, p) of the swept points of each piece: distance about its place, infinite for a half-space; and
+            whether it has a single one, so that its turn does not matter.
+        lengths: the numbers of `Seen`.
         twists: (3, njoints, 6) room.
+        pair: (k, 2) of the contacts; see `Contacts`, as the next two.
+        distance: (k,).
+        normal: (k, 3).
+        asked: (k or more,) their clearances.
+        elastic: (r, nv) rows; see `Rows`, as the next two.
+        violation: (r,).
+        contact: (r,).
+        first: label of the first contact.
     """
-    joints = len(parents)
-    twists[:] = 0.0
-    twist, change, own = twists[0], twists[1], twists[2]
-    for c in range(len(columns)):
-        for i in range(6):
-            own[column_joint[c], i] += columns[c, i] * displacement[c]
-    for j in range(1, joints):
-        # the axes of a joint move with the body that carries it
-        v, s = twist[parents[j]], own[j]
-        for i in range(3):
-            a, b = (i + 1) % 3, (i + 2) % 3
-            moved = v[3 + a] * s[b] - v[3 + b] * s[a] + v[a] * s[3 + b] - v[b] * s[3 + a]
-            change[j, i] = change[parents[j], i] + moved
-            change[j, 3 + i] = change[parents[j], 3 + i] + v[3 + a] * s[3 + b] - v[3 + b] * s[3 + a]
-        for i in range(6):
-            twist[j, i] = v[i] + s[i]
-    room = np.empty(len(distance))
+    count, bodies = len(distance), bodies_in(columns, joints, placement, swept[0], twists)
+    _second_order(displacement, bodies)
+    twist, change, joint, reach = bodies.twists[0], bodies.twists[1], bodies.joint, swept[0]
+    seen = Seen(lengths[0], lengths[1], lengths[2], lengths[3], lengths[4], lengths[5])
+    room = np.empty(count)
     room[:] = np.inf
     for r in range(len(violation)):
         c = contact[r] - first
         if c >= 0:
-            room[c] = min(room[c], dot(elastic[r], step) - violation[r])
+            room[c] = min(room[c], dot(elastic[r], displacement) - violation[r])
     worst, vectors = 0.0, np.empty((5, 3))
-    for c in range(len(distance)):
+    for c in range(count):
         nearer, way = np.inf, np.inf
-        round_piece = point[pair[c, 0]] or point[pair[c, 1]]
+        round_piece = swept[1, pair[c, 0]] > 0.0 or swept[1, pair[c, 1]] > 0.0
         for side in range(2):
             # a plane that moves with one piece, and the points of the other one; a single point has no plane
-            p, carrier = pair[c, side], joint[pair[c, 1 - side]]
-            if round_piece and not point[p]:
+            p = pair[c, side]
+            own, carrier = joint[p], joint[pair[c, 1 - side]]
+            if round_piece and not swept[1, p] > 0.0:
                 continue
+            piece = Moved(placement[p, 3], reach[p], twist[own], change[own])
             gone, bend = _seen_from(
-                placement[p, 3], reach[p], twist[joint[p]], change[joint[p]], twist[carrier], change[carrier],
-                normal[c], 1.0 - 2.0 * side, lengths[3], vectors,
-            )  # fmt: skip
+                piece, twist[carrier], change[carrier], normal[c], 1.0 - 2.0 * side, seen.off, vectors
+            )
             if bend < nearer:
                 nearer, way = bend, gone
-        nearer += lengths[3] * way
-        unseen = min(max(asked[c], lengths[4]), lengths[5])
+        nearer += seen.off * way
+        unseen = min(max(asked[c], seen.least), seen.most)
         if nearer <= unseen:
             continue
         spare = distance[c] - asked[c]
-        beyond = lengths[1] if spare <= lengths[2] else 0.0
-        if room[c] < lengths[0] * nearer or (not round_piece and spare + beyond < way):
+        beyond = seen.band if spare <= seen.lever else 0.0
+        if room[c] < seen.room * nearer or (not round_piece and spare + beyond < way):
             worst = max(worst, nearer / unseen)
     return worst
 
 
-@compiled(inner=True)
+@compiled(inner=True, forceinline=True)
+def _second_order(displacement: Array, bodies: Bodies) -> None:
+    """Write the twist of every joint, and its change at constant joint speeds, into the room of the bodies."""
+    columns, place, column_joint = bodies.columns, bodies.place, bodies.column_joint
+    parents, twists = bodies.parents, bodies.twists
+    twists[:] = 0.0
+    twist, change, own = twists[0], twists[1], twists[2]
+    for c in range(len(columns)):
+        joint, share = column_joint[c], displacement[place[c]]
+        for i in range(6):
+            own[joint, i] += columns[c, i] * share
+    for j in range(1, len(parents)):
+        # the axes of a joint move with the body that carries it
+        parent = parents[j]
+        v, s = twist[parent], own[j]
+        for i in range(3):
+            a, b = (i + 1) % 3, (i + 2) % 3
+            moved = v[3 + a] * s[b] - v[3 + b] * s[a] + v[a] * s[3 + b] - v[b] * s[3 + a]
+            change[j, i] = change[parent, i] + moved
+            change[j, 3 + i] = change[parent, 3 + i] + v[3 + a] * s[3 + b] - v[3 + b] * s[3 + a]
+        for i in range(6):
+            twist[j, i] = v[i] + s[i]
+
+
+class Moved(NamedTuple):
+    """A piece that moves: its place (3,), its points' distance from there, its twist (6,) and how that changes (6,)."""
+
+    place: Array
+    reach: float
+    twist: Array
+    change: Array
+
+
+@compiled(inner=True, forceinline=True)
 def _seen_from(
-    place: Array,
-    reach: float,
-    own: Array,
-    own_change: Array,
-    carrier: Array,
-    carrier_change: Array,
-    normal: Array,
-    sign: float,
-    off: float,
-    vectors: Array,
+    piece: Moved, carrier: Array, carrier_change: Array, normal: Array, sign: float, off: float, vectors: Array
 ) -> tuple[float, float]:
     """Longest way of the points of a piece as seen from another body, and by how much it can bow towards it.
 
-    `place` (3,) is the piece's and `reach` its points' distance from there; twists (6,) at the world's origin and their
-    changes are those of the piece's body and of the body from which it is seen. `normal` (3,) times `sign` points from
-    the piece to that body and may be `off` by so many radians. `vectors` (5, 3) is room.
+    `carrier` (6,) is the twist of that body, `normal` (3,) times `sign` points to it and may be `off` by so many
+    radians. `vectors` (5, 3) is room.
     """
+    place, reach, own, own_change = piece.place, piece.reach, piece.twist, piece.change
     speed, bow, spin, own_speed, carrier_speed = vectors[0], vectors[1], vectors[2], vectors[3], vectors[4]
     turn_square, speed_square, bow_square, spin_square = 0.0, 0.0, 0.0, 0.0
     towards, own_square, carrier_square = 0.0, 0.0, 0.0

@@ -7,21 +7,10 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import (
-    BOUND_TOLERANCE,
-    FULL_CORRECTIONS,
-    ROW_TOLERANCE,
-    compiled_kernel,
-    without_gradient,
-)
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.semismooth_newton import compiled_kernel as semismooth_kernel
-from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
-
-NEAR = 0.03  # m: rows with less room than this at x = 0 are in from the beginning
-ROUNDS = 8  # most times that rows are added before all of them are
-LIMITS = np.array([NEAR, ROUNDS, WARM_CORRECTIONS, FULL_CORRECTIONS, BOUND_TOLERANCE, ROW_TOLERANCE])
-"""What the compiled loop takes of these."""
+from wholebody.methods.qp.active_set import compiled_kernel, room_for
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, Room, work_size
+from wholebody.methods.qp.settings import CORRECTIONS
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 
 
 class WorkingSet:
@@ -38,8 +27,8 @@ class WorkingSet:
         """Begin without a guess."""
         self.solver = solver
         self._kernel = compiled_kernel()
-        semismooth_kernel()  # which a program may need in the middle of a solve
-        self._work, self._places = np.empty(0), np.empty(0, dtype=np.intp)
+        self._room: Room | None = None
+        self._limits = np.array(CORRECTIONS, dtype=float)
         self.held: Mask | None = None
         self.reset()
 
@@ -59,11 +48,6 @@ class WorkingSet:
             self.held = None  # correcting the same set once more would end the same
         return self._round_by_round(program, key)
 
-    def without_gradient(self, program: QuadraticProgram, active: ActiveSet, target: Array) -> Array | None:
-        """Minimiser of a program with g = 0 and its active set fixed; see `active_set.without_gradient`."""
-        self._make_room(program)
-        return without_gradient(program, active, target, self._work)
-
     def reset(self) -> None:
         """Drop the guess."""
         self.held = None
@@ -76,38 +60,36 @@ class WorkingSet:
 
     def _from_the_last(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution | None:
         """The answer by the active set of the program before, corrected; None where that does not settle."""
-        n, k = program.size, len(key)
-        self._make_room(program)
-        if 2 * k > len(self._places):
-            self._places = np.empty(4 * k, dtype=np.intp)
-        x: Array = np.empty(n)
+        x: Array = np.empty(program.size)
         assert self.held is not None
-        active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(k, dtype=bool))
+        active = ActiveSet(self.held[0].copy(), self.held[1].copy(), np.empty(len(key), dtype=bool))
         program.check_shapes(active)
+        room = self.room(program)
         rounds = self._kernel.solve_growing(
-            program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic,
-            program.least, program.elastic_weight, program.lower, program.upper, key, self.pushing, *active,
-            np.empty(k, dtype=bool), LIMITS, self._work, self._places, x,
-        )  # fmt: skip
+            *program, key, self.pushing, *active, room.chosen, room.places, room.work, self._limits, x
+        )
         if rounds < 0:
             return None
         self._remember(active, key)
         return QPSolution(x, active, True, 0, self.solver.count([ACTIVE_SET]))
 
-    def _make_room(self, program: QuadraticProgram) -> None:
-        size = self._kernel.work_size(program.size, len(program.target), len(program.least))
-        if size > len(self._work):
-            self._work = np.empty(2 * size)
+    def room(self, program: QuadraticProgram) -> Room:
+        """Room of the compiled loops for a program, kept from one to the next."""
+        size = work_size(program.size, len(program.target), len(program.least))
+        room = self._room
+        if room is None or size > len(room.work) or len(program.least) > len(room.chosen):
+            room = self._room = room_for(program, 2)
+        return room
 
     def _round_by_round(self, program: QuadraticProgram, key: NDArray[np.intp]) -> QPSolution:
         """The answer where nothing is known, or the solver has to be asked."""
         pushing: Mask = (key[:, None] == self.pushing).any(axis=1)  # of a few keys: np.isin would sort all
-        chosen = (program.least > -NEAR) | pushing
+        chosen = (program.least > CORRECTIONS.near) | pushing
         lower, upper = (None, None) if self.held is None else self.held
         closed: list[str] = []
         iterations = 0
-        for attempt in range(ROUNDS + 1):
-            if attempt == ROUNDS:
+        for attempt in range(CORRECTIONS.rounds + 1):
+            if attempt == CORRECTIONS.rounds:
                 chosen[:] = True
             smaller = program.with_elastic(chosen)
             guess = None if lower is None or upper is None else ActiveSet(lower, upper, pushing[chosen])

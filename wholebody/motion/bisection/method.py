@@ -1,23 +1,29 @@
-"""The method "bisection": settings, and one run on a clip."""
+"""The method "bisection": its settings, and the recursion on one clip."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
+import pinocchio as pin
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.checks import choice, listed, number, settle, text, whole
 from wholebody.figures.figure import Figure
+from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import method_for_motions
 from wholebody.motion.avoider import MethodResult, Run
-from wholebody.motion.bisection.prediction import SWINGING, Predictor
-from wholebody.motion.bisection.recursion import Kind, Recursion, RecursionSettings, hold_between, key_frames
-from wholebody.tasks import Freeze
+from wholebody.motion.bisection.keyframes import Group, Kind, collision_groups, fill, key_frames
+from wholebody.motion.bisection.prediction import Prediction, Predictor, path_planes
+from wholebody.tasks import Freeze, Plane
+from wholebody.tracking.tracks import MOST_FRAMES
 
-MOST_FRAMES = 1_000_000
+FAR = 0.3  # rad, m: a prediction that goes farther may be a poor local answer, and others are tried
 
 
 @dataclass(frozen=True)
@@ -47,6 +53,10 @@ class Bisection:
             follows the original more closely and predicts more postures.
         short: programs after which a prediction of "qp" is ended where others may be tried.
     """
+
+    name: ClassVar[str] = "bisection"
+    clearance: ClassVar[float] = 0.0
+    dynamics: ClassVar[None] = None
 
     evaluation: tuple[int, ...] | None = None
     buffer: float = 50.0
@@ -83,20 +93,6 @@ class Bisection:
         settle(self, "short", whole(self.short, "Bisection: short", 1, MOST_FRAMES))
         method_for_motions(self.method)
 
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "bisection"
-
-    @property
-    def clearance(self) -> float:
-        """It keeps pairs from overlapping, and no farther."""
-        return 0.0
-
-    @property
-    def dynamics(self) -> None:
-        """It looks at no torques."""
-
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`.
 
@@ -107,22 +103,16 @@ class Bisection:
         figure = run.scene.figure
         for frame in self.evaluation or ():
             whole(frame, f"Bisection: evaluation, {run.clip.name}", 0, len(run.clip) - 1)
-        usual = tuple(name for name in SWINGING if name in figure.frames)
-        settings = RecursionSettings(
-            usual if self.planes is None else self.planes, self.buffer / 100.0, self.least, self.interpolation,
-            self.short if self.method == "qp" else None,
-        )  # fmt: skip
-        for name in settings.planes:
+        for name in self.planes or ():
             figure.frame_id(name)
-        # Nine in ten predictions take at most 20 programs. More give a little less effort and take much more time where
-        # planes and what is held contradict each other.
+        # more iterations give a little less effort, and take long where planes and what is held contradict each other
         method = QP(restarts=0, iterations=50) if self.method == "qp" else method_for_motions(self.method)
         run = run.of(replace(run.terms, q=np.array([figure.clamp(q) for q in run.terms.q])))
         ways = self._frozen(figure)
         for frozen in ways:
             given = (*run.terms.given, *([Freeze(*frozen)] if frozen else []))
             predictor = Predictor(run.of(replace(run.terms, given=given)), method, self.room)
-            recursion = Recursion(predictor, settings)
+            recursion = Recursion(predictor, self)
             recursion.free(self._points(figure, run.terms.q, frozen), whole=frozen == ways[-1])
             if frozen == ways[-1] or run.ended or not recursion.stuck:
                 break
@@ -142,3 +132,182 @@ class Bisection:
         moving = np.ones(figure.model.nv, dtype=bool)
         moving[figure.dofs(frozen)] = False
         return key_frames(figure.model, original, moving, self.character)
+
+
+class Recursion:
+    """The recursion of figure 3.2 of the thesis: predict a middle frame, interpolate beside it, go into both halves.
+
+    Every frame that was predicted is a key: it does not change again, and groups end at keys. So the recursion ends
+    after at most one prediction a frame.
+
+    Attributes:
+        q: (n, nq) the present postures.
+        bad: (n,) which of them overlap.
+        keys: frames that were predicted and are free, and evaluation points.
+        stuck: frames whose prediction failed.
+    """
+
+    def __init__(self, predictor: Predictor, settings: Bisection) -> None:
+        """Begin at the original postures."""
+        run = predictor.run
+        self._run, self._predictor, self._settings = run, predictor, settings
+        figure = run.scene.figure
+        swinging = (f"{side}_{part}" for part in ("elbow", "ankle") for side in ("left", "right"))
+        usual = tuple(name for name in swinging if name in figure.frames)
+        self._planes = usual if settings.planes is None else settings.planes
+        # nine in ten predictions take at most 20 programs
+        self._short = settings.short if settings.method == "qp" else None
+        self._state, self._whole = State(run.scene.model), True
+        self.q = np.array(run.terms.q)
+        self.bad: Mask = np.array([not predictor.free(posture) for posture in self.q])
+        self.at_first = int(self.bad.sum())
+        self.keys: set[int] = set()
+        self.stuck: set[int] = set()
+
+    def free(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
+        """Free the evaluation points and both ends, then everything between them.
+
+        Args:
+            evaluation: frames.
+            whole: go on where a frame cannot be freed; else that ends it.
+        """
+        self._whole = whole
+        last = len(self.q) - 1
+        points = sorted({0, last, *evaluation})
+        corrected = [frame for frame in points if self.bad[frame]]
+        for frame in corrected:
+            self._key(frame)
+            if self._ended():
+                return
+        for frame in reversed(corrected[:-1]):
+            if self._run.ended:
+                return
+            self._again(frame)
+        self.keys.update(points)
+        for frame in corrected:
+            if frame not in self.stuck:
+                self._fill_around(frame)
+        for low, high in pairwise(points):
+            self._between(low, high)
+
+    def _ended(self) -> bool:
+        return self._run.ended or bool(self.stuck and not self._whole)
+
+    def _fill_around(self, frame: int) -> None:
+        """Interpolate frames that overlap beside a corrected point, up to the first free one or another key."""
+        for step in (-1, 1):
+            end = frame + step
+            while 0 <= end < len(self.q) and self.bad[end] and end not in self.keys:
+                end += step
+            if 0 <= end < len(self.q):
+                self._fill(min(frame, end), frame, max(frame, end))
+
+    def _between(self, low: int, high: int) -> None:
+        """Free the frames between two that stay."""
+        waiting = [(low, high)]
+        while waiting and not self._ended():
+            low, high = waiting.pop()
+            for group in collision_groups(self.bad, low, high, self._settings.buffer / 100.0, self._settings.least):
+                if not self._ended() and self._bisect(group):
+                    waiting += [(group.first - 1, group.middle), (group.middle, group.last + 1)]
+
+    def _bisect(self, group: Group) -> bool:
+        """Predict the middle and interpolate the others; whether the middle is free now."""
+        if not self._key(group.middle):
+            return False
+        self._fill(group.first - 1, group.middle, group.last + 1)
+        return True
+
+    def _key(self, frame: int) -> bool:
+        """Predict the posture of a frame with planes; where that fails or goes far, the least effort of several."""
+        if self._run.watch.tell(self.share_done(), f"frame {frame}"):
+            return False
+        planes = path_planes(self._run.scene.figure, self.q, frame, self._swinging(frame), self._state)
+        short = self._short
+        found = [self._predicted(frame, self.q[frame], planes, short)]
+        if not found[0].good or self._predictor.farthest(frame, found[0].q) > FAR:
+            found += [self._predicted(frame, start, [], short) for start in self._beside(frame)]
+            if planes and not any(prediction.good for prediction in found):
+                found.append(self._predicted(frame, self.q[frame], [], short))
+            if short is not None and self._whole and not any(prediction.good for prediction in found):
+                nearest = min(found, key=lambda prediction: self._predictor.depth(prediction.q))
+                found.append(self._predicted(frame, nearest.q, []))
+        good = [prediction for prediction in found if prediction.good]
+        if not good:
+            self.stuck.add(frame)
+            return False
+        self.q[frame] = min((each.q for each in good), key=lambda q: self._predictor.effort(frame, q))
+        self.bad[frame] = False
+        self.keys.add(frame)
+        return True
+
+    def _again(self, frame: int) -> None:
+        """Predict an evaluation point that went far from the side of the points after it, which were not known then."""
+        if frame in self.stuck or self._predictor.farthest(frame, self.q[frame]) <= FAR:
+            return
+        for start in self._beside(frame)[-1:]:
+            found = self._predicted(frame, start, [], self._short)
+            if found.good and self._predictor.effort(frame, found.q) < self._predictor.effort(frame, self.q[frame]):
+                self.q[frame] = found.q
+
+    def _swinging(self, frame: int) -> list[str]:
+        """Frames with plane constraints on which no foot stands: what stands is held, and need not be in the plane."""
+        figure, model = self._run.scene.figure, self._run.scene.model
+        feet = [model.frames[figure.frame_id(foot)].parentJoint for foot in self._run.terms.stands[frame]]
+        stood_on = {joint for foot in feet for joint in model.supports[foot]}
+        return [name for name in self._planes if model.frames[figure.frame_id(name)].parentJoint not in stood_on]
+
+    def _predicted(self, frame: int, start: Array, planes: Sequence[Plane], most: int | None = None) -> Prediction:
+        return self._predictor.predict(frame, self._run.terms.within(frame, start), planes, most=most)
+
+    def _beside(self, frame: int) -> list[Array]:
+        """Starts from the nearest free frames: their deviations from the original ones, on the original of this one."""
+        model, original = self._run.scene.model, self._run.terms.q
+        free = np.flatnonzero(~self.bad)
+        near = [int(side) for side in (*free[free < frame][-1:], *free[free > frame][:1])]
+        away = [pin.difference(model, original[side], self.q[side]) for side in near]
+        starts = [np.asarray(pin.integrate(model, original[frame], step)) for step in away if step.any()]
+        return starts or [self.q[side] for side in near]
+
+    def _fill(self, a: int, m: int, b: int) -> None:
+        """Interpolate between keys; joints that no key changed keep their original curves."""
+        model, original = self._run.scene.model, self._run.terms.q
+        fill(model, self.q, a, m, b, self._settings.interpolation)
+        changes = [np.abs(pin.difference(model, original[key], self.q[key])) for key in {a, m, b}]
+        changed = np.max(changes, axis=0) > 1e-4  # rad, m: what moves less was not needed
+        kept = [
+            slice(joint.idx_q, joint.idx_q + joint.nq)
+            for joint in model.joints[1:]
+            if not changed[joint.idx_v : joint.idx_v + joint.nv].any()
+        ]
+        for frame in range(a + 1, b):
+            if frame != m:
+                for values in kept:
+                    self.q[frame, values] = original[frame, values]
+                self.q[frame] = self._run.terms.within(frame, self.q[frame])
+                self.bad[frame] = not self._predictor.free(self.q[frame])
+
+    def share_done(self) -> float:
+        """Share of the frames that overlapped at first which no longer do."""
+        return 1.0 - int(self.bad.sum()) / max(1, self.at_first)
+
+
+def hold_between(recursion: Recursion, predictor: Predictor) -> None:
+    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found.
+
+    Steps of the tracker find most; what they do not find is predicted.
+    """
+    run = predictor.run
+    changed = np.flatnonzero((run.terms.q != recursion.q).any(axis=1)).tolist()
+    for done, frame in enumerate(changed):
+        q = recursion.q[frame]
+        if predictor.holds(frame, q):
+            continue
+        if run.watch.tell(done / len(changed), f"holds of frame {frame}"):
+            break
+        nearest = run.follower.frame(frame, q, goal=q)
+        if not predictor.good(frame, nearest):
+            nearest, good = predictor.predict(frame, q, effort_from=q)
+            if not good:
+                continue
+        recursion.q[frame] = nearest

@@ -20,16 +20,11 @@ from wholebody.tasks import Effort, Freeze, Hold, Plane
 from wholebody.tasks.base import Goal, Surroundings, filled
 from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 
-SWINGING = ("left_elbow", "right_elbow", "left_ankle", "right_ankle")  # have planes where the figure has them
-
 
 def path_planes(figure: Figure, q: Array, frame: int, joints: Sequence[str], state: State) -> list[Plane]:
     """Planes through the places of joints at a frame, normal to their paths there (eqs. 3.2 and 3.3 of the thesis).
 
-    Elbows and wrists leave their paths only sideways.
-
-    The normal is the direction from the place at this frame to the place at the next one, at the last frame from the
-    one before. They are made anew from the present curves each time that a posture is predicted.
+    The normal is the direction from the place at this frame to the next one, at the last frame from the one before.
 
     Args:
         figure: the figure.

@@ -19,10 +19,6 @@ from wholebody.motion.files.archive import read_arrays
 from wholebody.motion.skeleton import SkeletonMotion
 from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
-SKELETON = Path(__file__).parents[1] / "data" / "smpl.csv"
-"""Joints of SMPL, their parents and offsets."""
-
-RATES = ("mocap_framerate", "mocap_frame_rate", "fps")
 BODY = 22
 """Joints whose poses every version has; SMPL's two hands are joints only there."""
 
@@ -44,7 +40,7 @@ def read_motion(path: Path) -> SkeletonMotion:
     name = one_line(path.name)
     poses, places, frequency = _arrays(name, read_arrays(path))
     frames = len(poses)
-    bones = packaged_table(SKELETON)
+    bones = packaged_table(Path(__file__).parents[1] / "data" / "smpl.csv")
     names = tuple(bone["joint"] for bone in bones)
     offsets = np.array([[float(bone[axis]) for axis in "xyz"] for bone in bones])
     local = np.tile(np.eye(3), (frames, len(names), 1, 1))
@@ -64,9 +60,10 @@ def read_motion(path: Path) -> SkeletonMotion:
 
 def _arrays(name: str, arrays: dict[str, np.ndarray]) -> tuple[Array, Array, float]:
     """Poses (n, 3 x joints) and places (n, 3) of an archive, and its frame rate, checked; see `read_motion`."""
-    rate = next((arrays[key] for key in RATES if key in arrays), None)
+    rates = ("mocap_framerate", "mocap_frame_rate", "fps")
+    rate = next((arrays[key] for key in rates if key in arrays), None)
     if not is_amass(arrays) or rate is None:
-        missing = [key for key in ("poses", "trans") if key not in arrays] or [RATES[0]]
+        missing = [key for key in ("poses", "trans") if key not in arrays] or [rates[0]]
         raise FileFormatError(f"{name}: is no archive of AMASS; it lacks {', '.join(missing)}")
     if "poses" in arrays:
         poses = _numbers(arrays["poses"], f"{name}: poses")

@@ -20,14 +20,7 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Frames, Motion
 from wholebody.tracking.tracks import MOST_FRAMES
 
-VERSION = 1
-"""Of the layout of the arrays."""
-
-BROKEN = (
-    *(zipfile.BadZipFile, zlib.error, tokenize.TokenError, ValueError, OSError, EOFError, KeyError, SyntaxError),
-    *(NotImplementedError, RuntimeError, MemoryError, OverflowError, TypeError),
-)
-"""What numpy and zipfile raise for a damaged archive."""
+VERSION = 1  # of the layout of the arrays
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -118,7 +111,10 @@ def read_arrays(path: Path) -> dict[str, NDArray[np.generic]]:
                 arrays[name] = content
     except FileFormatError:
         raise
-    except BROKEN as error:
+    except (  # what numpy and zipfile raise for a damaged archive
+        *(zipfile.BadZipFile, zlib.error, tokenize.TokenError, ValueError, OSError, EOFError, KeyError, SyntaxError),
+        *(NotImplementedError, RuntimeError, MemoryError, OverflowError, TypeError),
+    ) as error:
         why = one_line(f"{type(error).__name__}: {error}")
         raise FileFormatError(f"{path.name}: is no npz file, or it is cut off or damaged ({why})") from None
     return arrays

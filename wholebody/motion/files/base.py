@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.figures.figure import Figure
-from wholebody.tracking.tracks import LARGEST
+from wholebody.tracking.tracks import LARGEST, MOST_FRAMES
 
 
 class Motion(Protocol):
@@ -47,8 +49,7 @@ class Frames(NamedTuple):
     name: str
 
 
-LARGEST_FILE = 500_000_000
-"""Bytes of a text file of motion: an hour of 75 joints at 120 frames a second."""
+LARGEST_FILE = 500_000_000  # bytes of a text file of motion: an hour of 75 joints at 120 frames a second
 
 
 def number(word: str, where: str) -> float:
@@ -64,6 +65,31 @@ def number(word: str, where: str) -> float:
     if not abs(value) <= LARGEST:
         raise FileFormatError(f"{where}: {one_line(word, 20)} is not finite or beyond {LARGEST:g}")
     return value
+
+
+def seconds(word: str, where: str) -> float:
+    """A time step.
+
+    Raises:
+        FileFormatError: the word is none.
+    """
+    dt = number(word, where)
+    if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
+        raise FileFormatError(f"{where}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
+    return dt
+
+
+def frame_count(word: str, where: str) -> int:
+    """A number of frames.
+
+    Raises:
+        FileFormatError: the word is none, or there are too many.
+    """
+    if not re.fullmatch(r"\d{1,9}", word):
+        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number of frames")
+    if not 1 <= int(word) <= MOST_FRAMES:
+        raise FileFormatError(f"{where}: {int(word)} frames; give 1 to {MOST_FRAMES}")
+    return int(word)
 
 
 def table(name: str, rows: Sequence[tuple[int, Sequence[str]]], columns: int) -> Array:

@@ -1,19 +1,17 @@
-"""BVH: skeletons that move, read and written by pybvh."""
+"""BVH: skeletons that move, with any order of channels; clips are written with one order."""
 
 from __future__ import annotations
 
-from importlib import import_module
+import io
 from pathlib import Path
-from types import ModuleType
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array
-from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
-from wholebody.base.files import Scratch, read_foreign_text, title_of
+from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import read_foreign_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion
@@ -21,25 +19,9 @@ from wholebody.motion.files.bvh_text import BvhText, parsed
 from wholebody.motion.files.nodes import OFF, angles_about, nodes_of, postures, rotations, wrapped
 from wholebody.motion.skeleton import UNITS, UP, SkeletonMotion, longest_way, recognised_unit
 
-RESTING = 1e-3
-"""Radians by which the joints of a rest posture turn at most. Converters put one before the motion."""
-
-
-def pybvh() -> ModuleType:
-    """Import pybvh.
-
-    Raises:
-        MissingPackageError: it is not installed.
-    """
-    try:
-        pybvh: ModuleType = import_module("pybvh")
-    except ImportError:
-        raise MissingPackageError("BVH files need pybvh; install it with pip install 'wholebody[motion]'") from None
-    return pybvh
-
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
-    """Read a moving skeleton, with any order of channels.
+    """Read a moving skeleton.
 
     Args:
         path: the file.
@@ -48,32 +30,25 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
 
     Raises:
         FileFormatError: the file cannot be read; the line is named.
-        MissingPackageError: pybvh is not installed.
     """
-    library = pybvh()
     found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
     offsets, root, notes = _offsets(found)
     notes = [*found.notes, *notes]
-    made = _pybvh_motion(library, found, offsets, root)
+    angles, local = _rotations(found)
     parents = np.array([joint.parent for joint in found.joints], dtype=np.intp)
     if longest_way(parents, offsets) == 0.0:
         raise FileFormatError(f"{path.name}: all joints of the skeleton are at one place; give their offsets")
     if up is None:
-        rest = made.rest_up or made.world_up
-        up = rest[1] if rest in ("+y", "+z") else "y"
+        up = _up(found, parents, offsets)
         notes.append(f"{up} is up")
     if unit is None:
         unit = recognised_unit(parents, offsets)
         notes.append(f"lengths are in {unit}")
-    if _begins_with_rest(np.asarray(made.joint_angles)[:, 1:]):
+    first = int(_begins_with_rest(angles[:, 1:]))
+    if first:
         notes.append("the first frame is the rest posture and no part of the motion; it is left out")
-        first = 1
-    else:
-        first = 0
     turn, scale = UP[up], UNITS[unit]
-    moving = np.array([bool(joint.channels) for joint in found.joints])
-    local = np.tile(np.eye(3), (len(found.table) - first, len(parents), 1, 1))
-    local[:, moving] = turn @ made.to_rotmat()[1][first:] @ turn.T
+    local = turn @ local[first:] @ turn.T
     names = tuple(joint.name for joint in found.joints)
     top = _moved_joint(found, parents, offsets)
     places = scale * root[first:] @ turn.T
@@ -89,7 +64,7 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
     try:
         return SkeletonMotion.moved(
-            names, parents, scale * offsets @ turn.T, local, places, made.frame_time, title_of(path), tuple(notes)
+            names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
         )
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
@@ -151,10 +126,11 @@ def _begins_with_rest(angles: Array) -> bool:
     """
     if len(angles) < 2:
         return False
-    turns = np.abs(angles) >= RESTING
+    still = 1e-3  # rad
+    turns = np.abs(angles) >= still
     if not turns[0].any():
         return bool(turns[1].any())
-    moving = np.ptp(angles[1:], axis=0) >= RESTING
+    moving = np.ptp(angles[1:], axis=0) >= still
     # a tenth of the angles that change later are not zero in the rest postures of CMU, nine tenths in recorded frames
     if len(angles) < 3 or not moving.any() or turns[0][moving].mean() >= 0.25:
         return False
@@ -191,38 +167,37 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
     return offsets, root, notes
 
 
-def _pybvh_motion(library: ModuleType, found: BvhText, offsets: Array, root: Array) -> Any:
-    """The motion in pybvh's classes; rotations that a joint lacks are zero."""
-    nodes = library.bvhnode
-    made: list[Any] = []
-    angles = []
+def _rotations(found: BvhText) -> tuple[Array, Array]:
+    """Angles (n, moving joints, 3), radians, and rotations of all joints in their parents (n, joints, 3, 3).
+
+    Rotations that a joint lacks are zero.
+    """
+    angles, local = list[Array](), np.tile(np.eye(3), (len(found.table), len(found.joints), 1, 1))
     for k, (joint, values) in enumerate(zip(found.joints, _columns(found), strict=True)):
-        offset = offsets[k].tolist()
-        order = [axis for axis, kind in joint.channels if kind == "rotation"]
-        order += [axis for axis in "XYZ" if axis not in order]
-        if k == 0:
-            node = nodes.BvhRoot(joint.name, offset, ["X", "Y", "Z"], order, [], None)
-        elif joint.channels:
-            node = nodes.BvhJoint(joint.name, offset, order, [], made[joint.parent])
-        else:
-            node = nodes.BvhEndSite(joint.name, offset, made[joint.parent])
-        if k:
-            made[joint.parent].children = [*made[joint.parent].children, node]
-        made.append(node)
         if joint.channels:
+            order = [axis for axis, kind in joint.channels if kind == "rotation"]
+            order += [axis for axis in "XYZ" if axis not in order]
             zero = np.zeros(len(found.table))
             angles.append(np.stack([np.radians(values.get((axis, "rotation"), zero)) for axis in order], axis=1))
-    return library.Bvh(
-        nodes=made,
-        root_pos=root,
-        joint_angles=np.stack(angles, axis=1),
-        frame_time=found.dt,
-        world_up="+y",
-    )
+            local[:, k] = Rotation.from_euler("".join(order), angles[-1]).as_matrix()
+    return np.stack(angles, axis=1), local
 
 
-ORDER = "ZXY"
-"""Order of rotations, as most writers of BVH have it."""
+def _up(found: BvhText, parents: NDArray[np.intp], offsets: Array) -> str:
+    """The axis that is up in the rest posture: towards the head, or else of the largest extent; "y" for any but z."""
+    rest = np.zeros_like(offsets)
+    for k in range(1, len(parents)):
+        rest[k] = rest[parents[k]] + offsets[k]
+    names = [joint.name.lower() for joint in found.joints]
+    tops = (rest[names.index(name)] for name in ("head", "neck", "chest", "spine") if name in names)
+    extent = np.ptp(rest, axis=0)
+    most = int(np.argmax(extent))
+    way = next((top for top in tops if np.linalg.norm(top) > 1e-6), np.eye(3)[most] * rest[:, most].mean())
+    axis = int(np.argmax(np.abs(way)))
+    return "z" if axis == 2 and way[axis] >= 0.0 else "y"
+
+
+ORDER = "ZXY"  # of rotations, as most writers of BVH have it
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -230,36 +205,35 @@ def write(motion: Motion, path: Path) -> Path:
 
     Raises:
         InputError: a joint of the figure slides, or the file cannot be written.
-        MissingPackageError: pybvh is not installed.
     """
-    library = pybvh()
-    kinds = library.bvhnode
     nodes = nodes_of(motion.figure)
     local, root = rotations(motion.figure, nodes, motion.q)
     back, scale = UP["y"].T, 1.0 / UNITS["centimetres"]  # six digits of which are 1e-8 m
-    made: list[Any] = []
-    for node in nodes:
-        offset = (scale * back @ node.offset).tolist()
-        if node.parent < 0:
-            made.append(kinds.BvhRoot(node.name, offset, ["X", "Y", "Z"], list(ORDER), [], None))
-        else:
-            made.append(kinds.BvhJoint(node.name, offset, list(ORDER), [], made[node.parent]))
-            made[node.parent].children = [*made[node.parent].children, made[-1]]
+    lines, order = ["HIERARCHY"], list[int]()
+
+    def add(number: int, indent: str) -> None:
+        node = nodes[number]
+        order.append(number)
+        kind, channels = ("JOINT", "3") if indent else ("ROOT", "6 Xposition Yposition Zposition")
+        rotating = " ".join(f"{axis}rotation" for axis in ORDER)
+        lines.extend([f"{indent}{kind} {node.name}", f"{indent}{{", offset(indent, node.offset)])
+        lines.append(f"{indent}\tCHANNELS {channels} {rotating}")
+        for child, other in enumerate(nodes):
+            if other.parent == number:
+                add(child, f"{indent}\t")
         if node.tip is not None:
-            end = kinds.BvhEndSite(f"{node.name}_end", (scale * back @ node.tip).tolist(), made[-1])
-            made[-1].children = [end]
-    tree = _depth_first(made[0])
-    written = library.Bvh(
-        nodes=tree,
-        root_pos=scale * root @ back.T,
-        joint_angles=_angles(back @ local @ back.T)[:, [made.index(node) for node in tree if node in made]],
-        frame_time=motion.dt,
-        world_up="+y",
-    )
-    with Scratch() as folder:
-        library.write_bvh_file(written, folder / "clip.bvh")
-        content = (folder / "clip.bvh").read_text()
-    return write_file(path, content)
+            lines.extend([f"{indent}\tEnd Site", f"{indent}\t{{", offset(f"{indent}\t", node.tip), f"{indent}\t}}"])
+        lines.append(f"{indent}}}")
+
+    def offset(indent: str, place: Array) -> str:
+        return f"{indent}\tOFFSET " + " ".join(f"{value:.6f}" for value in (scale * back @ place).tolist())
+
+    add(0, "")
+    lines += ["MOTION", f"Frames: {len(motion.q)}", f"Frame Time: {motion.dt:.10g}", ""]
+    angles = np.degrees(_angles(back @ local @ back.T)[:, order])
+    table = io.StringIO()
+    np.savetxt(table, np.column_stack([scale * root @ back.T, angles.reshape(len(angles), -1)]), fmt="%.6f")
+    return write_file(path, "\n".join(lines) + table.getvalue())
 
 
 def own(motion: SkeletonMotion, figure: Figure) -> Frames | None:
@@ -282,11 +256,6 @@ def own(motion: SkeletonMotion, figure: Figure) -> Frames | None:
     local[:, 1:] = np.swapaxes(world[:, [node.parent for node in nodes[1:]]], 2, 3) @ world[:, 1:]
     q = postures(figure, nodes, local, motion.positions[:, at[0]])
     return None if q is None else Frames(q, motion.dt, motion.name)
-
-
-def _depth_first(node: Any) -> list[Any]:
-    """A node and all below it, in the order of the file."""
-    return [node, *(below for child in getattr(node, "children", []) for below in _depth_first(child))]
 
 
 def _angles(local: Array) -> Array:

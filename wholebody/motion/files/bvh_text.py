@@ -1,7 +1,4 @@
-"""The text of a BVH file: joints, channels and numbers, every fault with its line.
-
-pybvh says no lines of faults in the motion, and refuses joints with positions or with less than three rotations.
-"""
+"""The text of a BVH file: joints, channels and numbers, every fault with its line."""
 
 from __future__ import annotations
 
@@ -9,11 +6,9 @@ import re
 from dataclasses import dataclass, field
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, one_line
+from wholebody.motion.files.base import frame_count, seconds, table
 from wholebody.motion.files.base import number as read_number
-from wholebody.motion.files.base import table
-from wholebody.tracking.tracks import MOST_FRAMES
 
 MOST_JOINTS = 1000
 
@@ -68,14 +63,9 @@ def parsed(text: str, name: str) -> BvhText:
     place = _Hierarchy(name, lines).read()
     frames, rest = _counted(name, lines, place.at, r"frames\s*:\s*(\S+)", "Frames:")
     step, rest = _counted(name, lines, rest, r"frame\s*time\s*:\s*(\S+)", "Frame Time:")
-    number = lines[rest - 2][0]
-    count = _whole(frames, f"{name}, line {number}")
-    if not 1 <= count <= MOST_FRAMES:
-        raise FileFormatError(f"{name}, line {number}: {count} frames; give 1 to {MOST_FRAMES}")
+    count = frame_count(frames, f"{name}, line {lines[rest - 2][0]}")
     number = lines[rest - 1][0]
-    dt = read_number(step, f"{name}, line {number}")
-    if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(f"{name}, line {number}: the frame time is {dt:g} s; {TIME_STEP_ASKED}")
+    dt = seconds(step, f"{name}, line {number}")
     wide = sum(len(joint.channels) for joint in place.joints)
     rows = _unwrapped([(number, line.split()) for number, line in lines[rest:]], count, wide)
     values = table(name, rows[:count], wide)
@@ -194,9 +184,3 @@ def _counted(name: str, lines: list[tuple[int, str]], at: int, pattern: str, wor
     if match is None:
         raise FileFormatError(f"{name}, line {number}: {one_line(line, 40)!r} stands where {word} is due")
     return match[1], at + 1
-
-
-def _whole(word: str, where: str) -> int:
-    if not re.fullmatch(r"\d{1,9}", word):
-        raise FileFormatError(f"{where}: {one_line(word, 20)!r} is no number of frames")
-    return int(word)

@@ -20,8 +20,6 @@ from wholebody.figures.figure import Figure
 from wholebody.motion.files.base import Motion
 from wholebody.motion.skeleton import UP
 
-WORLD = "world_y_up"
-
 
 def write(motion: Motion, path: Path) -> Path:
     """Write a clip as an animation: y up, z forward, metres, one keyframe a frame, interpolated linearly.
@@ -58,10 +56,10 @@ def joint_tree(model: Any, placements: Sequence[pin.SE3]) -> tuple[Any, list[str
     import trimesh
 
     names = [f"joint {name}" for name in model.names]
-    scene = trimesh.Scene(base_frame=WORLD)
+    scene = trimesh.Scene(base_frame="world_y_up")
     upward = np.eye(4)
     upward[:3, :3] = UP["y"].T
-    scene.graph.update(frame_to=names[0], frame_from=WORLD, matrix=upward)
+    scene.graph.update(frame_to=names[0], frame_from="world_y_up", matrix=upward)
     for joint in range(1, model.njoints):
         at = placements[joint].homogeneous
         scene.graph.update(frame_to=names[joint], frame_from=names[model.parents[joint]], matrix=at)

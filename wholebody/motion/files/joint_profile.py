@@ -13,17 +13,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from wholebody.base.arrays import Array
-from wholebody.base.checks import TIME_STEP, TIME_STEP_ASKED
 from wholebody.base.errors import FileFormatError, InputError, one_line
 from wholebody.base.files import read_text, title_of
 from wholebody.base.files import write as write_file
 from wholebody.figures.figure import Figure
-from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, number, table
+from wholebody.motion.files.base import LARGEST_FILE, Frames, Motion, frame_count, seconds, table
 from wholebody.motion.files.nodes import angles_about
 from wholebody.tracking.tracks import MOST_FRAMES, ROOT_SIZE
 
-GLOBAL = 6
-"""Values of the pelvis: place and rotation."""
+GLOBAL = 6  # values of the pelvis: place and rotation
 
 
 def write(motion: Motion, path: Path) -> Path:
@@ -66,7 +64,9 @@ def read(path: Path, figure: Figure) -> Frames:
     if len(rows) < 3:
         last = rows[-1][0] if rows else 1
         raise FileFormatError(f"{name}, line {last}: the file is cut off; give time step, number of frames and rows")
-    dt, count = _head(name, rows[0]), _count(name, rows[1])
+    words = [" ".join(row) for _, row in rows[:2]]
+    dt = seconds(words[0], f"{name}, line {rows[0][0]}")
+    count = frame_count(words[1], f"{name}, line {rows[1][0]}")
     frames = rows[2:]
     if len(frames) != count:
         line = frames[-1][0] if len(frames) < count else frames[count][0]
@@ -113,23 +113,6 @@ def sampled(times: Array, curves: Array, figure: Figure, dt: float, name: str = 
 def _postures(values: Array) -> Array:
     turns = Rotation.from_euler("XYZ", values[:, 3:GLOBAL]).as_quat()
     return np.hstack([values[:, :3], turns, values[:, GLOBAL:]])
-
-
-def _head(name: str, row: tuple[int, list[str]]) -> float:
-    line, words = row
-    if len(words) != 1:
-        raise FileFormatError(f"{name}, line {line}: {len(words)} values where the time step is due")
-    dt = number(words[0], f"{name}, line {line}")
-    if not TIME_STEP[0] <= dt <= TIME_STEP[1]:
-        raise FileFormatError(f"{name}, line {line}: the time step is {dt:g} s; {TIME_STEP_ASKED}")
-    return dt
-
-
-def _count(name: str, row: tuple[int, list[str]]) -> int:
-    line, words = row
-    if len(words) != 1 or not words[0].isdecimal() or not 1 <= len(words[0]) <= 7 or int(words[0]) < 1:
-        raise FileFormatError(f"{name}, line {line}: {one_line(' '.join(words), 20)!r} is no number of frames")
-    return int(words[0])
 
 
 def _check_figure(figure: Figure) -> None:

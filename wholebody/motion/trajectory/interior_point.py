@@ -27,25 +27,68 @@ from scipy.linalg import lapack
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.trajectory.banded_kernel import add_rows, add_sums
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 
 FIRST = 0.1  # products of slacks and multipliers at first; more and less take more iterations
 LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one that has none opposite
 
 
-def minimise(program: BandedQP, accuracy: float, gap: float) -> Answer:
+class BandedQP(NamedTuple):
+    """A program; matrices are scipy.sparse.csc_array or csc_matrix.
+
+    Attributes:
+        P: (n, n) symmetric and positive definite, both triangles.
+        c: (n,).
+        G: (m, n).
+        lower: (m,).
+        upper: (m,).
+        least: (n,).
+        most: (n,).
+        start: (n,) where the iteration begins; None for the middle between bounds.
+    """
+
+    P: Any
+    c: Array
+    G: Any
+    lower: Array
+    upper: Array
+    least: Array
+    most: Array
+    start: Array | None = None
+
+
+class Answer(NamedTuple):
+    """Of a program.
+
+    Attributes:
+        z: (n,) the minimiser, within `least` and `most`; finite.
+        solved: whether the conditions of optimality hold.
+        iterations: of the method.
+    """
+
+    z: Array
+    solved: bool
+    iterations: int
+
+
+def minimise(program: BandedQP, accuracy: float = 1e-5, gap: float = 1e-6) -> Answer:
     """Solve a program; see the module.
 
     Args:
-        program: P is positive definite; it begins at `start`, or in the middle between bounds.
+        program: what is minimised.
         accuracy: by which rows may be missed, and ten times of it, in parts of the largest derivative, the condition
-            of stationarity.
-        gap: of the objective, in parts of it where it is over 1.
+            of stationarity: a tenth of what a step is judged by; less costs an iteration.
+        gap: of the objective, in parts of it where it is over 1; more leaves deviations 3e-4 rad from the optimum.
     """
+    z, solved, iterations = _iterated(program, accuracy, gap)
+    finite = bool(np.isfinite(z).all())
+    return Answer(np.clip(z if finite else 0.0, program.least, program.most), solved and finite, iterations)
+
+
+def _iterated(program: BandedQP, accuracy: float, gap: float) -> Answer:
     fixed = program.most - program.least <= 1e-9  # an unknown whose bounds are no farther apart stays where it is
     if fixed.any():
         return _without(fixed, program, accuracy, gap)
-    matrices, bounds, c = _Matrices(sp.csc_array(program.P), sp.csc_array(program.G)), _Bounds(program), program.c
+    matrices, bounds, c = _Matrices(program), _Bounds(program), program.c
     z, s, y = _begun(matrices, bounds, program)
     count, Pz, Az = max(len(s), 1), matrices.P @ z, bounds.times(matrices.G @ z, z)
     for iteration in range(60):
@@ -94,7 +137,7 @@ def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Ans
         P[:, free][free], (c + P @ z)[free], sp.csc_array(left[rows]), lower[rows] - there, upper[rows] - there,
         least[free], most[free], None if start is None else start[free],
     )  # fmt: skip
-    found = minimise(others, accuracy, gap)
+    found = _iterated(others, accuracy, gap)
     z[free] = found.z
     return Answer(z, holds and found.solved, found.iterations)
 
@@ -158,10 +201,11 @@ class _Matrices:
         sums, columns: these two transposed.
     """
 
-    def __init__(self, P: Any, G: Any) -> None:
+    def __init__(self, program: BandedQP) -> None:
+        P, G = sp.csc_array(program.P), sp.csc_array(program.G)
         G.eliminate_zeros()
         self.P, self.G, self.transposed = sp.csr_array(P), sp.csr_array(G), sp.csr_array(G.T)
-        slack = _slacks(P, G)
+        slack = _slacks(P, G, np.isinf(program.most))
         self.slack: Indices = np.flatnonzero(slack).astype(np.intp)
         self.band: Indices = np.flatnonzero(~slack).astype(np.intp)
         self.share = sp.csc_array(G[:, self.slack])
@@ -286,9 +330,12 @@ class _Newton(NamedTuple):
         return dz, change, ds, -(products + y * ds) / s
 
 
-def _slacks(P: Any, G: Any) -> Mask:
-    """(n,) unknowns that P does not couple with others, of each row the last of them: no row has two slacks."""
-    alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0)
+def _slacks(P: Any, G: Any, unbounded: Mask) -> Mask:
+    """(n,) unknowns that P does not couple with others, of each row the last of them: no row has two slacks.
+
+    Only those that are unbounded above (n,): a slack begins where its rows are met.
+    """
+    alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0) & unbounded
     found = np.flatnonzero(alone)
     shares = sp.coo_array(G[:, found])
     row, column = shares.coords

@@ -24,7 +24,7 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.clip_torques import CUTOFF, smoothed
 from wholebody.motion.frame_terms import FrameTerms, between
 from wholebody.motion.inverse_dynamics import LIGHT, Derivatives, InverseDynamics, Loads, Stand, zero_moment_point
-from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength, torque_limits
 from wholebody.motion.trajectory.deviations import Chart
 from wholebody.motion.trajectory.retiming import TimedRows

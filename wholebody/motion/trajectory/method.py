@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pinocchio as pin
@@ -12,19 +12,13 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array, Mask
 from wholebody.motion.avoider import MethodResult, Run
 from wholebody.motion.clip import Clip
-from wholebody.motion.faults import Faults
 from wholebody.motion.frame_terms import FrameTerms, between
-from wholebody.motion.soles import standing_feet
+from wholebody.motion.stance import standing_feet
 from wholebody.motion.strength import Strength
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
-from wholebody.motion.trajectory.banded_qp import banded_solver
 from wholebody.motion.trajectory.loads import ClipLoads
 from wholebody.motion.trajectory.retiming import Timing, allowance, slowed, speed_bounds, timing
-from wholebody.motion.trajectory.window_run import ClipRun, WindowResult
+from wholebody.motion.trajectory.window_run import ClipRun
 from wholebody.motion.windows import Window
-
-CORRECTING = (0.2, 0.1)  # s: smoothness of their answers, the next where one gets no farther; smoother = nearer to the
-# rows, as filters change less of it
 
 
 @dataclass(frozen=True)
@@ -39,9 +33,6 @@ class Trajectory:
             0.1 s at first. Where an answer has over 1.2 of the jerk of the original, 0.15 s follow, else 0.04 s if that
             brings it nearer with no more jerk than this. With `dynamics` it stays 0.1 s.
         margin: seconds before and after a collision in which frames may be changed.
-        solver: of the quadratic programs: "banded", which is the package's own and the fastest, "piqp", "osqp", or None
-            for "banded".
-        iterations: most steps of one run of a window; a step takes one to three quadratic programs.
         stretch: factor by which the clip may be slowed, at most and anywhere, so that joints keep to their speed
             limits. The postures stay on their path, and the clip gets more frames of the same time step. 1 keeps the
             timing; joints that the clip moves faster than their limits then stay as fast.
@@ -50,15 +41,13 @@ class Trajectory:
 
     Raises:
         InputError: a value out of range.
-        UnknownNameError: there is no such solver.
-        MissingPackageError: the solver is not installed.
     """
+
+    name: ClassVar[str] = "trajectory"
 
     clearance: float = 0.0
     time: float | None = None
     margin: float = 0.5
-    solver: str | None = None
-    iterations: int = 40
     stretch: float = 1.0
     dynamics: Strength | None = None
 
@@ -68,65 +57,45 @@ class Trajectory:
         if self.time is not None:
             checks.settle(self, "time", checks.number(self.time, "Trajectory: time", 0.0, 100.0, "s"))
         checks.settle(self, "margin", checks.number(self.margin, "Trajectory: margin", 0.0, 100.0, "s"))
-        checks.settle(self, "iterations", checks.whole(self.iterations, "Trajectory: iterations", 1, 10_000))
         checks.settle(self, "stretch", checks.number(self.stretch, "Trajectory: stretch", 1.0, 100.0))
         if self.dynamics is not None:
             checks.instance(self.dynamics, Strength, "Trajectory: dynamics", "give wb.motion.Strength(percentile=50)")
-        banded_solver(self.solver)
-
-    @property
-    def name(self) -> str:
-        """Name for tables."""
-        return "trajectory" if self.solver is None else f"trajectory/{self.solver}"
 
     def avoid(self, run: Run) -> MethodResult:
         """Free a clip; see `wholebody.motion.avoider.Avoider`."""
-        _, solve = banded_solver(self.solver)
         loads, q = None, run.terms.q
         if self.dynamics is not None:
             clip = Clip(run.scene.figure, q, run.terms.dt)
             loads = ClipLoads.original(clip, standing_feet(clip, run.feet), self.dynamics, run.terms, self.stretch)
-        freed, missed = self._freed(run, solve, run.terms.q, loads, self.stretch)
-        new = None if run.ended else self._timing(freed, run.terms, solve, loads)
+        freed, missed = self._freed(run, run.terms.q, loads, self.stretch)
+        new = None if run.ended else self._timing(freed, run.terms, loads)
         if new is None:
-            return MethodResult(self._measured(run, solve, q, freed, loads, self.stretch), message="; ".join(missed))
+            return MethodResult(self._measured(run, q, freed, loads, self.stretch), message="; ".join(missed))
         # On the same path nothing is new but chords, which cut its corners; what they touch is freed from there.
         slower = run.of(run.terms.at(new.times))
         passed = between(run.scene.model, freed, new.times / run.terms.dt)
         loads = None if loads is None else loads.of(passed, new.times)
-        q, left = self._freed(slower, solve, passed, loads, 1.0, None if loads is None else loads.beyond())
-        q = self._measured(slower, solve, passed, q, loads, 1.0)
+        q, left = self._freed(slower, passed, loads, 1.0, None if loads is None else loads.beyond())
+        q = self._measured(slower, passed, q, loads, 1.0)
         return MethodResult(q, message="; ".join((*missed, *left)), times=new.times, stretch=new.largest)
 
-    def _measured(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, q: Array, loads: ClipLoads | None,
-        rate: float,
-    ) -> Array:  # fmt: skip
-        """Postures whose loads keep to their bounds as `torques` measures them, as far as a few corrections get.
+    def _measured(self, run: Run, reference: Array, q: Array, loads: ClipLoads | None, rate: float) -> Array:
+        """The best postures (n, nq) whose loads keep to their bounds as `torques` measures them, from free ones q.
 
         Rows are corrected by what the measurement of the present postures is more than theirs, and the frames around
-        what is beyond its bounds are computed again.
-
-        Args:
-            run: of the reference.
-            solve: solves one program.
-            reference: (n, nq) postures that deviations are from.
-            q: (n, nq) free postures.
-            loads: of the reference; None where they are not looked at.
-            rate: factor of the speed limits.
-
-        Returns:
-            (n, nq) the best postures that were found.
+        what is beyond its bounds are computed again. `rate` is the factor of the speed limits.
         """
         if loads is None:
             return q
-        faults, corrected, times = run.faults(reference), loads.corrected(q), list(CORRECTING)
+        # s: smoothness of the answers, the next where one gets no farther; filters change less of what is smoother
+        times = [0.2, 0.1]
+        faults, corrected = run.faults(reference), loads.corrected(q)
         worst = corrected.of(q).worst()
         for _ in range(6):  # more leave fewer loads beyond their bounds, and take longer where these cannot be kept
             beyond = worst > 1.5e-3  # m, see `loads.LENGTH`; the judge allows 2e-3
             if not beyond.any() or not times or run.ended:
                 break
-            windows = ClipRun(run, solve, reference, times[0], self.iterations, rate, corrected)
+            windows = ClipRun(run, reference, times[0], rate, corrected)
             changed: Mask = beyond | (q != reference).any(axis=1)
             other = np.array(q)
             for window in run.windows(changed, self.margin):
@@ -143,14 +112,13 @@ class Trajectory:
         return q
 
     def _freed(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, loads: ClipLoads | None, rate: float,
-        beyond: Mask | None = None,
-    ) -> tuple[Array, list[str]]:  # fmt: skip
+        self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
+    ) -> tuple[Array, list[str]]:
         """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
 
         Frames (n,) that are beyond something else are changed too.
         """
-        windows = ClipRun(run, solve, reference, self.time, self.iterations, rate, loads)
+        windows = ClipRun(run, reference, self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")
         faults = run.faults(reference)
@@ -163,7 +131,7 @@ class Trajectory:
             freed = windows.window(window, faults, told)
             q[window.first : window.end] = freed.q
             if freed.missed and not run.ended:
-                window, freed = self._kept_back(run, windows, window, freed, q, faults, told)
+                window, freed = windows.kept_back(window, freed, q, faults, told, self.margin)
                 q[window.first : window.end] = freed.q
                 found = [other for other in found if not window.first <= other.first < window.end]
                 missed = {other: said for other, said in missed.items() if not window.first <= other.first < window.end}
@@ -174,36 +142,7 @@ class Trajectory:
             done += len(window)
         return q, list(missed.values())
 
-    def _kept_back(
-        self, run: Run, windows: ClipRun, window: Window, freed: WindowResult, q: Array, faults: Faults,
-        told: Callable[[float], bool],
-    ) -> tuple[Window, WindowResult]:  # fmt: skip
-        """A window that was not freed once more, on one side of what it passes for good.
-
-        A limb that passes through a thin thing and comes back much later, or never, has to stay where it is until then.
-        So the window is made as long as that, whatever windows lie in it.
-
-        Args:
-            run: of the clip.
-            windows: frees them.
-            window: that was not freed.
-            freed: what was found for it.
-            q: (n, nq) postures of the clip, with these.
-            faults: of the reference.
-            told: told the share done.
-        """
-        for kept, changed in windows.kept_back(window, q):
-            changed[window.first : window.end] = True
-            marked = run.windows(changed, self.margin)
-            wider = next(one for one in marked if one.first <= window.first < one.end)
-            again = windows.window(wider, faults, told, kept[wider.first : wider.end])
-            if not again.missed:
-                return wider, again
-        return window, freed
-
-    def _timing(
-        self, q: Array, terms: FrameTerms, solve: Callable[[BandedQP], Answer], loads: ClipLoads | None
-    ) -> Timing | None:
+    def _timing(self, q: Array, terms: FrameTerms, loads: ClipLoads | None) -> Timing | None:
         """The new timing of postures (n, nq); None where it stays."""
         stretch = allowance(len(q), self.stretch)
         if stretch <= 1.0 or len(q) < 2:
@@ -212,9 +151,9 @@ class Trajectory:
         steps = np.array([pin.difference(model, q[gap], q[gap + 1]) for gap in gaps])
         slowest, fastest = (np.array(bounds) for bounds in zip(*map(terms.step_bounds, gaps), strict=True))
         most = speed_bounds(steps, slowest, fastest)
-        b = slowed(most, terms.dt, stretch, solve)
+        b = slowed(most, terms.dt, stretch)
         if loads is not None:
             path = loads.of(q)
             for _ in range(3):  # the ground's forces are split as the timing before makes them
-                b = slowed(most, terms.dt, stretch, solve, path.timed(b))
+                b = slowed(most, terms.dt, stretch, path.timed(b))
         return timing(b, terms.dt)

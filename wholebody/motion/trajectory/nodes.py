@@ -20,7 +20,6 @@ from wholebody.scene.workspace import Workspace
 from wholebody.tasks.base import Constraint, Goal
 
 NEAREST = 5e-4  # share of a gap: nearer to a frame than this, what the frame keeps is enough
-ROOM = 1e-4  # m: asked of pairs between frames; what is beside a place then dips by less than is told, once for all
 
 Terms = Sequence[Constraint | Goal]
 
@@ -50,8 +49,8 @@ class Node(NamedTuple):
 
     @property
     def room(self) -> float:
-        """Metres that programs ask of its rows beyond what must be met."""
-        return ROOM if self.share else 0.0
+        """Metres that programs ask of its rows beyond what must be met: what is beside a place dips by less."""
+        return 1e-4 if self.share else 0.0
 
 
 class Rows(NamedTuple):

@@ -16,14 +16,12 @@ import scipy.sparse as sp
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.motion.frame_terms import FrameTerms
-from wholebody.motion.trajectory.banded_program import BandedQP
 from wholebody.motion.trajectory.deviations import Chart, Objective
+from wholebody.motion.trajectory.interior_point import BandedQP
 from wholebody.motion.trajectory.nodes import Rows
 
 SOFT = 1e3  # 1/m, of loads that are beyond their bounds: large, so that they are met where contacts let them be
-STIFFNESS = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
 ONE_STEP = 0.03  # m, rad: of a deeper shortfall one step asks for this much; the normals are looked at again on the way
-CLOSE, NEAR_SHARE = 3e-3, 0.3  # m, and m for each rad of the radius: rows nearer than the larger begin a program
 
 
 class Limits(NamedTuple):
@@ -197,7 +195,7 @@ def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:
 
 def likely(one: Rows, radius: float) -> Mask:
     """(r,) rows of a node that a program is begun with: a step of the radius hardly ever misses others."""
-    near: Mask = one.gap < one.node.room + max(CLOSE, NEAR_SHARE * radius)
+    near: Mask = one.gap < one.node.room + max(3e-3, 0.3 * radius)  # m, and m for each rad
     return np.ones_like(near) if one.node.soft else near
 
 
@@ -214,6 +212,7 @@ def _slacks(one: Rows, kept: Mask) -> tuple[Indices, int]:
 def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tuple[sp.csc_matrix, Array]:
     """P and c: the objective, the prices of slacks, and the augmented Lagrangian of equalities."""
     x, dofs, count = step.x, step.dofs, len(step.dofs)
+    stiffness = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
     c = prices.copy()
     first, second = np.nonzero(objective.bands)
     values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
@@ -226,10 +225,10 @@ def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tu
         if len(one.equal):
             part, here = one.equal_rows[:, dofs], place[one.node.frame]
             wanted = part @ x[one.node.frame, dofs] - one.equal - multiplier
-            values.append((STIFFNESS * part.T @ part).ravel())
+            values.append((stiffness * part.T @ part).ravel())
             at.append(np.repeat(here, count))
             to.append(np.tile(here, count))
-            c[here] -= STIFFNESS * part.T @ wanted
+            c[here] -= stiffness * part.T @ wanted
     triplets = (np.concatenate(values), (np.concatenate(at), np.concatenate(to)))
     return sp.csc_matrix(triplets, shape=(len(c), len(c))), c
 
@@ -264,7 +263,7 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
     change = np.diff(x, axis=0)
     slowest, fastest = limits.slowest[:, step.dofs], limits.fastest[:, step.dofs]
     # from half of a bound on; one may be zero, where the original is as fast as the limit: a little before it is near
-    near = NEAR_SHARE * step.radius
+    near = 0.3 * step.radius
     fast, slow = np.minimum(0.5 * fastest, fastest - near), np.maximum(0.5 * slowest, slowest + near)
     frame, dof = np.nonzero((change > fast) | (change < slow))
     now, low, high = change[frame, dof], slowest[frame, dof], fastest[frame, dof]

@@ -13,15 +13,14 @@ subject to ``1/stretch^2 <= b_k <= 1``, and b_k at most the square of the rate t
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 
 from wholebody.base.arrays import Array, Indices
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 from wholebody.motion.trajectory.deviations import Objective
+from wholebody.motion.trajectory.interior_point import BandedQP, minimise
 
 SPREAD = 0.2
 """Seconds, tau: how far slowing at one frame spreads to its neighbours; larger = smoother, slower for longer."""
@@ -43,16 +42,13 @@ class TimedRows(NamedTuple):
     change: Array
 
 
-def slowed(
-    most: Array, dt: float, stretch: float, solve: Callable[[BandedQP], Answer], loads: TimedRows | None = None
-) -> Array:
+def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = None) -> Array:
     """(n,) squares of the rate at which each frame is passed: 1 where the timing stays, else less.
 
     Args:
         most: (n,) bounds on it that speed limits give.
         dt: seconds from frame to frame.
         stretch: by which factor the clip may be slowed at most, anywhere; more than 1.
-        solve: solves one program.
         loads: further rows; what cannot be met is missed by as little as can be.
     """
     count = len(most)
@@ -77,7 +73,7 @@ def slowed(
     program = BandedQP(
         sp.csc_matrix(P), c, sp.csc_matrix(G), lower, np.full(len(lower), np.inf), low, high
     )  # fmt: skip
-    z = solve(program).z[:count]
+    z = minimise(program).z[:count]
     found: Array = 1.0 - np.clip(z, low[:count], high[:count])
     return found
 

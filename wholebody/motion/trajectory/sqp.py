@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 from wholebody.motion.trajectory.deviations import Objective
+from wholebody.motion.trajectory.interior_point import minimise
 from wholebody.motion.trajectory.nodes import Node, NodeEvaluator, Rows
 from wholebody.motion.trajectory.program import (
     ONE_STEP,
@@ -163,21 +163,17 @@ class WindowProgram:
         nodes: where rows hold: every frame, and places between frames; more may be added before another `run`.
     """
 
-    def __init__(
-        self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, solve: Callable[[BandedQP], Answer],
-        iterations: int,
-    ) -> None:  # fmt: skip
+    def __init__(self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, iterations: int) -> None:
         """Take what is needed.
 
         Args:
             evaluator: of the rows at nodes.
             objective: of the window.
             limits: of its deviations.
-            solve: solves one program.
             iterations: most steps of one run; a step takes one to three programs.
         """
         self._evaluator, self._objective, self._limits = evaluator, objective, limits
-        self._solve, self._iterations = solve, iterations
+        self._iterations = iterations
         self.nodes = evaluator.nodes()
         self._free = (limits.lower < limits.upper).any(axis=0)
 
@@ -252,7 +248,7 @@ class WindowProgram:
         while True:
             step = Step(here.x, here.rows, dofs, ways.radius, ways.penalty, multipliers, kept)
             layout = lay_out(self._objective, self._limits, step)
-            x, solved = layout.deviations(self._solve(layout.program).z, here.x), solved + 1
+            x, solved = layout.deviations(minimise(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
             missed = [
                 mask & (foreseen(one, x - here.x) < one.node.room - MET) if mask.any() else mask

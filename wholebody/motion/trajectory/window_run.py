@@ -21,7 +21,6 @@ from wholebody.motion.clip import Clip
 from wholebody.motion.faults import FEW, Faults, depths_between, dipping, dips, sampled_dips
 from wholebody.motion.measures import jerk_ratio
 from wholebody.motion.one_side import PASSED, followed, kept_beside
-from wholebody.motion.trajectory.banded_program import Answer, BandedQP
 from wholebody.motion.trajectory.deviations import Chart, Objective
 from wholebody.motion.trajectory.loads import ClipLoads, WindowLoads
 from wholebody.motion.trajectory.nodes import NEAREST, Node, NodeEvaluator
@@ -42,6 +41,7 @@ class WindowSettings:
         jerk: parts of the original's; an answer with more is made smoother.
         share: of the squared deviation; acceleration that costs less leaves little to gain.
         rounds: of sweeping and adding places between frames.
+        iterations: most steps of one run; a step takes one to three programs.
     """
 
     first: float = 0.1
@@ -50,6 +50,7 @@ class WindowSettings:
     jerk: float = 1.2
     share: float = 0.1
     rounds: int = 12
+    iterations: int = 40
 
 
 SETTINGS = WindowSettings()
@@ -121,40 +122,52 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, solve: Callable[[BandedQP], Answer], reference: Array, time: float | None,
-        iterations: int = 40, rate: float = 1.0, loads: ClipLoads | None = None,
+        self, run: Run, reference: Array, time: float | None, rate: float = 1.0,
+        loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
         Args:
             run: of the clip.
-            solve: solves one program.
             reference: (n, nq) postures that the deviations are from.
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            iterations: most steps of one run.
             rate: factor of the speed limits, for a clip that will be slowed by as much.
             loads: of the reference postures, if they are to keep to their bounds.
         """
-        self._run, self._solve, self._reference = run, solve, reference
-        self._time, self._iterations, self._rate, self._loads = time, iterations, rate, loads
+        self._run, self._reference = run, reference
+        self._time, self._rate, self._loads = time, rate, loads
 
-    def kept_back(self, window: Window, q: Array) -> Iterable[tuple[Array, Mask]]:
-        """Postures of the clip that stay on one side of what motions of a window pass, for as long as it takes.
+    def kept_back(
+        self,
+        window: Window,
+        freed: WindowResult,
+        q: Array,
+        found: Faults,
+        cancel: Callable[[float], bool],
+        margin: float,
+    ) -> tuple[Window, WindowResult]:
+        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes.
 
         Args:
-            window: which frames.
-            q: (n, nq) postures of the clip.
-
-        Returns:
-            (n, nq) postures, and which of them (n,) are kept back: of the reference, and of q; none where that is not
-            found.
+            window: that was not freed.
+            freed: what was found for it.
+            q: (n, nq) postures of the clip, with these.
+            found: what is wrong with the reference.
+            cancel: as for `window`.
+            margin: seconds before and after.
         """
         for begun in (self._reference, q):
             gaps = dipping(self._run.workspace, begun, range(window.first, window.end - 1))
             kept = kept_beside(self._run, Window(0, len(q)), begun, gaps)
             changed: Mask = (kept != begun).any(axis=1)
             if changed.any():
-                yield kept, changed
+                changed[window.first : window.end] = True
+                marked = self._run.windows(changed, margin)
+                wider = next(one for one in marked if one.first <= window.first < one.end)
+                again = self.window(wider, found, cancel, kept[wider.first : wider.end])
+                if not again.missed:
+                    return wider, again
+        return window, freed
 
     def window(
         self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None = None
@@ -215,12 +228,7 @@ class ClipRun:
         return Objective(len(window), weights, time, self._run.terms.dt, self._seams(window))
 
     def _again(self, found: _Attempt, own: _Window) -> _Attempt:
-        """An answer once more, as smooth as its jerk asks for.
-
-        With more jerk than is allowed it is made smoother. With less it is made less smooth and so nearer to the
-        original, where smoothness costs deviation. Either is kept where its jerk is allowed. So jerk is a bound, and
-        the deviation what is minimised.
-        """
+        """An answer once more, smoother where its jerk is not allowed, else less smooth and nearer to the original."""
         jerk, square = self._jerk(own, found.x), float((found.x**2).sum())
         rough = jerk > SETTINGS.jerk
         if not rough and found.objective < (1.0 + SETTINGS.share) * 0.5 * square:
@@ -243,8 +251,8 @@ class ClipRun:
     def _starts(self, own: _Window, depths: Array) -> Iterable[Array]:
         """Deviations (n, nv) to begin with.
 
-        None; frames kept on one side of what motions between them pass; what following gives, from the deepest frame
-        and both ends, the least first. Attempts that end early are gone on with after all others.
+        None; frames kept on one side of what motions between them pass; what following from the deepest frame and both
+        ends gives, the least first.
         """
         window, none = own.window, np.zeros((len(own.window), self._run.workspace.model.nv))
         yield none
@@ -261,12 +269,12 @@ class ClipRun:
     def _attempt(self, begun: _Attempt, own: _Window, objective: Objective, way: _Way) -> _Attempt | None:
         """What iterations from an attempt lead to; None where the caller ends them."""
         work = self._run.work
-        program = WindowProgram(own.evaluator, objective, own.limits, self._solve, self._iterations)
+        program = WindowProgram(own.evaluator, objective, own.limits, SETTINGS.iterations)
         program.add(begun.between)
         x, radius, dipped, near = begun.x, way.radius, set[int](), list[Node]()
 
         def told(count: int, worst: float) -> bool:
-            return own.cancel(count / self._iterations)
+            return own.cancel(count / SETTINGS.iterations)
 
         for number in range(SETTINGS.rounds):
             # what passes a thing between two frames is on the wrong side: seen where little is missed in frames, long
@@ -297,13 +305,10 @@ class ClipRun:
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
     def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames where motions dip, and beside them; what dips again has them everywhere.
+        """Places between frames with deviations x (n, nv) where motions dip, and beside them.
 
-        Args:
-            own: the window.
-            x: (n, nv) deviations.
-            dipped: gaps that dipped before; those that dip now join them.
-            met: whether nothing is missed in frames; then what nearly dips is told too.
+        Gaps in `dipped`, which those that dip now join, have places everywhere. Where nothing is missed in frames
+        (`met`) what nearly dips is told too.
         """
         q, gaps = own.chart.postures(x), own.moved(x)
         swept = dips(self._run.workspace, q, gaps)

@@ -15,9 +15,6 @@ from wholebody.base.arrays import Array
 BONES_EACH = 4
 """Bones that move a vertex: as many as a page's shader takes."""
 
-NEAREST = 0.05
-"""Share of an edge that is left on either side of a cut: less makes slivers."""
-
 
 class Bound(NamedTuple):
     """Vertices with what moves them.
@@ -78,7 +75,8 @@ def divided(bound: Bound, faces: NDArray[np.int64]) -> tuple[Bound, NDArray[np.i
     first, second = ends.T
     lead, back = _lead(bound, owner, first, second), _lead(bound, owner, second, first)
     total = lead + back
-    share = np.clip(np.divide(lead, total, out=np.full(len(keys), 0.5), where=total > 0.0), NEAREST, 1.0 - NEAREST)
+    share = np.divide(lead, total, out=np.full(len(keys), 0.5), where=total > 0.0)
+    share = np.clip(share, 0.05, 0.95)  # of an edge, on either side of a cut: less makes slivers
     bound = bound.with_means(ends, np.stack([1.0 - share, share], axis=1))
 
     def cut(a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int64]:

@@ -13,9 +13,6 @@ from wholebody.view.surface.borders import BONES_EACH, strongest
 from wholebody.view.surface.fields import Field
 from wholebody.view.surface.nets import Triangles, triangles
 
-SOFTNESS = 0.014
-"""Metres over which the influence of a bone fades by e: a larger value bends joints over a longer stretch."""
-
 
 class Claim(NamedTuple):
     """The region of a bone: its influence on a point is exp(-distance / softness).
@@ -23,12 +20,12 @@ class Claim(NamedTuple):
     Attributes:
         bone: name of a segment, or "<segment>/half", which turns by half of what the segment turns.
         field: distance from the region.
-        softness: metres.
+        softness: metres over which the influence fades by e: a larger value bends joints over a longer stretch.
     """
 
     bone: str
     field: Field
-    softness: float = SOFTNESS
+    softness: float = 0.014
 
 
 class Garment(NamedTuple):

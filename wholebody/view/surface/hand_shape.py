@@ -15,15 +15,6 @@ from wholebody.figures.hand import FINGERS, PARTS, hand_figure_of, part_radius
 from wholebody.view.surface.fields import Field, ellipsoid, placed, round_cone, union
 from wholebody.view.surface.garments import Claim
 
-SPREAD = {"index": 14.0, "ring": 14.0, "little": 18.0}
-"""Degrees of abduction in the binding posture: fingers side by side would melt into one."""
-
-RESTING = {"index": (0.0, 0.0, 0.0), "middle": (8.0, 12.0, 6.0), "ring": (12.0, 16.0, 8.0), "little": (14.0, 18.0, 8.0)}
-"""Degrees of flexion of the person's fingers, whose hand is one segment: the index leads a reach, the others curl."""
-
-STUMP = 0.05
-"""Metres of forearm that a hand's surface has above the wrist; a sleeve covers it."""
-
 
 class HandShape(NamedTuple):
     """A hand in its own frame.
@@ -61,12 +52,13 @@ def hand_shape(person: Person, side: str) -> HandShape:
             claims.append(Claim(segment, shape, 0.0035))
         fingers.append(union(bones))
     wrist = person.radius("wrist")
-    stump = union([round_cone((x, 0.0, STUMP), (x, 0.0, -0.004), 0.68 * wrist, 0.72 * wrist) for x in (-0.008, 0.008)])
+    above = 0.05  # m: of forearm that the surface has above the wrist; a sleeve covers it
+    stump = union([round_cone((x, 0.0, above), (x, 0.0, -0.004), 0.68 * wrist, 0.72 * wrist) for x in (-0.008, 0.008)])
     claims.append(Claim(f"{side}_forearm", lambda points: np.maximum(-points[:, 2], 0.0), 0.006))
     thenar = _thenar(size, sign, bind[f"{side}_thumb_proximal"])
     solid = union([union([union(fingers, 0.002), palm], 0.007), thenar], 0.010)
     ends = [bind[f"{side}_{finger}_distal"] @ [0.0, 0.0, -0.03, 1.0] for finger in FINGERS]
-    corners = (*(end[:3] for end in ends), np.array([-0.05, 0.0, 0.0]), np.array([0.03, 0.0, STUMP + 0.02]))
+    corners = (*(end[:3] for end in ends), np.array([-0.05, 0.0, 0.0]), np.array([0.03, 0.0, above + 0.02]))
     return HandShape(union([solid, stump], 0.012), tuple(claims), corners, bind, rest)
 
 
@@ -93,12 +85,17 @@ def _bring_thumb(rest: dict[str, Array], side: str, target: Array) -> None:
 
 
 def _spread(side: str) -> dict[str, float]:
-    return {f"{side}_{finger}_mcp_abduction": angle for finger, angle in SPREAD.items()}
+    """Degrees of abduction in the binding posture: fingers side by side would melt into one."""
+    return {
+        f"{side}_{finger}_mcp_abduction": angle for finger, angle in (("index", 14.0), ("ring", 14.0), ("little", 18.0))
+    }
 
 
 def _resting(side: str) -> dict[str, float]:
+    """Degrees of flexion of fingers where the hand is one segment: the index leads a reach, the others curl."""
     found = {f"{side}_thumb_mcp_flexion": 8.0, f"{side}_thumb_ip_flexion": 12.0}
-    for finger, angles in RESTING.items():
+    curled = {"middle": (8.0, 12.0, 6.0), "ring": (12.0, 16.0, 8.0), "little": (14.0, 18.0, 8.0)}
+    for finger, angles in {"index": (0.0, 0.0, 0.0), **curled}.items():
         for joint, angle in zip(("mcp", "pip", "dip"), angles, strict=True):
             found[f"{side}_{finger}_{joint}_flexion"] = angle
     return found

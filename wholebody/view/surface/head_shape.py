@@ -21,9 +21,6 @@ from wholebody.view.surface.fields import (
     without,
 )
 
-MODEL_BREADTH, MODEL_LENGTH = 0.153, 0.198
-"""Metres; its breadth and length."""
-
 
 class HeadShape(NamedTuple):
     """Solids in the head's frame, and where the eyes are."""
@@ -38,11 +35,11 @@ class HeadShape(NamedTuple):
 
 def head_shape(size: Dimensions) -> HeadShape:
     """Return the head of a person: every shape below is of one head, and stretched to the person's."""
-    # metres from chin to vertex of the head that the numbers below were drawn for
+    # metres of the head that the numbers below were drawn for: length, breadth, from chin to vertex
     scale = np.array(
         [
-            2.0 * size.head_half_length / MODEL_LENGTH,
-            2.0 * size.head_half_breadth / MODEL_BREADTH,
+            2.0 * size.head_half_length / 0.198,
+            2.0 * size.head_half_breadth / 0.153,
             (size.head_top - size.head_bottom) / 0.228,
         ]
     )

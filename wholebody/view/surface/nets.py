@@ -24,13 +24,6 @@ BLOCK = 4
 STEEPEST = 1.8
 """Largest slope of a field near its surface; of a distance it is 1."""
 
-COARSER = 1.6
-"""Cells of a coarse surface, in median edges of the fine one: 2 saves no more time and loses eyes and lips."""
-
-
-PROBE = 1e-5
-"""Metres between the points of which the gradient is measured."""
-
 
 class Triangles(NamedTuple):
     """A closed surface.
@@ -84,12 +77,13 @@ def coarsened(surface: Triangles) -> NDArray[np.int64]:
 
     All vertices in a cell of a grid become the one that is nearest to their middle, and triangles that so lose an edge
     are left out (vertex clustering: Rossignac and Borrel, "Multi-resolution 3D approximations for rendering complex
-    scenes", 1993). The cells are COARSER times as large as the median edge is long. Vertices of sharp edges stay, as
+    scenes", 1993). The cells are 1.6 times as large as the median edge is long. Vertices of sharp edges stay, as
     hems would be ragged.
     """
     vertices, faces = surface.vertices, surface.faces
     edges = vertices[faces] - vertices[np.roll(faces, 1, axis=1)]
-    cell = COARSER * np.median(np.linalg.norm(edges, axis=-1))
+    # 2 saves no more time and loses eyes and lips.
+    cell = 1.6 * np.median(np.linalg.norm(edges, axis=-1))
     across = np.cross(edges[:, 1], edges[:, 2])
     across /= np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
     # cosine of the angle between a triangle and the normal at its corner, below which the corner is on a sharp
@@ -185,7 +179,8 @@ def _faces(inside: NDArray[np.bool_], number: NDArray[np.int64]) -> NDArray[np.i
 
 
 def _slopes(field: Field, points: Array, values: Array) -> Array:
-    return np.column_stack([(field(points + PROBE * axis) - values) / PROBE for axis in np.eye(3)])
+    apart = 1e-5  # m: of the points of which the gradient is measured
+    return np.column_stack([(field(points + apart * axis) - values) / apart for axis in np.eye(3)])
 
 
 def _moved(field: Field, vertices: Array, cell: float) -> Array:

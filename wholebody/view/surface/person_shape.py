@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -29,16 +30,23 @@ from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.head_shape import head_shape
 from wholebody.view.surface.profile import RAYS, caps, limb, piece_field, trunk
 
-SKIN, HAIR, LIPS = (0.86, 0.66, 0.54), (0.25, 0.17, 0.12), (0.72, 0.42, 0.38)
-SHIRT, TROUSERS, SHOES = (0.42, 0.55, 0.68), (0.27, 0.30, 0.38), (0.22, 0.18, 0.16)
-WHITE, IRIS = (0.95, 0.95, 0.94), (0.20, 0.24, 0.26)
+Color = tuple[float, float, float]
 
-CLOTH, TUCKED = 0.006, 0.003
-"""Metres of cloth over the pieces: the shirt, and the trousers below its hem."""
 
-BINDING = {"shoulder_abduction": 42.0, "hip_abduction": 7.0, "elbow_flexion": 12.0}
-"""Degrees of both sides in the binding posture: half way between the ends of what people do, and no limbs touch."""
+class _Colors(NamedTuple):
+    """Red, green, blue."""
 
+    skin: Color = (0.86, 0.66, 0.54)
+    hair: Color = (0.25, 0.17, 0.12)
+    lips: Color = (0.72, 0.42, 0.38)
+    shirt: Color = (0.42, 0.55, 0.68)
+    trousers: Color = (0.27, 0.30, 0.38)
+    shoes: Color = (0.22, 0.18, 0.16)
+    eyes: Color = (0.95, 0.95, 0.94)
+    irises: Color = (0.20, 0.24, 0.26)
+
+
+COLORS = _Colors()
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax")
 SIDES = (("left", 1.0), ("right", -1.0))
 HALVES = {"upper_arm": "clavicle", "forearm": "upper_arm", "hand": "forearm", "thigh": "pelvis", "shank": "thigh"}
@@ -56,7 +64,9 @@ class PersonShape:
         """Read the person's pieces and joints."""
         spec = human_spec(person)
         figure = figure_of(spec, "capsules")
-        degrees = {f"{side}_{name}": angle for side, _ in SIDES for name, angle in BINDING.items()}
+        # The binding posture is half way between the ends of what people do, and no limbs touch.
+        bent = {"shoulder_abduction": 42.0, "hip_abduction": 7.0, "elbow_flexion": 12.0}
+        degrees = {f"{side}_{name}": angle for side, _ in SIDES for name, angle in bent.items()}
         q = figure.with_joints(pin.neutral(figure.model), {name: np.radians(angle) for name, angle in degrees.items()})
         data = figure.model.createData()
         pin.framesForwardKinematics(figure.model, data, q)
@@ -161,7 +171,7 @@ class PersonShape:
                 )
         collar = 1.04 * size.body.radius("neck") + 0.006
         solids.append(round_cone(neck - [0.0, 0.0, 0.05], neck + [0.004, 0.0, 0.03], 1.15 * collar, collar))
-        body = grown(union(solids, 0.035 * scale), CLOTH)
+        body = grown(union(solids, 0.035 * scale), 0.006)  # m of cloth
         hem = half_space((0.0, 0.0, self._belt() - 0.022 * scale), (0.0, 0.0, -1.0))
         opening = half_space(neck + [0.0, 0.0, 0.022 * scale], (0.42, 0.0, 1.0))
         cuts = [hem, opening]
@@ -174,7 +184,7 @@ class PersonShape:
         points += [np.array([0.1, 0.0, self._belt() - 0.04]), np.array([-0.1, 0.0, neck[2] + 0.06])]
         low, high = bounds(points, 0.085 * scale + 0.05)
         claims = self._claims([name for name in segments if name != "neck"])
-        return Garment("shirt", SHIRT, body, low, high, 0.020, claims, cuts)
+        return Garment("shirt", COLORS.shirt, body, low, high, 0.020, claims, cuts)
 
     def _trousers(self) -> Garment:
         scale = self.size.stature / 1.75
@@ -190,7 +200,7 @@ class PersonShape:
                     np.array([0.080, 0.078, 0.085]) * scale,
                 )
             )
-        body = grown(union(solids, 0.04 * scale), TUCKED)
+        body = grown(union(solids, 0.04 * scale), 0.003)  # m of cloth below the shirt
         cuts = [half_space((0.0, 0.0, self._belt()), (0.0, 0.0, 1.0))]
         for side, _ in SIDES:
             knee, ankle = self.at(f"{side}_shank"), self.at(f"{side}_foot")
@@ -202,7 +212,7 @@ class PersonShape:
         segments = ["pelvis", "lower_lumbar", *self._sided("thigh", "shank")]
         points = [self.at(name) for name in [*segments, *self._sided("foot")]]
         low, high = bounds([*points, np.array([0.0, 0.0, self._belt()])], 0.13 * scale + 0.04)
-        return Garment("trousers", TROUSERS, body, low, high, 0.024, self._claims(segments), cuts)
+        return Garment("trousers", COLORS.trousers, body, low, high, 0.024, self._claims(segments), cuts)
 
     def _calf(self, side: str, sign: float) -> Field:
         """The muscle behind the shank."""
@@ -229,23 +239,23 @@ class PersonShape:
             Claim("head", union([half_space(atlas, (0.0, 0.0, -1.0)), placed(shape.skin, frame)]), 0.012),
         ]
         rigid = [Claim("head", lambda points: np.zeros(len(points)))]
-        yield Garment("head", SKIN, skin, low, high, 0.0093, claims)
+        yield Garment("head", COLORS.skin, skin, low, high, 0.0093, claims)
         low[2] = self.at("head", (0.0, 0.0, self.size.head_bottom))[2] - 0.06
-        yield Garment("hair", HAIR, placed(shape.hair, frame), low, high, 0.012, rigid)
+        yield Garment("hair", COLORS.hair, placed(shape.hair, frame), low, high, 0.012, rigid)
         eye = self.at("head", (self.size.eye_x, 0.0, self.size.eye_z))
         around = bounds([eye], 0.075 * scale)
-        yield Garment("eyes", WHITE, placed(shape.eyes, frame), *around, 0.0035, rigid)
-        yield Garment("irises", IRIS, placed(shape.irises, frame), *around, 0.0025, rigid)
-        yield Garment("brows", HAIR, placed(shape.brows, frame), *around, 0.0022, rigid)
+        yield Garment("eyes", COLORS.eyes, placed(shape.eyes, frame), *around, 0.0035, rigid)
+        yield Garment("irises", COLORS.irises, placed(shape.irises, frame), *around, 0.0025, rigid)
+        yield Garment("brows", COLORS.hair, placed(shape.brows, frame), *around, 0.0022, rigid)
         mouth = bounds([eye - np.array([0.0, 0.0, 0.075]) * scale], 0.05 * scale)
-        yield Garment("lips", LIPS, placed(shape.lips, frame), *mouth, 0.003, rigid)
+        yield Garment("lips", COLORS.lips, placed(shape.lips, frame), *mouth, 0.003, rigid)
 
     def _hand(self, side: str) -> Garment:
         shape, frame = hand_shape(self.person, side), self.bind[f"{side}_hand"]
         corners = [self.at(f"{side}_hand", corner) for corner in shape.corners]
         low, high = bounds(corners, 0.035)
         claims = [Claim(claim.bone, placed(claim.field, frame), claim.softness) for claim in shape.claims]
-        return Garment(f"{side}_hand", SKIN, placed(shape.field, frame), low, high, 0.0054, claims)
+        return Garment(f"{side}_hand", COLORS.skin, placed(shape.field, frame), low, high, 0.0054, claims)
 
     def _shoe(self, side: str, sign: float) -> Garment:
         size, scale = self.size, self.size.stature / 1.75
@@ -292,7 +302,7 @@ class PersonShape:
             ),
             Claim(f"{side}_toes", placed(half_space((toe, 0.0, 0.0), (-1.0, 0.0, 0.0)), frame), 0.010),
         ]
-        return Garment(f"{side}_shoe", SHOES, placed(body, frame), low, high, 0.012, claims)
+        return Garment(f"{side}_shoe", COLORS.shoes, placed(body, frame), low, high, 0.012, claims)
 
     # ---- places
 

@@ -22,10 +22,7 @@ from wholebody.view.surface.borders import Bound, divided
 from wholebody.view.surface.garments import Garment, Part, bounds, made
 from wholebody.view.surface.hand_shape import hand_shape
 from wholebody.view.surface.nets import Triangles, coarsened
-from wholebody.view.surface.person_shape import HALVES, SKIN, PersonShape
-
-FORMAT = "7"
-"""Part of the key of kept surfaces: another one whenever a shape, a weight or the layout changes."""
+from wholebody.view.surface.person_shape import COLORS, HALVES, PersonShape
 
 
 class Bone(NamedTuple):
@@ -167,7 +164,7 @@ def _make_hand(person: Person, side: str) -> Surface:
     bones = {name: Bone(name, None, None, placement, np.eye(4)) for name, placement in shape.bind.items()}
     bones[f"{side}_forearm"] = Bone(f"{side}_forearm", None, f"{side}_hand", np.eye(4), np.eye(4))
     low, high = bounds(shape.corners, 0.035)
-    garment = Garment(f"{side}_hand", SKIN, shape.field, low, high, 0.0030, shape.claims)
+    garment = Garment(f"{side}_hand", COLORS.skin, shape.field, low, high, 0.0030, shape.claims)
     return Surface(tuple(bones.values()), (made(garment, list(bones)),))
 
 
@@ -188,7 +185,8 @@ def halfway(first: Array, second: Array) -> Array:
 
 def _kept(kind: str, person: Person, make: Any) -> Surface:
     spec = human_spec(person)
-    digest = hashlib.sha256(f"{FORMAT} {kind} {person!r}".encode())
+    # The 7 is another one whenever a shape, a weight or the layout changes.
+    digest = hashlib.sha256(f"7 {kind} {person!r}".encode())
     for solid in spec.solids:
         shape = solid.geometry
         sizes = [getattr(shape, name, 0.0) for name in ("radius", "halfLength")]

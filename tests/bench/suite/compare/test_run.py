@@ -40,6 +40,13 @@ def misbehaved(fakes: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> d
     return found
 
 
+@pytest.fixture(scope="module")
+def once(fakes: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> tuple[Settings, Path, list[Record]]:
+    """Return the settings, the folder and the records of a run."""
+    asked, folder = settings(fakes, "solves", sweep=0), tmp_path_factory.mktemp("once")
+    return asked, folder, run(asked, folder).records
+
+
 def test_a_method_that_solves_is_judged_at_every_budget(misbehaved: dict[str, list[Record]]) -> None:
     records = misbehaved["solves"]
     assert sorted(record.tolerance for record in records) == [1e-6, 1e-4, 1e-2]
@@ -81,12 +88,13 @@ def test_a_false_claim_is_seen(misbehaved: dict[str, list[Record]]) -> None:
     assert not any(record.false_claim for record in misbehaved["solves"])
 
 
-def test_the_same_seed_gives_the_same_and_another_gives_others(fakes: ModuleType, tmp_path: Path) -> None:
-    asked = settings(fakes, "solves", sweep=0)
-    first, again = (run(asked, tmp_path / name) for name in ("a", "b"))
-    assert timeless(first.records) == timeless(again.records)
+def test_the_same_seed_gives_the_same_and_another_gives_others(
+    once: tuple[Settings, Path, list[Record]], tmp_path: Path
+) -> None:
+    asked, _, first = once
+    assert timeless(run(asked, tmp_path / "again").records) == timeless(first)
     other = Settings(asked.sets, asked.adapters, 1, 0, seed=1, minutes=3.0)
-    assert timeless(run(other, tmp_path / "c").records) != timeless(first.records)
+    assert timeless(run(other, tmp_path / "other").records) != timeless(first)
 
 
 def test_goals_that_move_are_followed_frame_by_frame(fakes: ModuleType, tmp_path: Path) -> None:
@@ -127,12 +135,11 @@ def test_a_killed_run_goes_on_where_it_was(fakes: ModuleType, tmp_path: Path) ->
     assert by_method == sorted(timeless(run(asked, tmp_path / "whole").records), key=str)
 
 
-def test_a_finished_run_is_not_run_again(fakes: ModuleType, tmp_path: Path) -> None:
-    asked = settings(fakes, "solves", sweep=0)
-    once = run(asked, tmp_path).records
-    assert run(asked, tmp_path).records == once
+def test_a_finished_run_is_not_run_again(fakes: ModuleType, once: tuple[Settings, Path, list[Record]]) -> None:
+    asked, folder, records = once
+    assert run(asked, folder).records == records
     with pytest.raises(InputError, match=r"holds a run with cases = 1, and 2 is asked for"):
-        Store(tmp_path, settings(fakes, "solves", cases=2, sweep=0).described())
+        Store(folder, settings(fakes, "solves", cases=2, sweep=0).described())
 
 
 def test_a_set_that_cannot_be_built_is_an_error_with_its_reason(fakes: ModuleType, tmp_path: Path) -> None:

@@ -20,8 +20,8 @@ from wholebody.methods.qp.active_set import guess_active_set
 from wholebody.methods.qp.method import QP
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import GUESS_TOLERANCE
 from wholebody.methods.qp.solvers.osqp_solver import OSQPSolver
+from wholebody.methods.qp.solvers.qpsolvers_solver import GUESS_TOLERANCE
 from wholebody.methods.qp.steps import QPStep
 from wholebody.tasks.base import Goal, Surroundings, filled
 

@@ -9,15 +9,18 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import solve_from, violated_set
+from wholebody.methods.qp.active_set import (
+    NOT_EXACT,
+    SEMISMOOTH,
+    last_resort,
+    solve_from,
+    violated_set,
+)
 from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.fallback import NOT_EXACT, SEMISMOOTH, last_resort
+from wholebody.methods.qp.settings import CORRECTIONS
 
 ACTIVE_SET = "active set"
 """What `QPSolution.by` says of answers that the hot start found: an active set that was known, corrected."""
-
-WARM_CORRECTIONS = 120
-"""Corrections of the last active set before the solver is asked."""
 
 _NEED = {ACTIVE_SET: 0, SEMISMOOTH: 2, NOT_EXACT: 3}  # a solver is between them
 
@@ -55,7 +58,7 @@ class QPSolver(ABC):
             solver gets a program that is not computable: its answer is to stay, as far as the box has zero.
         """
         if self.hot_start and self._begun:
-            solution = solve_from(program, violated_set(program) if guess is None else guess, WARM_CORRECTIONS)
+            solution = solve_from(program, violated_set(program) if guess is None else guess, CORRECTIONS.most)
             if solution is not None:
                 return with_values(solution, by=ACTIVE_SET)
         if not program.is_computable:

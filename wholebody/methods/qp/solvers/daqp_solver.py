@@ -7,8 +7,8 @@ from ctypes import c_int
 import daqp
 import numpy as np
 
+from wholebody.methods.qp.quadratic_program import SplitForm
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, SplitFormSolver
-from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e30  # DAQP's infinity
 LIMIT = 500  # iterations

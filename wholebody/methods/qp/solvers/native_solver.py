@@ -9,13 +9,12 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import solve_from
-from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.active_set import last_resort, solve_from
+from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram, SplitForm
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
 from wholebody.methods.qp.solvers.split_form import (
-    SCALE,
-    SplitForm,
+    SCALING,
     compiled_kernel,
     empty_form,
     read_active,
@@ -67,7 +66,7 @@ class NativeSolver(QPSolver):
                 break
             iterations += found.iterations
             x = self._uncorrected = np.where(np.isfinite(found.x), found.x, 0.0)
-            solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS)
+            solution = solve_from(program, read_active(found.box, found.push[:k]), CORRECTIONS.of_guess)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
             self._workspace = None
@@ -104,7 +103,7 @@ class SplitFormSolver(NativeSolver):
         if self._workspace is None:
             self._form = empty_form(n, m, slots)
         found = self.answer(scaled_split(program, self._form), n, m)
-        return None if found is None else with_values(found, x=found.x[:n] / SCALE)
+        return None if found is None else with_values(found, x=found.x[:n] / SCALING.x)
 
     @abstractmethod
     def answer(self, form: SplitForm, n: int, m: int) -> NativeAnswer | None:

@@ -17,16 +17,15 @@ from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.records import with_values
-from wholebody.methods.qp.active_set import solve_from, violated_set
-from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram
-from wholebody.methods.qp.solvers.base import ACTIVE_SET, WARM_CORRECTIONS, QPSolver
-from wholebody.methods.qp.solvers.fallback import CORRECTIONS, last_resort
-from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE, read_active, slots_for
+from wholebody.methods.qp.active_set import last_resort, solve_from, violated_set
+from wholebody.methods.qp.quadratic_program import ActiveSet, QPSolution, QuadraticProgram, SparseForm
+from wholebody.methods.qp.settings import CORRECTIONS
+from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
+from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active, slots_for
 
 RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
 HOT_ROUNDS = 2  # of them with a hot start: more take several times as long as semismooth Newton steps
-FAR = 1e30  # OSQP's infinity
 EXTENSION = "osqp.ext_builtin"
 
 
@@ -59,7 +58,7 @@ class OSQPSolver(QPSolver):
         iterations = 0
         for limit in ROUNDS[:HOT_ROUNDS] if self.hot_start else ROUNDS:
             iterations += workspace.run(limit)
-            solution = solve_from(program, workspace.active(), CORRECTIONS)
+            solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
             if solution is not None:
                 return with_values(solution, iterations=iterations, by=self.name)
         return last_resort(program, workspace.x(), iterations)
@@ -88,14 +87,14 @@ class ActiveSetSolver(QPSolver):
 
     def solve_cold(self, program: QuadraticProgram) -> QPSolution:
         """Minimise from no bounds and the rows that x = 0 does not meet; see `QPSolver.solve_cold`."""
-        solution = solve_from(program, violated_set(program), WARM_CORRECTIONS)
+        solution = solve_from(program, violated_set(program), CORRECTIONS.most)
         return self._osqp.solve_cold(program) if solution is None else with_values(solution, by=ACTIVE_SET)
 
 
 class Workspace:
     """One OSQP workspace: a fixed pattern of soft rows and a fixed number of dense slots for elastic rows.
 
-    The soft rows are scaled by the roots of their weights as far as `HEAVIEST`; the rest of a weight is in the
+    The soft rows are scaled by the roots of their weights as far as `Scaling.heaviest`; the rest of a weight is in the
     coefficient of the residual. The program is the true one, and its heaviest rows are nearly hard.
     """
 
@@ -112,7 +111,11 @@ class Workspace:
         objective, matrix, self._starts, self._places = _structure(n, m, self.slots, self.pattern.tobytes())
         self._pattern = matrix
         self.hessian, self.gradient = np.ones(size), np.zeros(size)
-        self._values, self.low, self.high = np.ones(matrix.nnz), np.full(size, INACTIVE), np.full(size, FAR)
+        self._values, self.low, self.high = (
+            np.ones(matrix.nnz),
+            np.full(size, SCALING.inactive),
+            np.full(size, SCALING.infinite),
+        )
         self.low[n : n + m] = self.high[n : n + m] = 0.0  # OSQP factorises anew where other rows become equalities
         self._kernel = compiled_kernel()
         osqp = extension()
@@ -137,14 +140,8 @@ class Workspace:
     def load(self, program: QuadraticProgram) -> None:
         """Put the program's numbers in."""
         self.k = len(program.least)
-        parts = (
-            program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic,
-            program.least, program.elastic_weight, program.lower, program.upper,
-        )  # fmt: skip
-        self._kernel.fill(
-            *map(np.ascontiguousarray, parts), self._starts, self._places, self.slots, SCALE, HEAVIEST, INACTIVE, FAR,
-            self.hessian, self.gradient, self._values, self.low, self.high,
-        )  # fmt: skip
+        form = SparseForm(self.hessian, self.gradient, self._values, self.low, self.high, self._starts, self._places)
+        self._kernel.fill_sparse(program.packed(), SCALING, form)
         self._solver.update_data_vec(q=self.gradient, l=self.low, u=self.high)
         self._solver.update_data_mat(P_x=self.hessian, P_i=None, A_x=self._values, A_i=None)
 
@@ -164,7 +161,7 @@ class Workspace:
 
     def x(self) -> Array:
         """(n,) where OSQP is."""
-        x = np.asarray(self._solver.solution.x)[: self.n] / SCALE
+        x = np.asarray(self._solver.solution.x)[: self.n] / SCALING.x
         return np.where(np.isfinite(x), x, 0.0)
 
     def active(self) -> ActiveSet:
@@ -205,17 +202,3 @@ def extension() -> Any:
     module = sys.modules[EXTENSION] = module_from_spec(found)
     found.loader.exec_module(module)
     return module
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp.solvers import osqp_kernel
-
-    none, one, places = np.zeros(0), np.ones(1), np.zeros(0, np.int64)
-    osqp_kernel.within(np.zeros((0, 1)), np.zeros((0, 1), dtype=bool))
-    osqp_kernel.fill(
-        one, one, np.zeros((0, 1)), none, none, np.zeros((0, 1)), none, none, one, one, np.zeros(2, np.int64), places,
-        1, 1.0, 1.0, 1.0, 1.0, np.ones(2), np.ones(2), np.ones(3), np.ones(2), np.ones(2),
-    )  # fmt: skip
-    return osqp_kernel

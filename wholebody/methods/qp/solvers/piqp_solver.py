@@ -14,7 +14,7 @@ import piqp
 from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
-from wholebody.methods.qp.solvers.split_form import HEAVIEST, INACTIVE, SCALE
+from wholebody.methods.qp.solvers.split_form import SCALING
 
 TOLERANCE = 1e-5  # of the optimality conditions; the active set is then corrected
 LIMIT = 100  # iterations
@@ -44,7 +44,7 @@ class PIQPSolver(NativeSolver):
         x = z[:n]
         box_lower, box_upper = np.asarray(found.z_bl)[:n], np.asarray(found.z_bu)[:n]
         return NativeAnswer(
-            x / SCALE,
+            x / SCALING.x,
             _active(box_upper, data["x_u"][:n] - x) - _active(box_lower, x - data["x_l"][:n]),
             _active(push, data["G"][:k] @ z - data["h_l"][:k]),
             max(int(found.info.iter), 1),
@@ -60,14 +60,14 @@ def _active(multiplier: Array, room: Array) -> Array:
 def _condensed(program: QuadraticProgram, slots: int) -> dict[str, Any]:
     """The program over x and its elastic rows' residuals, scaled as the split form is, as PIQP names its parts."""
     n, k = program.size, len(program.least)
-    size, root = n + slots, np.sqrt(np.minimum(program.elastic_weight, HEAVIEST))
+    size, root = n + slots, np.sqrt(np.minimum(program.elastic_weight, SCALING.heaviest))
     hessian, linear = np.eye(size), np.zeros(size)
-    hessian[:n, :n] = (program.rows.T * (program.weight / SCALE**2)) @ program.rows
-    hessian.flat[: n * (size + 1) : size + 1] += program.diagonal / SCALE**2
-    linear[:n] = (program.linear - (program.weight * program.target) @ program.rows) / SCALE
-    rows, least, places = np.eye(slots, size, n, order="F"), np.full(slots, INACTIVE), np.arange(k)
-    rows[:k, :n] = program.elastic * (root / SCALE)[:, None]
+    hessian[:n, :n] = (program.rows.T * (program.weight / SCALING.x**2)) @ program.rows
+    hessian.flat[: n * (size + 1) : size + 1] += program.diagonal / SCALING.x**2
+    linear[:n] = (program.linear - (program.weight * program.target) @ program.rows) / SCALING.x
+    rows, least, places = np.eye(slots, size, n, order="F"), np.full(slots, SCALING.inactive), np.arange(k)
+    rows[:k, :n] = program.elastic * (root / SCALING.x)[:, None]
     rows[places, n + places], least[:k] = root / np.sqrt(program.elastic_weight), root * program.least
     lower, upper = np.full(size, -np.inf), np.full(size, np.inf)
-    lower[:n], upper[:n] = SCALE * program.lower, SCALE * program.upper
+    lower[:n], upper[:n] = SCALING.x * program.lower, SCALING.x * program.upper
     return {"P": hessian, "c": linear, "G": rows, "h_l": least, "x_l": lower, "x_u": upper}

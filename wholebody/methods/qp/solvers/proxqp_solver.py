@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from proxsuite import proxqp
 
+from wholebody.methods.qp.quadratic_program import SplitForm
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, SplitFormSolver
-from wholebody.methods.qp.solvers.split_form import SplitForm
 
 FAR = 1e20  # ProxQP's infinity
 TOLERANCE = 1e-6  # of the optimality conditions; the active set is then corrected

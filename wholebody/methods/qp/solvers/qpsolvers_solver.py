@@ -7,10 +7,14 @@ import warnings
 import numpy as np
 
 from wholebody.base.arrays import Array
+from wholebody.base.records import with_values
+from wholebody.methods.qp.active_set import guess_active_set, last_resort, solve_from
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.solvers.fallback import finish, last_resort
 from wholebody.methods.qp.solvers.split_form import split
+
+GUESS_TOLERANCE = 1e-4  # rad, m: an approximate answer this near to its bound counts as on it
 
 
 class QpsolversSolver(QPSolver):
@@ -50,4 +54,5 @@ class QpsolversSolver(QPSolver):
             )  # fmt: skip
         x = np.zeros(n) if answer.x is None else np.where(np.isfinite(answer.x[:n]), answer.x[:n], 0.0)
         self._uncorrected = x
-        return finish(program, x, 1, self.name) or last_resort(program, x, 1)
+        solution = solve_from(program, guess_active_set(program, x, GUESS_TOLERANCE), CORRECTIONS.of_guess)
+        return last_resort(program, x, 1) if solution is None else with_values(solution, iterations=1, by=self.name)

@@ -18,7 +18,7 @@ from scipy.linalg.lapack import dgeqrf, dtrtri
 from wholebody.base.arrays import Array
 from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
-from wholebody.methods.qp.solvers.split_form import HEAVIEST, SCALE
+from wholebody.methods.qp.solvers.split_form import SCALING
 
 
 class QuadprogSolver(NativeSolver):
@@ -32,13 +32,13 @@ class QuadprogSolver(NativeSolver):
         if self._workspace is None:
             self._workspace = _buffers(n, slots)
         factor, rows = (part[: n + k] for part in self._workspace)
-        factor[:n, :n] = SCALE * inverse_factor(program)
-        root, residuals = np.sqrt(np.minimum(program.elastic_weight, HEAVIEST)), np.arange(k)
-        rows[:n, 2 * n : 2 * n + k] = program.elastic.T * (root / SCALE)
+        factor[:n, :n] = SCALING.x * inverse_factor(program)
+        root, residuals = np.sqrt(np.minimum(program.elastic_weight, SCALING.heaviest)), np.arange(k)
+        rows[:n, 2 * n : 2 * n + k] = program.elastic.T * (root / SCALING.x)
         rows[n + residuals, 2 * n + residuals] = root / np.sqrt(program.elastic_weight)
         linear = np.zeros(n + k)
-        linear[:n] = ((program.weight * program.target) @ program.rows - program.linear) / SCALE
-        least = np.concatenate([SCALE * program.lower, -SCALE * program.upper, root * program.least])
+        linear[:n] = ((program.weight * program.target) @ program.rows - program.linear) / SCALING.x
+        least = np.concatenate([SCALING.x * program.lower, -SCALING.x * program.upper, root * program.least])
         try:
             z, _, _, iterations, multiplier, _ = quadprog.solve_qp(
                 factor[:, : n + k], linear, rows[:, : 2 * n + k], least, 0, True
@@ -46,7 +46,7 @@ class QuadprogSolver(NativeSolver):
         except ValueError:  # it takes rounding for a contradiction; programs have none
             return NativeAnswer(np.zeros(n), np.zeros(n), np.zeros(k), 1)
         box = multiplier[n : 2 * n] - multiplier[:n]
-        return NativeAnswer(z[:n] / SCALE, box, multiplier[2 * n :], max(int(iterations[0]), 1))
+        return NativeAnswer(z[:n] / SCALING.x, box, multiplier[2 * n :], max(int(iterations[0]), 1))
 
 
 def inverse_factor(program: QuadraticProgram) -> Array:

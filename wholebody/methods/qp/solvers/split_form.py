@@ -14,38 +14,18 @@ one, however heavy its rows: the heaviest are nearly hard, since their residuals
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram
+from wholebody.methods.qp.active_set import smallest
+from wholebody.methods.qp.quadratic_program import ActiveSet, QuadraticProgram, Scaling, SparseForm, SplitForm
 
-SCALE = 100.0  # x is in hundredths of a radian inside solvers, so that its entries are as large as the residuals
-HEAVIEST = 1e5  # of a row's scale, squared: larger = heavy rows closer, light ones later
 SLOTS = 8  # elastic rows come in multiples of this, so that sizes seldom change; more slots = slower iterations
-INACTIVE = -1e3  # least value of slots without a row: never active, and no other kind of row than those in use
-PUSHING = 1e-9  # multiplier above which a bound or a row counts as active
 
 
-class SplitForm(NamedTuple):
-    """Objective and rows over z of size n + m + k.
-
-    Attributes:
-        diagonal: (n + m + k,) diagonal Hessian.
-        linear: (n + m + k,).
-        matrix: (m + k, n + m + k) rows [T -I 0; C 0 I], dense.
-        lower, upper: (m + k,) bounds of the rows.
-        box_lower, box_upper: (n + m + k,) bounds of z; infinite for r and s.
-    """
-
-    diagonal: Array
-    linear: Array
-    matrix: Array
-    lower: Array
-    upper: Array
-    box_lower: Array
-    box_upper: Array
+SCALING = Scaling()
 
 
 def split(program: QuadraticProgram) -> SplitForm:
@@ -78,11 +58,7 @@ def scaled_split(program: QuadraticProgram, form: SplitForm) -> SplitForm:
     Returns:
         The same form.
     """
-    parts = (
-        program.diagonal, program.linear, program.rows, program.target, program.weight, program.elastic, program.least,
-        program.elastic_weight, program.lower, program.upper,
-    )  # fmt: skip
-    compiled_kernel().fill(*map(np.ascontiguousarray, parts), SCALE, HEAVIEST, INACTIVE, *form)
+    compiled_kernel().fill(program.packed(), SCALING, form)
     return form
 
 
@@ -91,7 +67,7 @@ def empty_form(n: int, m: int, slots: int) -> SplitForm:
     size = n + m + slots
     box = np.full(size, np.inf)
     return SplitForm(
-        np.ones(size), np.zeros(size), np.zeros((m + slots, size)), np.full(m + slots, INACTIVE),
+        np.ones(size), np.zeros(size), np.zeros((m + slots, size)), np.full(m + slots, SCALING.inactive),
         np.full(m + slots, np.inf), -box, box,
     )  # fmt: skip
 
@@ -108,7 +84,7 @@ def read_active(box: Array, push: Array) -> ActiveSet:
         box: (n,) of the box; positive where an upper bound holds, negative where a lower one does.
         push: (k,) of the elastic rows, positive where they push.
     """
-    return ActiveSet(box < -PUSHING, box > PUSHING, push > PUSHING)
+    return ActiveSet(box < -1e-9, box > 1e-9, push > 1e-9)
 
 
 @lru_cache(maxsize=1)
@@ -116,8 +92,11 @@ def compiled_kernel() -> Any:
     """The module of compiled loops, compiled or read back: not in the middle of a solve."""
     from wholebody.methods.qp.solvers import split_kernel
 
-    none, one, row = np.zeros(0), np.ones(1), np.zeros((0, 1))
-    split_kernel.fill(
-        one, one, row, none, none, row, none, none, one, one, SCALE, HEAVIEST, INACTIVE, *empty_form(1, 0, 1)
+    program, _ = smallest()
+    split_kernel.within(program.rows, np.zeros((0, 1), dtype=bool))
+    split_kernel.fill(program, SCALING, empty_form(1, 0, 1))
+    two, places = np.ones(2), np.zeros(0, np.int64)
+    split_kernel.fill_sparse(
+        program, SCALING, SparseForm(two, two, np.ones(3), two, two, np.zeros(2, np.int64), places)
     )
     return split_kernel

@@ -1,55 +1,77 @@
-"""The filling of the scaled split form, as a compiled loop: see `split_form`."""
+"""The filling of split forms, dense and sparse, as compiled loops: see `split_form`."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from wholebody.base.arrays import Array
+from wholebody.base.arrays import Array, Mask
 from wholebody.base.compiled import compiled
+from wholebody.methods.qp.quadratic_program import QuadraticProgram, Scaling, SparseForm, SplitForm
+
+
+@compiled()
+def within(rows: Array, pattern: Mask) -> bool:
+    """Whether rows (m, n) are zero outside of a pattern (m, n)."""
+    for i in range(rows.shape[0]):
+        for c in range(rows.shape[1]):
+            if rows[i, c] != 0.0 and not pattern[i, c]:
+                return False
+    return True
 
 
 @compiled(error_model="numpy")
-def fill(
-    diagonal: Array,
-    linear: Array,
-    rows: Array,
-    target: Array,
-    weight: Array,
-    elastic: Array,
-    least: Array,
-    elastic_weight: Array,
-    lower: Array,
-    upper: Array,
-    scale: float,
-    heaviest: float,
-    inactive: float,
-    form_diagonal: Array,
-    form_linear: Array,
-    matrix: Array,
-    low: Array,
-    high: Array,
-    box_lower: Array,
-    box_upper: Array,
-) -> None:
-    """Write a program's numbers into a scaled split form of its size, in which all else is as `empty_form` left it.
-
-    The first ten are the program's, the last seven the form's. x is multiplied by `scale`, a row by the root of its
-    weight up to the root of `heaviest`; `inactive` is the least value of slots without a row.
-    """
-    n, m, k = len(diagonal), len(target), len(least)
+def fill(program: QuadraticProgram, scaling: Scaling, form: SplitForm) -> None:
+    """Write a program's numbers into a split form of its size, in which all else is as `empty_form` left it."""
+    n, m, k, scale = len(program.diagonal), len(program.target), len(program.least), scaling.x
     for i in range(n):
-        form_linear[i], form_diagonal[i] = linear[i] / scale, diagonal[i] / (scale * scale)
-        box_lower[i], box_upper[i] = scale * lower[i], scale * upper[i]
+        form.linear[i], form.diagonal[i] = program.linear[i] / scale, program.diagonal[i] / (scale * scale)
+        form.box_lower[i], form.box_upper[i] = scale * program.lower[i], scale * program.upper[i]
     for r in range(m):
-        root = np.sqrt(min(weight[r], heaviest))
+        root = np.sqrt(min(program.weight[r], scaling.heaviest))
         for i in range(n):
-            matrix[r, i] = rows[r, i] * (root / scale)
-        matrix[r, n + r] = -root / np.sqrt(weight[r])
-        low[r] = high[r] = root * target[r]
-    for j in range(len(low) - m):
+            form.matrix[r, i] = program.rows[r, i] * (root / scale)
+        form.matrix[r, n + r] = -root / np.sqrt(program.weight[r])
+        form.lower[r] = form.upper[r] = root * program.target[r]
+    for j in range(len(form.lower) - m):
         row = m + j
-        root = np.sqrt(min(elastic_weight[j], heaviest)) if j < k else 0.0
+        root = np.sqrt(min(program.elastic_weight[j], scaling.heaviest)) if j < k else 0.0
         for i in range(n):
-            matrix[row, i] = elastic[j, i] * (root / scale) if j < k else 0.0
-        matrix[row, n + row] = root / np.sqrt(elastic_weight[j]) if j < k else 1.0
-        low[row] = root * least[j] if j < k else inactive
+            form.matrix[row, i] = program.elastic[j, i] * (root / scale) if j < k else 0.0
+        form.matrix[row, n + row] = root / np.sqrt(program.elastic_weight[j]) if j < k else 1.0
+        form.lower[row] = root * program.least[j] if j < k else scaling.inactive
+
+
+@compiled(error_model="numpy")
+def fill_sparse(program: QuadraticProgram, scaling: Scaling, form: SparseForm) -> None:
+    """Write a program's numbers into a sparse split form, whose slots are at least the program's elastic rows."""
+    n, m, k, scale = len(program.diagonal), len(program.target), len(program.least), scaling.x
+    slots = len(form.lower) - n - m
+    root, elastic_root = np.empty(m), np.empty(k)
+    for i in range(m):
+        root[i] = np.sqrt(min(program.weight[i], scaling.heaviest))
+        form.lower[n + i] = form.upper[n + i] = root[i] * program.target[i]
+        form.hessian[n + i], form.gradient[n + i] = 1.0, 0.0
+    for j in range(slots):
+        if j < k:
+            elastic_root[j] = np.sqrt(min(program.elastic_weight[j], scaling.heaviest))
+        form.lower[n + m + j] = elastic_root[j] * program.least[j] if j < k else scaling.inactive
+        form.upper[n + m + j] = scaling.infinite
+        form.hessian[n + m + j], form.gradient[n + m + j] = 1.0, 0.0
+    at = 0
+    for c in range(n):
+        form.hessian[c], form.gradient[c] = program.diagonal[c] / (scale * scale), program.linear[c] / scale
+        form.lower[c], form.upper[c] = scale * program.lower[c], scale * program.upper[c]
+        form.values[at] = 1.0
+        at += 1
+        for place in range(form.starts[c], form.starts[c + 1]):
+            i = form.places[place]
+            form.values[at] = root[i] / scale * program.rows[i, c]
+            at += 1
+        for j in range(slots):
+            form.values[at + j] = elastic_root[j] / scale * program.elastic[j, c] if j < k else 0.0
+        at += slots
+    for i in range(m):
+        form.values[at + i] = -root[i] / np.sqrt(program.weight[i])
+    at += m
+    for j in range(slots):
+        form.values[at + j] = elastic_root[j] / np.sqrt(program.elastic_weight[j]) if j < k else 1.0

@@ -12,10 +12,6 @@ Its positive part joins the program as soft rows. A dozen programs lead to a sta
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import lru_cache
-from typing import Any
-
 import numpy as np
 import pinocchio as pin
 
@@ -27,28 +23,22 @@ from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution
+from wholebody.methods.qp.rows import Rows
+from wholebody.methods.qp.settings import NEAREST
 from wholebody.methods.qp.solvers.base import QPSolver
-from wholebody.methods.qp.subproblem import Rows, Subproblem
+from wholebody.methods.qp.subproblem import Subproblem, compiled_kernel
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.terms.linearisation import Lineariser
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
-WITHIN = 0.12  # m: pairs nearer than this get rows
-RADIUS = 0.5  # rad, m: of the first step
-LARGEST_RADIUS = 1.0
 LEAST_RADIUS = 1e-4
-HELD = 1e-2  # m, rad: holds missed by more than this do not bend; what they pull with says nothing yet
 UNIT = 1e-9  # by which rows of a wrench may differ from the axes of the world
-FLAT = 1e-3  # share of the violation that a step must be foreseen to gain, or the posture is stationary
-NEARLY_FLAT = 1e-2  # the same where only the size of what is left counts
 WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
 SHRINK = 0.3
-DAMPING = 3e-2  # share of the largest curvature that every direction has at least; less: sets that go in circles
-NEGLIGIBLE = 1e-2  # share of the largest curvature below which a direction is left out
 
 
-class CurvedReach:
+class Closest:
     """Comes as near to a problem's goals as goes, with the curvature of what is pulled and held in every program."""
 
     def __init__(self, problem: Problem, lineariser: Lineariser, solver: QPSolver, control: Control) -> None:
@@ -61,7 +51,7 @@ class CurvedReach:
         free = [joint.idx_v for joint in model.joints if joint.shortname() == "JointModelFreeFlyer"]
         self._walk = np.array([first + k for first in free for k in range(3)], dtype=np.intp)
 
-    def through_everything(self, start: Array, enough: float, most: int) -> LocalSolution:
+    def without_contacts(self, start: Array, enough: float, most: int) -> LocalSolution:
         """Descend from a posture (nq,) within limits and constraints, as if nothing were there.
 
         Args:
@@ -72,11 +62,11 @@ class CurvedReach:
         Returns:
             A posture that may be inside of things; converged where nothing nearer is near.
         """
-        return self._descend(self._alone, start, enough, most, 0.0, NEARLY_FLAT)
+        return self._descend(self._alone, start, enough, most, 0.0, NEAREST.nearly_flat)
 
-    def among_things(self, start: Array, enough: float, most: int) -> LocalSolution:
-        """Descend from a posture (nq,) and pass through nothing; arguments as of `through_everything`."""
-        return self._descend(self._lineariser, start, enough, most, WITHIN, FLAT)
+    def with_contacts(self, start: Array, enough: float, most: int) -> LocalSolution:
+        """Descend from a posture (nq,) and pass through nothing; arguments as of `without_contacts`."""
+        return self._descend(self._lineariser, start, enough, most, NEAREST.within, NEAREST.flat)
 
     def _descend(
         self, lineariser: Lineariser, q: Array, enough: float, most: int, within: float, flat: float
@@ -84,7 +74,7 @@ class CurvedReach:
         working_set = WorkingSet(self._solver)
         here = self._iterate_at(lineariser, q, within)
         push = np.zeros(len(here.rows.soft_error))
-        radius, used, converged = RADIUS, 0, False
+        radius, used, converged = NEAREST.radius, 0, False
         bent: tuple[Array, Array] | None = None  # at this posture; it stays where a step is rejected
         while used < most and here.violation.worst > enough and radius > LEAST_RADIUS and not self._control.over:
             used += 1
@@ -94,16 +84,16 @@ class CurvedReach:
             )
             if bent is None:
                 lineariser.state.update(here.at.q)
-                bent = self._curvature(rows, push if here.violation.hold <= HELD else np.zeros_like(push))
+                bent = self._curvature(rows, push if here.violation.hold <= NEAREST.held else np.zeros_like(push))
             bend, weight = bent
             lower, upper = program.lower.copy(), program.upper.copy()
             if not within:  # where nothing is in the way, and a translation bends nothing
                 lower[self._walk], upper[self._walk] = here.at.lower[self._walk], here.at.upper[self._walk]
-            program = replace(
+            program = with_values(
                 program,
                 lower=lower,
                 upper=upper,
-                diagonal=np.maximum(program.diagonal, DAMPING * float(weight.max(initial=0.0))),
+                diagonal=np.maximum(program.diagonal, NEAREST.damping * float(weight.max(initial=0.0))),
                 rows=np.vstack([program.rows, bend]),
                 target=np.concatenate([program.target, np.zeros(len(bend))]),
                 weight=np.concatenate([program.weight, weight]),
@@ -131,7 +121,7 @@ class CurvedReach:
             if ratio < POOR or blocked:
                 radius = SHRINK * min(radius, step)
             elif ratio > GOOD and step > 0.7 * radius:
-                radius = min(2.0 * radius, LARGEST_RADIUS)
+                radius = min(2.0 * radius, NEAREST.largest_radius)
             if ratio > WORTH and not blocked:
                 push = rows.soft_weight * (rows.soft @ x + rows.soft_error)
                 here, bent = there, None
@@ -172,7 +162,7 @@ class CurvedReach:
         bending = state.folded(state.folded(total).T)
         bent = np.flatnonzero(bending.any(axis=0))
         value, vector = np.linalg.eigh(bending[np.ix_(bent, bent)])
-        kept = value > NEGLIGIBLE * max(float(value.max(initial=0.0)), 1.0)
+        kept = value > NEAREST.negligible * max(float(value.max(initial=0.0)), 1.0)
         ways = np.zeros((int(kept.sum()), len(bending)))
         ways[:, bent] = vector[:, kept].T
         return ways, value[kept]
@@ -200,13 +190,3 @@ def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Arra
     else:
         return
     compiled_kernel().add_kinematic_hessian(total, state.columns, state.support[part.joint], point, pull, moment)
-
-
-@lru_cache(maxsize=1)
-def compiled_kernel() -> Any:
-    """The module of compiled loops, compiled or read back: not in the middle of a solve."""
-    from wholebody.methods.qp import kinematic_hessian_kernel
-
-    three = np.zeros(3)
-    kinematic_hessian_kernel.add_kinematic_hessian(np.zeros((1, 1)), np.zeros((1, 6)), np.zeros(1), three, three, three)
-    return kinematic_hessian_kernel

@@ -8,20 +8,16 @@ from typing import Any
 import numpy as np
 
 from wholebody.base.arrays import Array
-from wholebody.methods.ccd.cones import cone_guards
-from wholebody.methods.ccd.guards import guards
-from wholebody.methods.ccd.limbs import Limbs, moved, rotated, seen_from
-from wholebody.methods.ccd.overlap_resolution.links import Link, LinkFinder, Overlap, Vector
-from wholebody.methods.ccd.sweep import carried, distance, moving_all
+from wholebody.methods.ccd.guards import Kept, cone_guards, guards
+from wholebody.methods.ccd.limbs import Limbs, rotated, seen_from
+from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.sweep import Aims
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 
 MARGIN = 2e-4  # m: distance of a goal outside the obstacle, so that the next query finds no overlap
-CLOSE = 1e-4  # m: a goal nearer than this is reached
 SWEEPS = 5  # for one goal; it is computed anew afterwards, so more sweeps waste time
-SLOW = 0.9  # a sweep that leaves more than this share of the distance is the last one
 PARALLEL = 0.26  # sine of 15 degrees: a bone at a smaller angle to the obstacle's surface is nearly parallel to it
-ALIKE = np.ones(3)  # weights of axes, and of a point, that count alike
 SHORT = 0.02  # m: a link shorter than this has no meaningful direction
 
 
@@ -29,7 +25,6 @@ class ChainResolver:
     """A chain of the figure with its links, limits and cones.
 
     Attributes:
-        name: the chain's name.
         limbs: its joints.
         reach: for each node, an upper bound of the distance from its joint to a point of the chain, metres.
         translated: joints that hold the orientation of links that were moved out by translation, since it was cleared.
@@ -39,33 +34,28 @@ class ChainResolver:
         self,
         scene: Scene,
         workspace: Workspace,
-        name: str,
         joints: Sequence[int],
         foreign: frozenset[int],
         tip: int,
-        cones: Sequence[str] | None = None,
-        ranges: Sequence[str] = (),
-        exact: bool = True,
+        kept: Kept,
+        exact: bool,
     ) -> None:
         """Prepare a chain.
 
         Args:
             scene: figure and things.
             workspace: of the run.
-            name: of the chain.
             joints: Pinocchio's indices of its joints.
             foreign: joints of the other chains.
             tip: index of the frame at its end.
-            cones: names of the reach cones to keep; None for all of the figure's.
-            ranges: names of the ranges of motion to keep.
+            kept: cones and ranges.
             exact: see `LinkFinder`.
         """
-        self.name = name
         self.translated: set[int] = set()
         self.limbs = Limbs(scene.model, joints)
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
-        self._guards = guards(scene.figure, self.limbs, cones, ranges)
-        self._cones = cone_guards(scene.figure, self.limbs, cones)
+        self._guards = guards(scene.figure, self.limbs, kept)
+        self._cones = cone_guards(scene.figure, self.limbs, kept)
         self._tip = _three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(workspace)
         self.reach = self._reaches(workspace)
@@ -136,19 +126,18 @@ class ChainResolver:
 
     def _reach_out(self, node: int, nodes: Sequence[int], effector: Vector, push: Vector) -> None:
         """Cyclic coordinate descent that moves a point of a node by a vector."""
-        limbs = self.limbs
+        frame = self.limbs.frame(node)
         goal = (effector[0] + push[0], effector[1] + push[1], effector[2] + push[2])
-        frame = limbs.frame(node)
         local = seen_from(frame, effector[0] - frame[9], effector[1] - frame[10], effector[2] - frame[11])
-        here, there, plan = np.array([effector]), np.array([goal]), moving_all(tuple(nodes), 1, 1)
-        left = distance(here, there, ALIKE[:1])
+        aims = Aims(self.limbs, [node], [local], [goal], [True])
+        plan, left = aims.plan(nodes), aims.distance
         for _ in range(SWEEPS):
-            carried(limbs, here, there, ALIKE[:1], plan)
-            limbs.forward()
+            aims.sweep(plan)
+            self.limbs.forward()
             self.keep_ranges()
-            here[0] = moved(limbs.frame(node), *local)
-            before, left = left, distance(here, there, ALIKE[:1])
-            if left < CLOSE or left > SLOW * before:
+            aims.carry()
+            before, left = left, aims.distance
+            if left < 1e-4 or left > 0.9 * before:  # m: reached; or slow
                 return
 
     def _translate(self, link: Link, push: Vector, inner: Sequence[int], tracked: Any) -> None:
@@ -168,12 +157,14 @@ class ChainResolver:
                 there = wanted
                 self.translated.update(limbs.joints[node] for node in link.nodes)
         self._reach_out(inner[0], inner, (first[9], first[10], first[11]), push)
-        plan = moving_all(own, 3, 0)
+        aims = Aims(limbs, [link.node] * 3, np.eye(3), there, [False] * 3)
+        plan = aims.plan(own)
         for _ in range(SWEEPS):
-            change = carried(limbs, _columns(limbs.frames[link.node]).copy(), there, ALIKE, plan)
+            change = aims.sweep(plan)
             limbs.forward()
-            if change < CLOSE:
+            if change < 1e-4:  # rad
                 break
+            aims.carry()
         self.keep_ranges()
 
     def _passes(self, node: int, point: Sequence[float]) -> bool:

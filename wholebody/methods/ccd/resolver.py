@@ -15,9 +15,10 @@ from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.proximity import Joints
+from wholebody.methods.ccd.chain import MARGIN, ChainResolver
+from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
-from wholebody.methods.ccd.overlap_resolution.chain import MARGIN, ChainResolver
-from wholebody.methods.ccd.overlap_resolution.links import Link, Overlap
+from wholebody.methods.ccd.links import Link, Overlap
 from wholebody.methods.control import Control
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
@@ -26,10 +27,7 @@ Find = Callable[[ChainResolver, Sequence[Overlap]], "Link | None"]
 """What chooses the link to be moved."""
 
 TOLERANCE = 1e-4  # m: largest overlap that is ignored; coal's own accuracy is a hundredth of it
-GOALS = 8  # most goals for one chain in one pass
-PASSES = 4  # most passes over all chains
-SLOW = 0.8  # a goal that leaves more than this share of the link's overlap is the last one of the pass
-GAIN = 0.98  # a pass that leaves more than this share of the deepest overlap is the last one
+PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
 
 
 @dataclass
@@ -61,42 +59,31 @@ class OverlapResolver:
         tracked: joint placements whose orientation links that are translated take; None for that which they have.
     """
 
-    def __init__(
-        self,
-        scene: Scene,
-        workspace: Workspace,
-        clearances: Array | None = None,
-        fixed: frozenset[int] = frozenset(),
-        cones: Sequence[str] | None = None,
-        ranges: Sequence[str] = (),
-        tolerance: float = TOLERANCE,
-        exact: bool = True,
-        control: Control | None = None,
-    ) -> None:
-        """Prepare the chains of the figure.
+    def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED, *, exact: bool = True) -> None:
+        """Prepare for clearances of zero; `begin` takes others.
 
         Args:
             scene: figure and things.
             workspace: of the run, for as long as this is used.
-            clearances: (pairs,) clearance of every collision pair, metres; None for zero.
-            fixed: Pinocchio's indices of joints that must not move.
-            cones: names of the reach cones that are kept; None for all of the figure's.
-            ranges: names of the ranges of motion that are kept.
-            tolerance: largest overlap that is ignored, metres.
+            kept: joints that must not move, cones and ranges.
             exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
-            control: may end the removal early.
         """
         self.exact, self.margin = exact, MARGIN
         self.tracked: Any = None
-        self.scene, self.workspace = scene, workspace
-        self.begin(clearances, tolerance, Control(np.inf) if control is None else control)
+        self.scene, self.workspace, self._kept = scene, workspace, kept
+        self.begin(None, TOLERANCE, Control(np.inf))
         self._data = scene.model.createData()
         self._joints = workspace.table.joint.tolist()
         self.deepest = 0.0
-        self._fixed, self._cones, self._ranges = fixed, cones, ranges
 
     def begin(self, clearances: Array | None, tolerance: float, control: Control) -> None:
-        """Begin a run; see the constructor for the arguments."""
+        """Begin a run.
+
+        Args:
+            clearances: (pairs,) clearance of every collision pair, metres; None for zero.
+            tolerance: largest overlap that is ignored, metres.
+            control: may end the run early.
+        """
         self.clearances, self.tolerance, self.control = clearances, tolerance, control
         self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self.counts = Counts()
@@ -105,21 +92,13 @@ class OverlapResolver:
     def chains(self) -> dict[str, ChainResolver]:
         """Name to chain, in the figure's order; made at the first overlap."""
         named = {
-            name: ([joint for joint in joints if joint not in self._fixed], tip)
+            name: ([joint for joint in joints if joint not in self._kept.fixed], tip)
             for name, (joints, tip) in chains_of(self.scene.figure).items()
         }
         everything = frozenset(joint for joints, _ in named.values() for joint in joints)
         return {
             name: ChainResolver(
-                self.scene,
-                self.workspace,
-                name,
-                joints,
-                everything - set(joints),
-                tip,
-                self._cones,
-                self._ranges,
-                self.exact,
+                self.scene, self.workspace, joints, everything - set(joints), tip, self._kept, self.exact
             )
             for name, (joints, tip) in named.items()
             if joints
@@ -168,7 +147,7 @@ class OverlapResolver:
         overlaps = self.query(q)
         names = list(self.chains)
         find = ChainResolver.nearest_root
-        for _ in range(PASSES):
+        for _ in range(4):
             if not overlaps:
                 break
             before = self.deepest
@@ -176,7 +155,7 @@ class OverlapResolver:
                 if self.counts.work > most_work or self.control.over:
                     break
                 overlaps = self._leave(self.chains[names[k]], q, overlaps, find)
-            if overlaps and self.deepest > GAIN * before:
+            if overlaps and self.deepest > 0.98 * before:  # the pass gained too little
                 if find is ChainResolver.deepest or not self.exact:
                     break
                 find = ChainResolver.deepest  # a forearm that cannot leave keeps the hand from its turn
@@ -185,9 +164,9 @@ class OverlapResolver:
     def _leave(self, chain: ChainResolver, q: Array, overlaps: list[Overlap], find: Find) -> list[Overlap]:
         """Move one chain out of its overlaps, with a new goal every time; q is changed in place."""
         worst, node = np.inf, -1
-        for _ in range(GOALS):
+        for _ in range(8):
             link = find(chain, overlaps)
-            if link is None or (link.node == node and link.depth > SLOW * worst):
+            if link is None or (link.node == node and link.depth > 0.8 * worst):
                 break
             worst, node = link.depth, link.node
             began = time.perf_counter()

@@ -12,8 +12,8 @@ import pytest
 import wholebody as wb
 from wholebody.bench.suite.stability.bodies import Builder
 from wholebody.geometry.penetration import global_depth
-from wholebody.methods.ccd.overlap_resolution.frames import resolve_overlap
-from wholebody.methods.ccd.overlap_resolution.resolver import OverlapResolver
+from wholebody.methods.ccd.frames import resolve_overlap
+from wholebody.methods.ccd.resolver import OverlapResolver
 
 
 def _wall(figure: wb.Figure) -> tuple[wb.Scene, list[Any]]:

@@ -13,28 +13,20 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.moved_pairs import QueryResult
 from wholebody.geometry.continuous.passing_through import first_passed, last_free
-from wholebody.methods.ccd.attraction import Attraction
-from wholebody.methods.ccd.overlap_resolution.chain import MARGIN
-from wholebody.methods.ccd.overlap_resolution.resolver import Counts, OverlapResolver
+from wholebody.methods.ccd.chain import MARGIN
+from wholebody.methods.ccd.resolver import PERTURBATIONS, Counts, OverlapResolver
 from wholebody.scene.scene import Scene
 
-STEP = 0.03  # m: largest motion of a chain's tip in one step; half of a forearm's width
-SMALL_STEP = 0.006  # m: length of steps that lead around a bulge which the direct motion penetrates
-STEPS = 8  # most steps of one frame
 BUDGET = 42  # queries and goals after which a frame makes no further step, and the next one continues: some 3 ms
-SMALL_STEP_BUDGET = 15  # queries and goals for small steps, if larger ones found no free motion
 OVERRUN = 16  # further queries and goals after which no chain is processed any more
-HALVINGS = 7  # of an interpolation: a step of 3 cm to a quarter of a millimetre
-PERTURBATIONS = (0.02, 0.05, 0.1, 0.2)  # rad: of a posture that things penetrate and that single joints cannot free
+LEAST_GAIN = 1e-7  # rad^2: a part that gets nearer to the tracked posture by less than this stays where it is
 ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown posture to the next
-PASSED = 2e-3  # m: allowed overlap of the motion of a single step; `ALLOWED_DEPTH` is that between shown postures
-WIDE = 5e-3  # m: margin of limbs that return to a free posture, so that they have room to turn
-TINY = 1e-12  # rad, m
 
 
 @dataclass(frozen=True)
@@ -87,6 +79,104 @@ def resolve_overlap(
         return frames.remove(checked[0], checked[1], rng, largest_motion)
 
 
+class Attraction:
+    """Moves parts of a figure towards the tracked posture: its chains, and root and trunk as one more part.
+
+    Displaced joints are attracted back in every frame, in short steps or joint by joint, as far as contact allows (the
+    coach and trainee of Boulic and others 1997).
+
+    Attributes:
+        parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
+        step_length: largest motion of a part's tip in one step, m.
+        free: whether the wanted posture overlaps nothing: then a part may move away from it for a while.
+        limit: of the work in the resolver's counts; beyond it joints are not tried one by one.
+    """
+
+    def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
+        """Find the degrees of freedom of each chain."""
+        self._model, self._resolver = scene.model, resolver
+        self.step_length, self.limit, self.free = 0.0, 0, False
+        self.parts: list[tuple[NDArray[np.intp], Array]] = []
+        rest = np.ones(scene.model.nv, dtype=bool)
+        for chain in resolver.chains.values():
+            joints = [scene.model.joints[joint] for joint in chain.limbs.joints]
+            dofs = np.array([joint.idx_v for joint in joints], dtype=np.intp)
+            fresh = rest[dofs]
+            rest[dofs] = False
+            reach = np.maximum(chain.reach, 1e-9)  # m: steps are divided by it, and a last link may have no shape
+            self.parts.append((dofs[fresh], reach[fresh]))
+        size = max([float(reach.max(initial=0.5)) for _, reach in self.parts], default=0.5)
+        others = np.flatnonzero(rest)
+        reach = np.full(len(others), 2.0 * size)
+        if scene.figure.root == "free":
+            reach[others < 3] = 1.0
+        self.parts.append((others, reach))
+
+    def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
+        """Move every part that is not settled a step towards the wanted posture; None if no part can move.
+
+        Returns:
+            The new posture, (nq,), and the share of its motion that each part made, (parts,).
+        """
+        way = np.asarray(pin.difference(self._model, q, wanted))
+        shares = np.zeros(len(self.parts))
+        for k, (dofs, reach) in enumerate(self.parts):
+            part = way[dofs]
+            length = float(np.abs(part) @ reach)
+            if not settled[k] and float(part @ part) >= 1e-12:  # rad^2: it has not arrived
+                shares[k] = min(1.0, self.step_length / length)
+            way[dofs] = part * shares[k]
+        if not shares.any():
+            return None
+        return np.asarray(pin.integrate(self._model, q, way)), shares
+
+    def keep_gains(self, q: Array, trial: Array, wanted: Array, shares: Array, settled: list[bool]) -> Array:
+        """Undo changes that brought a part no nearer to the wanted posture; move joints of blocked parts one by one.
+
+        If overlap resolution undoes the attraction, single joints may still be free: a shoulder can move the whole arm
+        back, although the wrist cannot straighten yet. A part for which this gains nothing either is settled.
+        """
+        before = np.asarray(pin.difference(self._model, q, wanted))
+        after = np.asarray(pin.difference(self._model, trial, wanted))
+        back = np.zeros(self._model.nv, dtype=bool)
+        slow = []
+        for k, (dofs, _) in enumerate(self.parts):
+            old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
+            if shares[k] and old - new < LEAST_GAIN and not self.free:
+                back[dofs] = True
+            if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
+                slow.append(k)
+        if back.any():
+            way = np.asarray(pin.difference(self._model, trial, q))
+            kept = np.asarray(pin.integrate(self._model, trial, np.where(back, way, 0.0)))
+            if not self._resolver.query(kept):
+                trial = kept
+        for k in slow:
+            trial, gained = self._attract_joints(trial, wanted, k)
+            settled[k] = not gained
+        if len(slow) or back.any():
+            self._resolver.query(trial)
+        return trial
+
+    def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
+        """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
+        gained = False
+        chains = list(self._resolver.chains.values())
+        held = {self._model.joints[joint].idx_v for joint in (chains[part].translated if part < len(chains) else ())}
+        for dof, reach in zip(*self.parts[part], strict=True):
+            if dof in held:  # it would turn a link that was moved out by translation
+                continue
+            way = float(pin.difference(self._model, q, wanted)[dof])
+            if way * way < LEAST_GAIN or self._resolver.counts.work > self.limit:
+                continue
+            step = np.zeros(self._model.nv)
+            step[dof] = min(max(way, -self.step_length / reach), self.step_length / reach)
+            trial = np.asarray(pin.integrate(self._model, q, step))
+            if not self._resolver.query(trial):
+                q, gained = trial, True
+        return q, gained
+
+
 class FrameResolver:
     """Overlap resolution from frame to frame in one scene."""
 
@@ -133,14 +223,17 @@ class FrameResolver:
         pin.forwardKinematics(self._model, self._tracked, wanted)
         resolver.tracked = self._tracked
         attraction.free = not resolver.query(wanted)
-        resolver.margin = WIDE if attraction.free else MARGIN
+        resolver.margin = (
+            5e-3 if attraction.free else MARGIN
+        )  # m: limbs that return to a free posture need room to turn
         if attraction.free and not self._passes_through(before, q, wanted):
             shown = self._toward(q, wanted)
             if shown is not None:
                 return shown
         attraction.limit = resolver.counts.work + BUDGET + OVERRUN
-        for attraction.step_length in (STEP, SMALL_STEP):
-            attraction.limit = max(attraction.limit, resolver.counts.work + SMALL_STEP_BUDGET + OVERRUN)
+        # m: of a chain's tip; half of a forearm's width, and less where the direct motion penetrates a bulge
+        for attraction.step_length in (0.03, 0.006):
+            attraction.limit = max(attraction.limit, resolver.counts.work + 15 + OVERRUN)
             way = self._approach(q, wanted, before, rng)
             chosen = dict.fromkeys((len(way) - 1, len(way) // 2, 0)) if way else ()
             found = (self._toward(q, way[k]) for k in chosen)
@@ -157,7 +250,7 @@ class FrameResolver:
             self._attraction.free
         )  # limbs that are pressed against something leave it before the root moves
         way = []
-        for _ in range(STEPS):
+        for _ in range(8):
             if resolver.counts.work > self._attraction.limit - OVERRUN:
                 break
             moved = self._attraction.step(q, wanted, settled)
@@ -185,7 +278,7 @@ class FrameResolver:
         share.
         """
         way = np.asarray(pin.difference(self._model, q0, q1))
-        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), TINY))
+        shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))
         for dofs, _ in self._parts:
             shares[dofs] = shares[dofs].min(initial=1.0)
         least = float(shares.min())
@@ -208,13 +301,13 @@ class FrameResolver:
 
     def _interpolate(self, free: Array, q: Array) -> Array:
         """The last free posture between a free one and q, by bisection."""
-        result = last_free(self._model, free, q, self._resolver.query, HALVINGS)
+        result = last_free(self._model, free, q, self._resolver.query, 7)  # 3 cm to a quarter of a millimetre
         self._resolver.query(result)
         return result
 
     def _passes_through(self, before: QueryResult, q0: Array, q1: Array) -> bool:
         """Whether the motion passes through something; `_hit` is then the first contact."""
-        hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, PASSED)
+        hit = first_passed(self._workspace, before, self._resolver.placed, q0, q1, 2e-3)  # m
         if hit is not None:
             self._hit = hit.q
         return hit is not None

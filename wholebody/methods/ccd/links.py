@@ -19,9 +19,6 @@ from wholebody.scene.workspace import Workspace
 
 Vector = tuple[float, float, float]
 
-CANCELLED = 0.3  # PD_g shorter than this share of the deepest pair: normals cancel, as in figure 4b of the paper
-ROUNDS = 4  # over the obstacles of one link; two walls need one, wedges a few
-
 
 class Overlap(NamedTuple):
     """Two overlapping pieces: their indices and joints, depth [m], normal from a to b, points on a and b."""
@@ -141,7 +138,7 @@ class LinkFinder:
             by_owner.setdefault(owners[overlap.b if is_a else overlap.a], []).append((overlap, is_a))
         pushes = [self._global_depth(owner, group) for owner, group in by_owner.items()]
         x, y, z = pushes[0]
-        for _ in range(ROUNDS if len(pushes) > 1 else 0):
+        for _ in range(4 if len(pushes) > 1 else 0):  # two walls need one, wedges a few
             for px, py, pz in pushes:
                 square = px * px + py * py + pz * pz
                 shortfall = 1.0 - (x * px + y * py + z * pz) / square if square > 0.0 else 0.0
@@ -163,7 +160,9 @@ class LinkFinder:
             z += square * overlap.normal[2]
             total += overlap.depth
         x, y, z = x / total, y / total, z / total
-        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= CANCELLED * max(overlap.depth for overlap, _ in group):
+        deepest = max(overlap.depth for overlap, _ in group)
+        # a short PD_g says that normals cancel, as in figure 4b of the paper
+        if not self._exact or (x * x + y * y + z * z) ** 0.5 >= 0.3 * deepest:
             return x, y, z
         return self._separation(owner, group) or (x, y, z)
 

@@ -1,0 +1,137 @@
+"""`wholebody clip info`, `convert`, `retarget`: what a file of motion holds, in another format, for a figure."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from wholebody.cli.clip.arguments import JOBS, MOTIONS, ONE_MOTION, bar, clip_of, figure_of, jobs_of
+from wholebody.cli.command import command, option
+
+
+@command(
+    "info",
+    "what a file of motion holds",
+    """\
+Say what a file of motion holds: figure, frames, time step, duration, and of the joints that move most their range and
+greatest speed.""",
+    *ONE_MOTION,
+)
+def info(arguments: argparse.Namespace) -> int:
+    """Describe the clip."""
+    import numpy as np
+    from rich.console import Console
+    from rich.markup import escape
+
+    from wholebody.cli.tables import table
+
+    clip = clip_of(arguments)
+    figure, console = clip.figure, Console()
+    rate = 1.0 / clip.dt
+    console.print(
+        f"[bold]{escape(clip.name)}[/]: {len(clip)} frames at {rate:.4g} Hz, {clip.duration:.3f} s, "
+        f"{escape(figure.name)} with {figure.model.nv} degrees of freedom",
+        highlight=False,
+    )
+    outside = sum(not figure.within_limits(q, 1e-6) for q in clip.q)
+    console.print(f"frames beyond joint limits: {outside}", highlight=False)
+    speeds = np.abs(clip.velocities()).max(axis=0)
+    values = [figure.joint_values(q) for q in clip.q]
+    made = table("joints that move most", "from", "to", "greatest speed")
+    ranges = {name: [frame[name] for frame in values] for name in values[0]}
+    for name in sorted(ranges, key=lambda name: min(ranges[name]) - max(ranges[name]))[:12]:
+        slides = figure.model.joints[figure.joint_id(name)].shortname().startswith("JointModelP")
+        unit, factor = ("m", 1.0) if slides else ("deg", float(np.degrees(1.0)))
+        low, high = (factor * end for end in (min(ranges[name]), max(ranges[name])))
+        speed = factor * float(speeds[figure.dofs([name])].max())
+        made.add_row(escape(name), f"{low:.4g} {unit}", f"{high:.4g} {unit}", f"{speed:.4g} {unit}/s")
+    console.print(made)
+    return 0
+
+
+@command(
+    "convert",
+    "write a motion in another format",
+    """\
+Write a motion in another format: .npz (without loss), .bvh, .csv, .txt (joint profile) or .glb (glTF animation).
+A skeleton that is not the figure's own is retargeted.""",
+    *ONE_MOTION,
+    option("out", type=Path, metavar="OUT", help="the file to write"),
+    option("--dt", type=float, metavar="S", help="seconds from frame to frame (default: as it is)"),
+    option("--mirror", action="store_true", help="exchange left and right"),
+    epilog="""\
+examples:
+  wholebody clip convert walk.npz walk.glb
+  wholebody clip convert walk.npz slow.bvh --dt 0.04 --mirror""",
+)
+def convert(arguments: argparse.Namespace) -> int:
+    """Read, change and write."""
+    from wholebody.base.files import check_writable
+    from wholebody.motion.files import check_ending
+
+    check_writable(check_ending(arguments.out))
+    clip = clip_of(arguments)
+    if arguments.dt is not None:
+        clip = clip.resampled(arguments.dt)
+    if arguments.mirror:
+        clip = clip.mirrored()
+    print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s")
+    return 0
+
+
+@command(
+    "retarget",
+    "skeletons' motions for a figure",
+    """\
+Turn the motion of a skeleton (BVH, AMASS) into a clip of a figure of any proportions: directions of limbs as recorded,
+within joint limits and reach cones, smooth, standing feet held. The clip may collide with itself: `wholebody clip
+check` says where, `wholebody clip avoid` frees it. Several files are written into a folder; what it holds already is
+not made again.""",
+    *MOTIONS,
+    option(
+        "out", type=Path, metavar="OUT", help="the file to write: .npz, .bvh, .csv, .txt or .glb; of several a folder"
+    ),
+    option("--names", type=Path, metavar="FILE.toml", help="which bone is which part"),
+    option("--unit", metavar="UNIT", help="of lengths, such as centimetres (default: recognised)"),
+    option("--up", choices=("y", "z"), help="the axis that points up (default: recognised)"),
+    *JOBS,
+    epilog="""\
+examples:
+  wholebody clip retarget walk.bvh walk.npz --sex female --stature 1.62
+  wholebody clip retarget walk.bvh robot.npz --figure g1.urdf --names bones.toml
+  wholebody clip retarget walk.bvh run.bvh jump.bvh clips --jobs 4""",
+)
+def retarget_motions(arguments: argparse.Namespace) -> int:
+    """Read, retarget and write."""
+    if len(arguments.files) > 1:
+        return _many(arguments)
+    from wholebody.base.files import check_writable
+    from wholebody.motion.files import check_ending
+    from wholebody.motion.reading import read_skeleton
+    from wholebody.motion.retargeting import retarget
+
+    check_writable(check_ending(arguments.out))
+    motion = read_skeleton(arguments.files[0], unit=arguments.unit, up=arguments.up)
+    figure = figure_of(arguments)
+    with bar("retargeting") as tell:
+        clip = retarget(motion, figure, arguments.names, progress=lambda share: tell(share, "retargeting"))
+    print(f"wrote {clip.write(arguments.out)}: {len(clip)} frames, {clip.duration:.3f} s, of {figure.name}")
+    return 0
+
+
+def _many(arguments: argparse.Namespace) -> int:
+    from wholebody.base.errors import InputError
+    from wholebody.motion.batch import read_many
+
+    for given in ("names", "unit", "up"):
+        if getattr(arguments, given) is not None:
+            raise InputError(f"--{given} is for one file, and there are {len(arguments.files)}; give one at a time")
+    figure, count = figure_of(arguments), len(arguments.files)
+    with bar("retargeting", count) as tell:
+        found = read_many(
+            arguments.files, arguments.out, figure, jobs=jobs_of(arguments), cluster=arguments.cluster,
+            progress=lambda done, said: tell(done, said),
+        )  # fmt: skip
+    for name, made in found.items():
+        print(f"wrote {made}" if isinstance(made, Path) else f"{name}: {made}")
+    return 0 if all(isinstance(made, Path) for made in found.values()) else 1

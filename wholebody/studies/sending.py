@@ -1,0 +1,87 @@
+"""What is sent to other processes: values, without the scenes that these have seen already."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import pickle
+from collections import OrderedDict
+from typing import Any, NamedTuple
+
+from wholebody.base.runner import packed
+from wholebody.scene.scene import Scene
+
+
+class Kept(NamedTuple):
+    """What stays in this process."""
+
+    value: Any
+
+    def read(self) -> Any:
+        """The value."""
+        return self.value
+
+
+class Sent(NamedTuple):
+    """What is sent to another process.
+
+    Attributes:
+        value: pickled, with scenes left out.
+        scenes: digest of each of its scenes to that scene, pickled.
+    """
+
+    value: bytes
+    scenes: dict[str, bytes]
+
+    def read(self) -> Any:
+        """The value, with the scenes that this process has seen already, or has them now."""
+        return _Reader(self).load()
+
+
+class Sender:
+    """Pickles values; every scene is pickled once as long as nothing in it moves."""
+
+    def __init__(self) -> None:
+        """Begin with none."""
+        self._scenes: dict[tuple[int, int, int], tuple[str, bytes, Scene]] = {}
+
+    def sent(self, value: Any) -> Sent:
+        """A value, ready to be sent."""
+        into, scenes = io.BytesIO(), {}
+
+        def leave_out(given: object) -> str | None:
+            if not isinstance(given, Scene):
+                return None
+            key = id(given), given.revision, given.built.moves
+            if key not in self._scenes:
+                made = packed(given)
+                self._scenes[key] = hashlib.sha256(made).hexdigest(), made, given
+            digest, made, _ = self._scenes[key]
+            scenes[digest] = made
+            return digest
+
+        import cloudpickle
+
+        pickler = cloudpickle.Pickler(into)
+        pickler.persistent_id = leave_out
+        pickler.dump(value)
+        return Sent(into.getvalue(), scenes)
+
+
+_SEEN: OrderedDict[str, Scene] = OrderedDict()
+"""Scenes that were sent to this process, the newest last."""
+
+
+class _Reader(pickle.Unpickler):
+    def __init__(self, sent: Sent) -> None:
+        super().__init__(io.BytesIO(sent.value))
+        self._scenes = sent.scenes
+
+    def persistent_load(self, digest: str) -> Scene:
+        """The scene with a digest."""
+        if digest not in _SEEN:
+            _SEEN[digest] = pickle.loads(self._scenes[digest])
+        _SEEN.move_to_end(digest)
+        while len(_SEEN) > 4:
+            _SEEN.popitem(last=False)
+        return _SEEN[digest]
