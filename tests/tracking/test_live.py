@@ -24,7 +24,10 @@ def along(drag: LiveDrag, name: str, way: Any, frames: int = 30) -> Any:
     start = drag.place(name)
     drag.take(name)
     for share in np.linspace(0.0, 1.0, frames)[1:]:
-        frame = drag.move(start + share * np.array(way))
+        before, frame = drag.q, drag.move(start + share * np.array(way))
+        if frame.path:  # where a thing moved
+            assert frame.path[0][1] == pytest.approx(before)
+            assert frame.path[-1][1] == pytest.approx(frame.q)
     for _ in range(SETTLING):  # frames that were slow, as on a busy machine, leave some way
         if frame.error > 1e-3:
             frame = drag.move(start + np.array(way))
@@ -57,7 +60,7 @@ def test_holds_are_those_of_the_problem_and_can_be_released(drag: LiveDrag) -> N
 
 def test_a_thing_pushes_the_hand_away_and_undo_brings_both_back(drag: LiveDrag) -> None:
     q = drag.q.copy()
-    along(drag, "table", (-0.5, 0.0, 0.0), 40)
+    assert along(drag, "table", (-0.5, 0.0, 0.0), 40).path
     assert drag.scene.objects["table"].placement.translation[0] == pytest.approx(0.1, abs=1e-9)
     assert drag.report().overlap < 2e-3
     assert not np.allclose(drag.q, q)

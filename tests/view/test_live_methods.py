@@ -54,3 +54,29 @@ def test_an_assembly_has_a_page(tmp_path: Path) -> None:
         assert page._method.options == ("newton",)
     finally:
         page.stop()
+
+
+def test_the_way_within_a_frame_is_shown(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where a thing moves the figure does not go straight: the thing and it are shown on the way too."""
+    given = problem()
+    given.scene.add(wb.Sphere(0.1), name="ball", at=(2.0, 0.0, 1.0))
+    drag = LiveDrag(wb.Problem(given.scene))
+    page = opened(drag, tmp_path)
+    try:
+        drag.take("ball")
+        move, aside = drag.move, drag.q + 0.0
+        aside[0] += 0.5
+        ball = next(n for n, owner in enumerate(drag.scene.piece_owner) if owner == "ball")
+        seen, show = [], page._place
+
+        def noted(q: np.ndarray, at: dict) -> None:
+            show(q, at)
+            seen.append((q[0], page._pieces[ball].position[0]))
+
+        monkeypatch.setattr(page, "_place", noted)
+        way = ((0.0, drag.q), (0.25, aside), (1.0, drag.q))
+        monkeypatch.setattr(drag, "move", lambda place: move(place)._replace(path=way))
+        page.follow(np.array((1.6, 0.0, 1.0)))
+        assert seen == [(aside[0], pytest.approx(1.9)), (drag.q[0], pytest.approx(1.6))]
+    finally:
+        page.stop()

@@ -17,10 +17,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution, Status, TraceEntry
 from wholebody.tasks.balance import Balance
 
-SLACK = 1.05  # factor on the tolerance: an assessment computes with other rounding
-COAL_ACCURACY = 1e-6  # m
-WORTH = 3.0  # margins: a goal this far off may be met without the margin, which costs one to two of them of reach
-
 
 @dataclass(frozen=True)
 class Ending:
@@ -57,7 +53,9 @@ class Ending:
 
 def assessed_tolerance(tolerance: float) -> float:
     """Error [m, rad] up to which an assessment counts as good for a method with a tolerance."""
-    return SLACK * tolerance + COAL_ACCURACY
+    # factor on the tolerance: an assessment computes with other rounding
+    # m
+    return 1.05 * tolerance + 1e-6
 
 
 def meets(judgement: Assessment, tolerance: float) -> bool:
@@ -147,7 +145,8 @@ def _way_out(problem: Problem, judgement: Assessment) -> str:
         return ""
     for term, name in zip(problem.constraints, problem.constraint_names, strict=True):
         margin = term.margin if isinstance(term, Balance) and term in problem.defaults else 0.0
-        near = judgement.goal_error <= WORTH * margin
+        # margins: a goal this far off may be met without the margin, which costs one to two of them of reach
+        near = judgement.goal_error <= 3.0 * margin
         if near and margin and any(blocker.names == (name,) for blocker in judgement.blockers):
             least = f"{1e3 * margin:.0f} mm"
             return f"; state Balance() to let the centre of mass come nearer to the feet's edges than {least}"

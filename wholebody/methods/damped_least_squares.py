@@ -38,8 +38,6 @@ from wholebody.solution import TraceEntry
 from wholebody.tasks.answers import values
 from wholebody.tasks.checks import undefined, values_and_rows
 
-SHARE = 0.5  # of the tolerance, to which goals and equalities are met: the assessment rounds differently
-HALVINGS = 12  # of a step to where a term of one's own is not finite, before the descent ends
 RANK = 1e-8  # squared singular values below this share of the largest count as zero
 
 
@@ -106,7 +104,8 @@ class _Descent:
     def run(self) -> bool:
         """Descend; true if it converged or the goals are met, false if the iterations ran out."""
         problem, method = self._problem, self._method
-        enough = SHARE * method.tolerance
+        # of the tolerance, to which goals and equalities are met: the assessment rounds differently
+        enough = 0.5 * method.tolerance
         q, step, best = self.best, 0.0, (np.inf, np.inf)
         for _ in range(method.iterations + 1):
             self._state.update(q)
@@ -135,7 +134,8 @@ class _Descent:
         """Where a way (nv,), or a half of it or less, leads from q (nq,); None if a term is not finite on all of it."""
         problem = self._problem
         asked = (*problem.goals, *problem.stated, *problem.bounds, *problem.measures)
-        for _ in range(HALVINGS):
+        # of a step to where a term of one's own is not finite, before the descent ends
+        for _ in range(12):
             moved = problem.scene.figure.clamp(np.asarray(pin.integrate(problem.scene.model, q, way)))
             error = undefined(asked, self._state.update(moved))
             if error is None:

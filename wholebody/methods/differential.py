@@ -21,7 +21,6 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 from wholebody.solution import TraceEntry
 
-SHARE = 0.5  # of the tolerance, to which goals and constraints are met: the assessment rounds differently
 REST = 1e-2  # share of the tolerance: a smaller step counts as convergence
 MEASURES = 1e-2  # weight of the measures at the beginning, against goals of weight 1
 LEAST = 1e-3  # share of the tolerance: least weight of the measures, which goals then miss by less than the tolerance
@@ -131,7 +130,8 @@ class Iteration:
 
     def _iterate(self) -> None:
         settings, model = self._settings, self._problem.scene.model
-        enough, length = SHARE * settings.tolerance, 0.0
+        # of the tolerance, to which goals and constraints are met: the assessment rounds differently
+        enough, length = 0.5 * settings.tolerance, 0.0
         while True:
             error, violation = self._look()
             self.trace.append(TraceEntry(error, violation, 0.0, length))

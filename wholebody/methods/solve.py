@@ -20,8 +20,6 @@ from wholebody.problem import Problem
 from wholebody.solution import Solution
 
 PROTOCOL = "solve", "tracker", "accepts"
-FLOWN = 0.3  # m: a root that moved farther than this was carried to the goals; a person who bends moves it less
-AT_THE_END = 1e-5  # m, rad: tolerance of the goals at the end of a motion
 
 
 def method_named(name: str) -> Method:
@@ -106,7 +104,8 @@ def method_for_motions(given: object) -> Method:
     if given == "ccd":
         from wholebody.methods.ccd.method import CCD
 
-        return CCD(tolerance=AT_THE_END, restarts=0)
+        # m, rad: tolerance of the goals at the end of a motion
+        return CCD(tolerance=1e-5, restarts=0)
     return method_named(given)
 
 
@@ -144,7 +143,8 @@ def _warn_if_nothing_holds(problem: Problem, solution: Solution) -> None:
     if any(term.touching for term in problem.goals):
         return
     flown = float(np.linalg.norm(solution.q[:3] - problem.start[:3]))
-    if flown > FLOWN:
+    # m: a root that moved farther than this was carried to the goals; a person who bends moves it less
+    if flown > 0.3:
         warnings.warn(
             f"nothing holds the figure: its root moved {flown:.2f} m to meet the goals; add "
             "wb.Stand(on=...), wb.Hold('left_foot') or wb.Freeze('root')",

@@ -16,8 +16,6 @@ from wholebody.tasks.grasp import Grasp
 SPREADS = (0.3, 0.6, 1.0)  # largest distance from the first start, as a share of each joint's range, in turn
 AT_LIMIT = 0.02  # rad: a joint nearer to its limit than this counts as at it
 BEND = 0.3  # rad: distance by which such a joint is moved off its limit
-SAME_MINIMUM = 0.01  # largest relative difference of values of one minimum; 0.05 merges neighbouring minima
-ROOT_SPREAD = 0.2  # m and rad, for joints without limits, but those that turn about one axis
 TURN = 2.0 * np.pi  # rad: range of those
 
 
@@ -116,7 +114,8 @@ class Minima:
     def add(self, value: float, converged: bool) -> None:
         """Add the end of a descent; the end of one that did not converge is no minimum with which others can agree."""
         self._count += 1
-        if not any(abs(value - known) <= SAME_MINIMUM * value for known in self._values):
+        # largest relative difference of values of one minimum; 0.05 merges neighbouring minima
+        if not any(abs(value - known) <= 0.01 * value for known in self._values):
             self._values.append(value if converged else np.inf)
 
     @property
@@ -130,7 +129,8 @@ class Minima:
 def _ranges(problem: Problem, start: Array) -> tuple[Array, Array]:
     """The least and the largest move (nv,) of each degree of freedom from a posture (nq,), all of them finite."""
     lower, upper = problem.scene.figure.tangent_bounds(start)
-    spread = np.full(len(lower), ROOT_SPREAD)
+    # m and rad, for joints without limits, but those that turn about one axis
+    spread = np.full(len(lower), 0.2)
     for joint in list(problem.scene.model.joints)[1:]:  # the first is the world
         if joint.shortname().startswith("JointModelR"):
             spread[joint.idx_v] = TURN

@@ -2,6 +2,7 @@
 
 from wholebody.tracking.dragging import Dragged, DragJudgement, drag_along, judge_drag
 from wholebody.tracking.frame import Frame
+from wholebody.tracking.inner_paths import resampled
 from wholebody.tracking.loop import FrameLoop, follow
 from wholebody.tracking.paths import circle, read_path, spread
 from wholebody.tracking.recording import Judgement, Recording, judge
@@ -30,6 +31,7 @@ __all__ = [
     "posed",
     "read_path",
     "read_track",
+    "resampled",
     "spread",
     "write_track",
 ]

@@ -72,7 +72,7 @@ class ProblemDrag:
             self._workspace.refresh()
             collisions, path = tuple[Collision, ...](), tuple[tuple[float, Array], ...]()
             if np.isinf(self.tracker.unswept):
-                step = next(self._frames())
+                step = self.tracker.frame(self.q) if self._seconds == np.inf else next(self._frames())
                 self.q, iterations = step.q, step.iterations
                 collisions, path = getattr(step, "collisions", ()), getattr(step, "path", ())
             else:
@@ -81,7 +81,8 @@ class ProblemDrag:
                 if self._motion is not None:
                     collisions = judged(self._workspace, self._motion, before, self.q)
                     path = ((0.0, before), (1.0, self.q))
-            self._moves.end(self._left()[1])
+            if self._seconds < np.inf:
+                self._moves.end(self._left()[1])
             error = goal_error(self.problem, self._workspace, self.q)
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 

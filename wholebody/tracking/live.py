@@ -14,6 +14,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import known, numbers, shown
 from wholebody.base.errors import InputError, WholebodyError
+from wholebody.base.records import with_values
 from wholebody.methods import installed_methods
 from wholebody.methods.base import Method
 from wholebody.methods.newton.assembly import Assembly
@@ -36,6 +37,7 @@ class LiveFrame(NamedTuple):
         overlap: deepest overlap, metres.
         seconds: that the frame took.
         status: one line: what is dragged, by which method, and what is wrong if something is.
+        path: as in `DragFrame`: the way within the frame, where a thing was moved.
     """
 
     q: Array
@@ -44,6 +46,7 @@ class LiveFrame(NamedTuple):
     overlap: float
     seconds: float
     status: str
+    path: tuple[tuple[float, Array], ...] = ()
 
 
 class LiveDrag:
@@ -121,7 +124,7 @@ class LiveDrag:
         if not self.taken:
             raise InputError("no handle was taken; take one first")
         place = numbers(place, (3,), "the place of a handle")
-        began, error = time.perf_counter(), 0.0
+        began, error, path = time.perf_counter(), 0.0, tuple[tuple[float, Array], ...]()
         if self._drag is not None:
             try:
                 if self.taken in self.things:
@@ -130,11 +133,11 @@ class LiveDrag:
                 else:
                     frame = self._drag.to(place)
                     error = float(np.linalg.norm(self.place_at(frame.q, self.taken) - place))
-                self.q = np.array(frame.q)
+                self.q, path = np.array(frame.q), frame.path
                 self._subject.arrived()
             except WholebodyError as trouble:
                 self._trouble = str(trouble)
-        return self._report(error, time.perf_counter() - began)
+        return with_values(self._report(error, time.perf_counter() - began), path=path)
 
     def toggle(self, name: str) -> bool:
         """Hold a frame where it is, or release it; whether it is held now.

@@ -13,12 +13,12 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
+from wholebody.tracking.inner_paths import Timed
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
 from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps
 from wholebody.view.goal_markers import Goals, mark_frames
-from wholebody.view.inner_paths import Timed
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.style import LOOK, Color

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
+from wholebody.base.arrays import Array
 from wholebody.base.errors import WholebodyError
 from wholebody.tracking.frame import FRAME
 from wholebody.tracking.live import LiveDrag, LiveFrame
@@ -189,40 +190,53 @@ class LivePage:
             self._stopped.wait(max(FRAME - (time.perf_counter() - began), 0.001))
 
     def follow(self, target: Any) -> LiveFrame:
-        """Make one frame towards a place (3,) of the mouse, and show it."""
-        name, before = self.drag.taken, self.drag.q
-        place = self.drag.place(name)
-        frame = self.drag.move(target)
+        """Make one frame towards a place (3,) of the mouse, and show it, with the way within it."""
+        name, before, drag = self.drag.taken, self.drag.q, self.drag
+        place, things = drag.place(name), drag.scene.objects
+        began = things[name].placement if name in things else None
+        frame = drag.move(target)
         self.frames += 1
-        moved = max(np.abs(frame.q - before).max(), np.abs(self.drag.place(name) - place).max())
+        moved = max(np.abs(frame.q - before).max(), np.abs(drag.place(name) - place).max())
         still = moved < STILL
         if still:
             self._reached = target  # nothing to send until the mouse moves on
+        last = 0.0
+        for share, q in frame.path[1:-1]:
+            here = {} if began is None else {name: pin.SE3.Interpolate(began, things[name].placement, share)}
+            self._place(q, here)
+            self._stopped.wait((share - last) * FRAME)
+            last = share
         if self._settling:
             self._settling = 0 if still else self._settling - 1
             if not self._settling:
-                self.drag.let_go()
-                self._target, frame = None, self.drag.report()
+                drag.let_go()
+                self._target, frame = None, drag.report()
         self._show(frame)
         return frame
 
     def _show(self, frame: LiveFrame) -> None:
-        scene = self.drag.scene
-        data = scene.state(frame.q).data
-        with self.server.atomic():
-            for number, piece in enumerate(scene.geometry.geometryObjects):
-                place = data.oMi[piece.parentJoint] * piece.placement
-                known = self._sent.get(number)
-                if known is None or not place.isApprox(known, STILL):
-                    handle, self._sent[number] = self._pieces[number], place
-                    handle.position, handle.wxyz = place.translation, _wxyz(place)
-            for name, ball in self._handles.items():
-                ball.position = self.drag.place(name)
+        self._place(frame.q, {})
+        for name, ball in self._handles.items():
+            ball.position = self.drag.place(name)
         self._status.content = f"**{frame.status}**"
         self._numbers.content = (
             f"{frame.contacts} contacts, deepest overlap {1e3 * frame.overlap:.2f} mm  \n"
             f"handle off by {1e3 * frame.error:.1f} mm; frame {1e3 * frame.seconds:.1f} ms"
         )
+
+    def _place(self, q: Array, at: Mapping[str, pin.SE3]) -> None:
+        """Put the pieces where they are at a posture (nq,), and those of some things at other placements."""
+        scene = self.drag.scene
+        data = scene.state(q).data
+        with self.server.atomic():
+            for number, piece in enumerate(scene.geometry.geometryObjects):
+                place, owner = data.oMi[piece.parentJoint] * piece.placement, scene.piece_owner[number]
+                if owner in at:
+                    place = at[owner] * scene.objects[owner].placement.actInv(place)
+                known = self._sent.get(number)
+                if known is None or not place.isApprox(known, STILL):
+                    handle, self._sent[number] = self._pieces[number], place
+                    handle.position, handle.wxyz = place.translation, _wxyz(place)
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:

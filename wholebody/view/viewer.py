@@ -23,11 +23,11 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.newton.assembly import Assembly
 from wholebody.problem import Problem
+from wholebody.tracking.inner_paths import timed
 from wholebody.view.camera import look
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.gltf import posture_glb
-from wholebody.view.inner_paths import timed
 from wholebody.view.legend import panel
 from wholebody.view.movie import check_movie, counted, frame_times, movie
 from wholebody.view.page import live_page, static_page

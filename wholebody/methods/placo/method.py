@@ -22,11 +22,8 @@ from wholebody.scene.workspace import Workspace
 
 STEP = 0.1  # rad, m: largest motion of a joint or the root in one iteration; half of it takes a quarter longer
 NEAR = 0.1  # m: pairs nearer than this have a row; placo's trigger
-LET_IN = 0.4  # share of the tolerance by which pairs may be nearer than their clearance
 HOLDS = {"hard": 0.0, "soft": 100.0}
 """What `Placo.holds` may be -> the weight of holds as soft tasks, 0 for hard ones."""
-ON_THE_WAY = 1e-3  # m, rad: tolerance of the goals in frames of a motion before its end
-DECAY = 0.75  # of the measures' weight from one iteration to the next; less ends sooner and with more effort
 
 
 @dataclass(frozen=True)
@@ -50,7 +47,8 @@ class Placo(Checked, Descends):
             hard tasks contradict each other or what keeps pairs apart.
     """
 
-    on_the_way = ON_THE_WAY
+    # m, rad: tolerance of the goals in frames of a motion before its end
+    on_the_way = 1e-3
     tolerance: Tolerance = 1e-5
     iterations: Iterations = 200
     time_limit: TimeLimit = None
@@ -92,7 +90,8 @@ class Placo(Checked, Descends):
         with problem.scene.built.pool(_RobotCache, _RobotCache).borrow() as cache:
             robot = cache.robot(problem, workspace, self.pairs(problem))
             stepper = _Programs(problem, robot, self.tolerance, HOLDS[self.holds])
-            settings = Settings(self.tolerance, self.iterations, STEP, DECAY)
+            # of the measures' weight from one iteration to the next; less ends sooner and with more effort
+            settings = Settings(self.tolerance, self.iterations, STEP, 0.75)
             run = Iteration(problem, workspace, stepper, settings, control)
             run.go()
         failure = f"placo gave up at program {run.steps} ({run.failure})" if run.failure else ""
@@ -135,7 +134,8 @@ class _Programs:
         self._solver.enable_velocity_limits(True)
         apart = self._solver.add_avoid_self_collisions_constraint()
         # without it, rounding makes a held foot on a floor infeasible
-        apart.self_collisions_margin = -SWELL - LET_IN * tolerance
+        # share of the tolerance by which pairs may be nearer than their clearance
+        apart.self_collisions_margin = -SWELL - 0.4 * tolerance
         apart.self_collisions_trigger = NEAR - SWELL
         apart.configure("apart", "hard", 1.0)
 

@@ -26,13 +26,6 @@ from wholebody.tasks.approach import approached, has_face
 from wholebody.terms.linearisation import Lineariser
 
 IN_FRONT = 0.01  # m: how far surfaces are in front of faces; more: reached by fewer limbs, and farther from the contact
-ACCURACY = 1e-3  # m, rad: to which a descent goes; what is exact there is not where surfaces meet
-MET = 0.01  # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
-PROGRAMS = 40  # most programs of one descent
-TRIES = 24  # most descents, of which the first is from the start; of a driver in 30 one in ten is met
-AGREEING = 3  # ends that are the least and equally far: what is asked is out of reach, and others are no nearer
-AGREE = 1.1  # times the least violation up to which ends count as equally far
-SHARE = 0.5  # of the time limit that the descents may take
 
 
 def before_contact(
@@ -64,18 +57,23 @@ def before_contact(
     alone = lineariser.relaxed(ENDLESS)
     alone.take(goals, alone.clearances, constraints)
     start = problem.scene.figure.clamp(problem.start)
-    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), TRIES - 1)
+    # most descents, of which the first is from the start; of a driver in 30 one in ten is met
+    others = restarts(problem, lineariser.state, start, np.random.default_rng(seed), 24 - 1)
     ends, missed = list[float](), list[LocalSolution]()
     for q in chain([start], others):
         local = _descent(subproblem, alone, solver, trace, control).run(q)
-        if local.violation.worst <= MET:
+        # m, rad: nearer ends lead to the contacts; of the others, which take ten times as long, one in ten does
+        if local.violation.worst <= 0.01:
             yield with_values(local, iterations=local.iterations + sum(each.iterations for each in missed))
             missed = []
         else:
             missed.append(local)
             ends.append(local.violation.total)
-        alike = sum(end <= AGREE * min(ends) for end in ends) >= AGREEING
-        if alike or control.over or control.spent > SHARE:
+        # ends that are the least and equally far: what is asked is out of reach, and others are no nearer
+        # times the least violation up to which ends count as equally far
+        alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
+        # of the time limit that the descents may take
+        if alike or control.over or control.spent > 0.5:
             break
     if missed and not alike:
         nearest = min(missed, key=lambda each: each.violation.total)
@@ -85,12 +83,14 @@ def before_contact(
 def _descent(
     subproblem: Subproblem, alone: Lineariser, solver: QPSolver, trace: list[TraceEntry], control: Control
 ) -> SQP:
+    # m, rad: to which a descent goes; what is exact there is not where surfaces meet
+    # most programs of one descent
     return SQP(
         subproblem,
         alone,
         solver,
-        ACCURACY,
-        PROGRAMS,
+        1e-3,
+        40,
         trace=trace,
         note="before contact",
         full_step=True,

@@ -21,10 +21,7 @@ from wholebody.problem import Problem
 from wholebody.scene.workspace import Workspace
 
 CANCELLED = 0.1  # share of the deepest overlap below which what all normals together push with counts as none
-MOST_PAIRS = 16  # of pieces that overlap; more take longer to separate than other starts
 STEPS = 12  # most steps of least squares
-LONGEST_STEP = 0.2  # rad, m: of a degree of freedom in one of them
-DAMPING = 1e-3  # added to the squared singular values, m^2; more: steps fall short near stretched limbs
 ROOM = 1e-4  # m: that the two are moved apart beyond touching
 
 
@@ -45,7 +42,8 @@ def posture_apart(problem: Problem, workspace: Workspace, q: Array) -> Array | N
     for group in _groups(workspace, near):
         depth = -near.distance[group.rows]
         push = global_depth(depth, near.normal[group.rows])
-        if float(np.linalg.norm(push)) <= CANCELLED * float(depth.max()) and len(group.rows) <= MOST_PAIRS:
+        # of pieces that overlap; more take longer to separate than other starts
+        if float(np.linalg.norm(push)) <= CANCELLED * float(depth.max()) and len(group.rows) <= 16:
             way = _separation(workspace, near, group.owners)
             if way is not None:
                 return _moved(problem, workspace, q, group.joints, way)
@@ -92,8 +90,10 @@ def _moved(problem: Problem, workspace: Workspace, q: Array, joints: tuple[int, 
         turning = np.cross(here.translation, np.eye(3))
         wrenches = np.block([[np.eye(3), turning], [np.zeros((3, 3)), np.eye(3)]])
         rows = state.rows(wrenches, joint, against)
-        step = rows.T @ np.linalg.solve(rows @ rows.T + DAMPING * np.eye(6), error)
-        step *= min(1.0, LONGEST_STEP / max(float(np.abs(step).max()), ROOM))
+        # added to the squared singular values, m^2; more: steps fall short near stretched limbs
+        step = rows.T @ np.linalg.solve(rows @ rows.T + 1e-3 * np.eye(6), error)
+        # rad, m: of a degree of freedom in one of them
+        step *= min(1.0, 0.2 / max(float(np.abs(step).max()), ROOM))
         lower, upper = figure.tangent_bounds(q)
         for bound in problem.bounds:
             low, high = bound.bounds(state, None)

@@ -33,7 +33,6 @@ from wholebody.terms.linearisation import Lineariser
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
 LEAST_RADIUS = 1e-4
-UNIT = 1e-9  # by which rows of a wrench may differ from the axes of the world
 WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
 SHRINK = 0.3
 
@@ -183,7 +182,8 @@ def _add_kinematic_hessian(total: Array, state: State, part: Wrench, force: Arra
     if len(linear) != 3:
         return
     pull, point = force[:3], np.zeros(3)
-    if np.abs(linear[:, :3] - np.eye(3)).max() <= UNIT:
+    # by which rows of a wrench may differ from the axes of the world
+    if np.abs(linear[:, :3] - np.eye(3)).max() <= 1e-9:
         point = np.array([linear[1, 5], linear[2, 3], linear[0, 4]])
     elif not linear[:, :3].any():
         pull, moment = np.zeros(3), force[:3]

@@ -31,7 +31,6 @@ from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Lineariser
 
 SHORTER, LONGER = 0.7, 1.2  # factors of the box after a step back and after a step on
-SHORTEST = 0.3  # after a step to where a term of one's own is not finite
 AT_LIMIT = 1e-6  # rad
 
 
@@ -94,7 +93,8 @@ class Feasibility:
             if there is None:
                 if box < FEASIBILITY.least_step:
                     return _end(here, False, count)
-                box, last = SHORTEST * min(box, float(np.abs(step).max())), np.zeros_like(step)
+                # after a step to where a term of one's own is not finite
+                box, last = 0.3 * min(box, float(np.abs(step).max())), np.zeros_like(step)
                 continue
             here = there
             self._record(here, float(np.abs(step).max(initial=0.0)), "goal")

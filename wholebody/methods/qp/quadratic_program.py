@@ -19,9 +19,6 @@ from numpy.typing import NDArray
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
 
-MOST = 1e30
-"""Sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite."""
-
 
 class QuadraticProgram(NamedTuple):
     """Data of one program in n variables; compiled loops take it as it is.
@@ -78,7 +75,8 @@ class QuadraticProgram(NamedTuple):
             bounds = bounds[~np.isinf(bounds)]  # one of these may be missing
             largest = curvature.sum() + targets + self.linear @ self.linear + bounds @ bounds
             least = min(part.min(initial=np.inf) for part in (self.diagonal, self.weight, self.elastic_weight))
-            return bool(largest < MOST and least > 0.0 and (self.lower <= self.upper).all())
+            # sum of the squares in a program from which on it is not solved: solvers take 1e30 for infinite.
+            return bool(largest < 1e30 and least > 0.0 and (self.lower <= self.upper).all())
 
     @property
     def size(self) -> int:

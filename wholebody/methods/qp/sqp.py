@@ -32,7 +32,6 @@ from wholebody.solution import TraceEntry
 from wholebody.terms.linearisation import Linearisation, Lineariser
 
 LEAST_RADIUS = 1e-7
-BENT = 1e-2  # share of a gain that is worth a step, where its curvature is known
 
 
 @dataclass
@@ -180,7 +179,8 @@ class SQP:
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
                 saved -= multipliers.change(program, parts.tangential)
             bent = here.at.planes is not None and len(here.at.planes.bend)
-            flat = saved / self._gain <= (BENT if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
+            # share of a gain that is worth a step, where its curvature is known
+            flat = saved / self._gain <= (1e-2 if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
             flat = flat and self.subproblem.violation(here.rows, parts.normal).total <= here.violation.total
             x = parts.normal if flat else x  # what is asked is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total

@@ -29,8 +29,6 @@ from wholebody.problem import Problem
 from wholebody.terms.linearisation import Linearisation
 from wholebody.terms.planes import TermPlanes
 
-PLANE_KEYS = -(1 << 40)  # keys of supporting planes are below this, out of the way of all others
-
 _NONE = np.zeros(0)
 
 
@@ -41,12 +39,13 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     """
     count = len(planes.value)
     weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
+    # keys of supporting planes are below this, out of the way of all others
     return with_values(
         rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
         elastic_violation=np.concatenate([rows.elastic_violation, planes.value]),
         contact=np.concatenate([rows.contact, np.full(count, -1, dtype=np.intp)]),
-        key=np.concatenate([rows.key, PLANE_KEYS - planes.key]),
+        key=np.concatenate([rows.key, -(1 << 40) - planes.key]),
         elastic_weight=np.concatenate([rows.elastic_weight, weights[np.minimum(planes.row, rows.goals)]]),
     )
 

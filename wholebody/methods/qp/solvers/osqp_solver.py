@@ -23,9 +23,7 @@ from wholebody.methods.qp.settings import CORRECTIONS
 from wholebody.methods.qp.solvers.base import ACTIVE_SET, QPSolver
 from wholebody.methods.qp.solvers.split_form import SCALING, compiled_kernel, read_active, slots_for
 
-RHO = 0.1  # OSQP's step length at the beginning; it adapts
 ROUNDS = (25, 50, 100, 200, 400)  # iterations, until an active set read off the multipliers settles
-HOT_ROUNDS = 2  # of them with a hot start: more take several times as long as semismooth Newton steps
 EXTENSION = "osqp.ext_builtin"
 
 
@@ -56,7 +54,8 @@ class OSQPSolver(QPSolver):
         """Minimise; see `QPSolver.solve_cold`."""
         workspace = self.workspace(program)
         iterations = 0
-        for limit in ROUNDS[:HOT_ROUNDS] if self.hot_start else ROUNDS:
+        # of them with a hot start: more take several times as long as semismooth Newton steps
+        for limit in ROUNDS[:2] if self.hot_start else ROUNDS:
             iterations += workspace.run(limit)
             solution = solve_from(program, workspace.active(), CORRECTIONS.of_guess)
             if solution is not None:
@@ -122,7 +121,8 @@ class Workspace:
         settings = self._settings = osqp.OSQPSettings()
         osqp.osqp_set_default_settings(settings)
         settings.verbose, settings.scaling, settings.polishing = False, 0, False
-        settings.warm_starting, settings.rho, settings.adaptive_rho = True, RHO, 1
+        # OSQP's step length at the beginning; it adapts
+        settings.warm_starting, settings.rho, settings.adaptive_rho = True, 0.1, 1
         settings.check_termination, settings.max_iter = 0, ROUNDS[0]
         self._solver: Any = osqp.OSQPSolver(
             osqp.CSC(objective), self.gradient, osqp.CSC(matrix), self.low, self.high, size, size, settings

@@ -16,9 +16,6 @@ from wholebody.methods.qp.quadratic_program import QuadraticProgram
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, NativeSolver
 from wholebody.methods.qp.solvers.split_form import SCALING
 
-TOLERANCE = 1e-5  # of the optimality conditions; the active set is then corrected
-LIMIT = 100  # iterations
-
 
 class PIQPSolver(NativeSolver):
     """PIQP with a workspace that lives on; an interior-point method begins anew in each program."""
@@ -32,7 +29,9 @@ class PIQPSolver(NativeSolver):
         if self._workspace is None:
             self._workspace = piqp.DenseSolver()
             settings = self._workspace.settings
-            settings.eps_abs, settings.eps_rel, settings.max_iter = TOLERANCE, 0.0, LIMIT
+            # of the optimality conditions; the active set is then corrected
+            # iterations
+            settings.eps_abs, settings.eps_rel, settings.max_iter = 1e-5, 0.0, 100
             # the set is read where it is plain, long before the gap closes; rows have one scale already
             settings.check_duality_gap, settings.preconditioner_iter = False, 0
             self._workspace.setup(**data)

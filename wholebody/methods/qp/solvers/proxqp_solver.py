@@ -9,8 +9,6 @@ from wholebody.methods.qp.quadratic_program import SplitForm
 from wholebody.methods.qp.solvers.native_solver import NativeAnswer, SplitFormSolver
 
 FAR = 1e20  # ProxQP's infinity
-TOLERANCE = 1e-6  # of the optimality conditions; the active set is then corrected
-LIMIT = 200  # outer iterations
 
 
 class ProxQPSolver(SplitFormSolver):
@@ -27,8 +25,10 @@ class ProxQPSolver(SplitFormSolver):
         )  # fmt: skip
         if self._workspace is None:
             solver = proxqp.dense.QP(size, m, slots, True, proxqp.dense.HessianType.Diagonal)
-            solver.settings.eps_abs, solver.settings.eps_rel = TOLERANCE, 0.0
-            solver.settings.max_iter = LIMIT
+            # of the optimality conditions; the active set is then corrected
+            solver.settings.eps_abs, solver.settings.eps_rel = 1e-6, 0.0
+            # outer iterations
+            solver.settings.max_iter = 200
             solver.settings.initial_guess = proxqp.InitialGuess.NO_INITIAL_GUESS
             solver.init(*data)
         else:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.tracking.inner_paths import resampled, timed
 from wholebody.tracking.loop import follow
+from wholebody.tracking.track_files import read_track, write_track
 from wholebody.tracking.tracks import Track
-from wholebody.view.inner_paths import timed
 
 DT = 0.1
 
@@ -31,6 +34,22 @@ def test_the_postures_within_a_frame_stand_at_their_shares_of_it() -> None:
     assert found.times[[0, 1, 3]] == pytest.approx([0.0, 0.25 * DT, DT])
     assert (np.diff(found.times) > 0.0).all()
     assert found.frames == [0, 1, 1, 1]
+
+
+def test_a_file_of_a_motion_goes_along_its_paths(planar_arm, tmp_path) -> None:
+    """A reader who goes straight from row to row meets the postures within frames at their times."""
+    arm = planar_arm((0.5, 0.4, 0.3))
+    start, inner, other, end = (np.array((0.02 * angle, 0.2, 0.2)) for angle in (0, 3, 5, 1))
+    way = ((0.0, start), (0.3, inner), (0.55, other), (1.0, end))
+    motion = SimpleNamespace(q=np.array((start, end, end)), dt=DT, paths=((), way, ()))
+    track = read_track(write_track(resampled(arm, motion), tmp_path / "way.csv"), arm)
+    for share, q in way:
+        place = share * DT / track.dt
+        rows = track.q[int(place)], track.q[min(int(place) + 1, len(track) - 1)]
+        assert rows[0] + (place - int(place)) * (rows[1] - rows[0]) == pytest.approx(q, abs=1e-3)
+    assert (len(track) - 1) * track.dt == pytest.approx(2 * DT)
+    straight = SimpleNamespace(q=motion.q, dt=DT)
+    np.testing.assert_array_equal(resampled(arm, straight).q, motion.q)
 
 
 def test_as_many_paths_as_postures() -> None:
