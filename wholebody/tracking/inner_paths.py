@@ -16,7 +16,6 @@ from wholebody.figures.figure import Figure
 from wholebody.tracking.tracks import Track, check_figure
 
 NEAR = 1e-3  # m, rad: from the track to a posture of a path at its time
-FINEST = 64  # rows a frame
 
 
 class Timed(NamedTuple):
@@ -95,7 +94,8 @@ def resampled(figure: Figure, motion: Any, name: str = "track") -> Track:
             float(np.abs(pin.difference(model, _between(model, rows, time * finer / dt), q)).max())
             for time, q in zip(given.times, given.q, strict=True)
         )
-        if left <= NEAR or finer == FINEST:
+        # rows a frame
+        if left <= NEAR or finer == 64:
             break
         finer *= 2
         at = np.interp(np.arange((len(plain.q) - 1) * finer + 1) * dt / finer, given.times, np.arange(len(given.q)))
