@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 import wholebody as wb
+from wholebody.bench.suite.adapters.registry import adapters
 from wholebody.methods import METHODS
 from wholebody.methods.base import Method, UnsupportedTermError
 from wholebody.methods.solve import method_named
@@ -84,3 +87,30 @@ def test_a_drag_uses_a_method_by_its_protocol_alone(name: str, scene: wb.Scene) 
         drag = wb.Drag(wb.Problem(scene, [0.1, 0.2, 0.3], goals=[wb.Point("tip", there)]), one)
         found.append([drag.to(there + (0.0, 0.01 * k, 0.0)).q for k in range(3)])
     assert np.array_equal(found[0], found[1])
+
+
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [
+        ("no_module_of_this_name:Kind", "cannot be imported"), ("json:Nothing", "cannot be imported"),
+        ("json:loads", "no class with solve"), ("json:JSONDecoder", "no class with solve"),
+    ],
+)  # fmt: skip
+def test_a_method_that_cannot_be_imported_is_refused_in_one_sentence(name, told):
+    with pytest.raises(wb.InputError, match=told) as refused:
+        method_named(name)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_method_of_ones_own_by_the_name_of_its_module(tmp_path, monkeypatch):
+    """`solve` and comparisons take it by "module:Class"; budgets go to the arguments that it has."""
+    example = Path(__file__).parents[2] / "examples" / "own_method.py"
+    (tmp_path / "mine_alone.py").write_text(example.read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("sys.path", list(sys.path))
+    name = "mine_alone:JacobianTranspose"
+    problem = wb.Problem(wb.Scene(wb.load("avatar")), goals=[wb.Point("right_palm", (0.4, -0.3, 1.1))])
+    assert wb.solve(problem, name).solved
+    (adapter,) = adapters([name])
+    assert adapter.name == name
+    assert adapter.make(1e-2, 7) == type(method_named(name))(tolerance=1e-2, iterations=7)

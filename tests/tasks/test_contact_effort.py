@@ -14,7 +14,8 @@ from wholebody.tasks.kinks import MOST_FACES
 AS_CHEAP = 1.02  # times the effort at the place
 STATIONARY = 1e-2  # rad, m
 CASES = {
-    "frame on an edge": (wb.Touch("right_index_tip", "thing"), 3),
+    "frame on an edge": (wb.Touch("right_index_tip", "thing"), 10),
+    "piece on an edge": (wb.Touch("right_hand:2", "thing"), 2),
     "segment across an edge": (wb.Touch("right_hand", "thing"), 7),  # no face has the normal of two edges that cross
     "palm on a box": (wb.Grasp("right", "thing"), 5),
 }
@@ -44,7 +45,7 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY
     scene, touch = problem.scene, problem.goals[0]
-    frame = term.frame
+    frame = term.frame.partition(":")[0]
     place = scene.state(solution.q).frame(scene.figure.frame_id(frame))
     point = touch.nearest_points(scene.state(solution.q)) if isinstance(touch, wb.Touch) else place.translation
     goal: wb.Goal = wb.Point(frame, point, offset=place.actInv(point))
@@ -53,13 +54,18 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
 
 
+SEATS = {"with a back": (-0.35, 0.05, 0.42), "without": (-0.425, 0.179, 0.347)}
+
+
 @pytest.mark.filterwarnings("ignore:nothing holds the figure")
-def test_a_seat_is_sat_on_where_it_is_cheapest() -> None:
-    """The pelvis ends at the edge of its room over the seat, where the rows of that room have a kink."""
+@pytest.mark.parametrize("name", SEATS)
+def test_a_seat_is_sat_on_where_it_is_cheapest(name: str) -> None:
+    """The pelvis ends at the edge of its room over the seat or of the seat, where its rows have kinks."""
+    x, y, top = SEATS[name]
     scene = wb.Scene(wb.load("human", sex="male"))
-    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(-0.35, 0.05, 0.40))
-    scene.add(wb.Box((0.03, 0.48, 0.36)), name="back", at=(-0.57, 0.05, 0.84))
-    solution = wb.solve(wb.Problem(scene, goals=[wb.Sit("seat", "back")]))
+    scene.add(wb.Box((0.44, 0.48, 0.04)), name="seat", at=(x, y, top - 0.02))
+    scene.add(wb.Box((0.03, 0.48, 0.36)), name="back", at=(x - 0.22, y, top + 0.42))
+    solution = wb.solve(wb.Problem(scene, goals=[wb.Sit("seat", "back" if name == "with a back" else None)]))
     assert solution.status == "solved"
     assert solution.assessment.optimality < STATIONARY
 
@@ -105,7 +111,7 @@ def test_derivatives_of_supporting_planes(name: str) -> None:
         np.testing.assert_allclose((found[0] - found[1]) / (2.0 * half), planes.jacobian[faces] @ way, atol=6e-3)
 
 
-def test_planes_hold_where_a_contact_is_made_and_bend_as_a_sphere_does() -> None:
+def test_planes_hold_where_a_contact_is_made_and_bend_as_spheres_do() -> None:
     figure = wb.load("human")
     q = figure.posture("standing")
     tip = figure.placement(q, "right_index_tip").translation
@@ -115,11 +121,19 @@ def test_planes_hold_where_a_contact_is_made_and_bend_as_a_sphere_does() -> None
     np.testing.assert_allclose(faces, [-0.2, -0.15, -0.12, -0.08, -0.05, 0.0], atol=1e-8)
     round_scene = wb.Scene(figure).add(wb.Sphere(0.05), name="ball", at=tip + (0.0, 0.0, -0.05))
     touch = wb.Touch("right_index_tip", "ball").resolve(round_scene, q)
-    bend = touch.supporting_planes(round_scene.state(q)).bend
-    row = round_scene.state(q).dense_jacobian(
-        wb.Point("right_index_tip", tip).resolve(round_scene, q).jacobian(round_scene.state(q))
-    )
-    np.testing.assert_allclose(bend.T @ bend, row[:2].T @ row[:2] / 0.05, atol=0.3)
+    state = round_scene.state(q)  # the end of the finger and the ball roll on each other
+    bend = touch.supporting_planes(state).bend
+    finger = round_scene.geometry.geometryObjects[round_scene.geometry.getGeometryId("right_hand:2")]
+    ends = [np.array((0.0, 0.0, sign * finger.geometry.halfLength)) for sign in (1.0, -1.0)]
+    of_finger = state.data.oMi[finger.parentJoint] * finger.placement
+    middle = min((of_finger.act(end) for end in ends), key=lambda end: float(np.linalg.norm(end - tip)))
+    place = state.frame(figure.frame_id("right_index_tip"))
+    rolling = wb.Point("right_index_tip", middle, offset=place.actInv(middle)).resolve(round_scene, q)
+    row = state.dense_jacobian(rolling.jacobian(state))
+    arm = middle - (tip + (0.0, 0.0, -0.05))
+    apart = float(np.linalg.norm(arm))
+    across = np.eye(3) - np.outer(arm, arm) / apart**2
+    np.testing.assert_allclose(bend.T @ bend, row.T @ across @ row / apart, atol=0.02)
 
 
 def test_more_time_buys_a_lower_minimum() -> None:

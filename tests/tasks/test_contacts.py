@@ -41,7 +41,6 @@ TERMS = {
     "palm": wb.Grasp("left", "box"),
     "palm_side": wb.Grasp("right_hand", "box", side=(0, 0, 1)),
     "power": wb.Grasp("right", "bar", "power"),
-    "pinch": wb.Grasp("right", "bar", "pinch"),
 }
 HALF = 2e-6  # m, rad: half of a difference; coal's distances are good to 1e-9
 
@@ -77,9 +76,31 @@ def test_touch_is_the_signed_distance(depth: float) -> None:
     scene = wb.Scene(figure).add(wb.Sphere(0.2), name="ball", at=tip + (0.2 + depth) * way)
     touch = wb.Touch("right_index_tip", "ball").resolve(scene, q)
     state = scene.state(q)
-    assert touch.value(state)[0] == pytest.approx(depth, abs=1e-8)
+    assert touch.value(state)[0] == pytest.approx(depth, abs=1e-5)  # the end of the finger may be a little turned
     point = wb.Point("right_index_tip", (0, 0, 0)).resolve(scene, q)
     np.testing.assert_allclose(touch.jacobian(state)[0], -way @ state.wrench_jacobian(point.jacobian(state)), atol=1e-5)
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.03, 0.3])
+def test_a_frame_touches_where_the_round_end_of_its_piece_does(turn: float) -> None:
+    """Between two balls: as far as the frame is 8e-6 m off where they meet, else it is the frame that is to touch."""
+    figure, ball = wb.load("human"), 0.2
+    q = figure.posture("standing")
+    tip = figure.placement(q, "right_index_tip")
+    state, finger = State(figure.model).update(q), figure.geometry.getGeometryId("right_hand:2")
+    piece = figure.geometry.geometryObjects[finger]
+    end = state.data.oMi[piece.parentJoint] * piece.placement
+    middle = end.translation + piece.geometry.halfLength * end.rotation[:, 2]
+    radius = float(np.linalg.norm(tip.translation - middle))
+    assert radius == pytest.approx(piece.geometry.radius, abs=1e-9)
+    pointing = (tip.translation - middle) / radius
+    aside = np.cross(pointing, (1.0, 0.0, 0.0)) / np.linalg.norm(np.cross(pointing, (1.0, 0.0, 0.0)))
+    center = middle + (ball + radius) * (np.cos(turn) * pointing + np.sin(turn) * aside)
+    scene = wb.Scene(figure).add(wb.Sphere(ball), name="ball", at=center)
+    touch = wb.Touch("right_index_tip", "ball").resolve(scene, q)
+    apart = float(np.linalg.norm(tip.translation - center)) - ball
+    asked = 0.0 if turn < 0.1 else apart - 8e-6
+    assert touch.value(scene.state(q))[0] == pytest.approx(asked, abs=1e-8)
 
 
 def test_touch_of_a_segment_is_coals_least_distance(scene: wb.Scene) -> None:
@@ -228,6 +249,7 @@ def test_other_methods_refuse_by_name(scene: wb.Scene, method: str) -> None:
         (lambda: wb.Grasp("middle", "box"), "'left' or 'right'"),
         (lambda: wb.Grasp("left", "floor", "power"), "no end"),
         (lambda: wb.Grasp("left", "box", "claw"), "palm"),
+        (lambda: wb.Grasp("left", "bar", "pinch"), "one piece; load the person with hands='fingers'"),
         (lambda: wb.Lean("backrest", side=(0, 0, 0)), "no direction"),
     ],
 )

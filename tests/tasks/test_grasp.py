@@ -13,6 +13,7 @@ import wholebody as wb
 
 FEET = [wb.Hold("left_foot"), wb.Hold("right_foot")]
 AT = (0.40, -0.2, 1.1)
+FOUR = ("index", "middle", "ring", "little")
 
 
 @pytest.fixture(scope="module")
@@ -24,8 +25,8 @@ def _start(figure: wb.Figure) -> Any:
     return figure.with_joints(figure.posture("standing"), {"right_elbow_flexion": np.radians(80.0)})
 
 
-def _normal(scene: wb.Scene, q: Any, pieces: str) -> Any:
-    """Of the nearest contact of pieces, by the beginning of their names, with the thing."""
+def _normal(scene: wb.Scene, q: Any, pieces: str | tuple[str, ...]) -> Any:
+    """Of the nearest contact of pieces, by the beginnings of their names, with the thing."""
     data = scene.model.createData()
     pin.forwardKinematics(scene.model, data, q)
     best, request = None, coal.DistanceRequest()
@@ -61,9 +62,39 @@ def test_thumb_and_fingers_oppose(figure: wb.Figure, kind: Any, shape: Any) -> N
     grasp = wb.Grasp("right", "thing", kind)
     solution = wb.solve(wb.Problem(scene, start=_start(figure), goals=[grasp], constraints=FEET))
     assert solution.status == "solved", solution.message
-    fingers = ("index",) if kind == "pinch" else ("index", "middle", "ring", "little")
+    fingers = ("index",) if kind == "pinch" else FOUR
     mean = np.sum([_normal(scene, solution.q, f"right_{finger}_distal") for finger in fingers], axis=0)
     assert _apart(_normal(scene, solution.q, "right_thumb_distal"), mean) > 135.0 - 0.1
+
+
+def _outer(finger: str) -> tuple[str, ...]:
+    inner = "proximal" if finger == "thumb" else "middle"
+    return f"right_{finger}_{inner}", f"right_{finger}_distal"
+
+
+@pytest.mark.parametrize(
+    "shape",
+    [wb.Sphere(0.015), wb.Sphere(0.035), wb.Sphere(0.04), wb.Capsule(0.0125, 0.3), wb.Capsule(0.025, 0.3)],
+    ids=["ball 30 mm", "ball 70 mm", "ball 80 mm", "rod 25 mm", "rod 50 mm"],
+)
+def test_in_a_power_grip_the_thumb_opposes_the_fingers(figure: wb.Figure, shape: Any) -> None:
+    scene = wb.Scene(figure).add(shape, name="thing", at=AT)
+    problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
+    solution = wb.solve(problem)
+    assert solution.status == "solved", solution.message
+    mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
+    assert _apart(_normal(scene, solution.q, _outer("thumb")), mean) > 135.0 - 0.1
+
+
+def test_around_a_thin_bar_thumb_and_fingers_oppose_the_palm(figure: wb.Figure) -> None:
+    scene = wb.Scene(figure).add(wb.Capsule(0.007, 0.3), name="thing", at=AT)
+    problem = wb.Problem(scene, start=_start(figure), goals=[wb.Grasp("right", "thing", "power")], constraints=FEET)
+    solution = wb.solve(problem)
+    assert solution.status == "solved", solution.message
+    palm = _normal(scene, solution.q, "right_hand")
+    mean = np.sum([_normal(scene, solution.q, _outer(finger)) for finger in FOUR], axis=0)
+    for side in (mean, _normal(scene, solution.q, _outer("thumb"))):
+        assert _apart(palm, side) > 135.0 - 0.1
 
 
 def test_fingers_on_one_side_do_not_oppose(figure: wb.Figure) -> None:

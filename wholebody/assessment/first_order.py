@@ -134,7 +134,7 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
         terms: list[Goal | Constraint] = [*asked.goals, *asked.constraints]
         for term in terms:
             if (planes := term.supporting_planes(state)) is not None:
-                near = (planes.value >= -ACTIVE - planes.slack) & (planes.value <= ACTIVE)
+                near = np.abs(planes.value) <= ACTIVE
                 one_sided.add(-planes.jacobian[near], [("constraint", ("",))] * int(near.sum()))
     else:
         objective = sum((goal.weight * error @ jacobian for error, jacobian, goal in goals), np.zeros(nv))

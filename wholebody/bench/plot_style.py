@@ -126,6 +126,8 @@ def plain_log(axis: Any) -> None:
 
     class Plain(LogLocator):
         def tick_values(self, vmin: float, vmax: float) -> Any:
+            if not vmin > 0.0:
+                return ()  # an axis without data
             wide = vmax > 10.0**2.6 * vmin  # beyond, the labels of 2 and 5 would overlap their neighbours
             self.set_params(subs=(1.0,) if wide else (1.0, 2.0, 5.0))
             return super().tick_values(vmin, vmax)

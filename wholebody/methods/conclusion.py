@@ -94,7 +94,8 @@ def concluded(
         why += f"; {ending.caveat}"
     said = why or control.message(judgement) or _message(problem, status, judgement, ending, enough)
     note = f"; {problem.left_out}" if problem.left_out else ""
-    after = (judgement.in_the_way, _way_out(problem, judgement), ending.remark, _undefined(status, control), note)
+    blocked = "" if status == "solved" else judgement.in_the_way
+    after = (blocked, _way_out(problem, judgement), ending.remark, _undefined(status, control), note)
     return Solution(
         q=ending.q,
         status=status,

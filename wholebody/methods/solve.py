@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import sys
 import warnings
+from collections.abc import Callable
+from importlib import import_module
 
 import numpy as np
 
 from wholebody.base.checks import function, shown
-from wholebody.base.errors import InputError, UnknownNameError
+from wholebody.base.errors import InputError, UnknownNameError, one_line
 from wholebody.methods import METHODS
 from wholebody.methods.base import Method
 from wholebody.methods.control import Progress
@@ -15,16 +19,20 @@ from wholebody.methods.inputs import check_problem
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
+PROTOCOL = "solve", "tracker", "accepts"
 FLOWN = 0.3  # m: a root that moved farther than this was carried to the goals; a person who bends moves it less
 AT_THE_END = 1e-5  # m, rad: tolerance of the goals at the end of a motion
 
 
 def method_named(name: str) -> Method:
-    """A method with its default settings.
+    """A method with its default settings, or one of one's own as "module:Class".
 
     Raises:
         UnknownNameError: there is no such method.
+        InputError: the module or its class cannot be imported, or is no method.
     """
+    if ":" in name:
+        return as_method(imported(name)())
     if name == "qp":
         from wholebody.methods.qp.method import QP
 
@@ -48,6 +56,25 @@ def method_named(name: str) -> Method:
     raise UnknownNameError("method", name, METHODS)
 
 
+def imported(name: str) -> Callable[..., Method]:
+    """The class of a method of one's own, from "module:Class"; modules are looked for in the working folder too.
+
+    Raises:
+        InputError: the module or its class cannot be imported, or is no class of methods.
+    """
+    module, _, kind = name.partition(":")
+    if os.getcwd() not in sys.path:
+        sys.path.append(os.getcwd())
+    try:
+        found = getattr(import_module(module), kind)
+    except Exception as error:  # whatever the module raises
+        told = one_line(f"{type(error).__name__}: {error}")
+        raise InputError(f"method {name!r} cannot be imported ({told}); give 'module:Class'") from None
+    if not isinstance(found, type) or not all(callable(getattr(found, part, None)) for part in PROTOCOL):
+        raise InputError(f"method {name!r} is no class with solve, tracker and accepts; derive it from wb.Method")
+    return found
+
+
 def as_method(given: object) -> Method:
     """A method from its name, or a configured one as it is.
 
@@ -57,7 +84,7 @@ def as_method(given: object) -> Method:
     """
     if isinstance(given, str):
         return method_named(given)
-    parts = (getattr(given, name, None) for name in ("solve", "tracker", "accepts"))
+    parts = (getattr(given, name, None) for name in PROTOCOL)
     if isinstance(given, type) or not all(map(callable, parts)) or not hasattr(given, "name"):
         raise InputError(f"method is {shown(given)}; give a name such as 'qp', or a method such as wb.QP()")
     return given  # type: ignore[return-value]

@@ -50,8 +50,8 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
         state: at the start.
 
     Returns:
-        Its axes are the ring's own, the direction outwards in the ring's plane, and that of the rim; `half` the size of
-        what counts as straight.
+        Its axes are the ring's own, the direction outwards in the ring's plane, and that of the rim; `half` is half the
+        rim's thickness along the ring's axis, twice, and half the size of what counts as straight.
     """
     if len(thing.shapes) < 8:  # least number of pieces of a ring
         return None
@@ -78,25 +78,31 @@ def rim_of(thing: Surface, outwards: Array, state: State) -> Face | None:
     e = level / np.linalg.norm(level)
     at = thing.placed(0, state)
     local = np.array([n, e, np.cross(n, e)]) @ at.rotation
+    shapes = [(shape, thing.placed(k, state)) for k, shape in enumerate(thing.shapes)]
+    ends = [np.concatenate([outermost(shape, place, way) @ n for shape, place in shapes]) for way in (n, -n)]
+    thick = 0.5 * float(ends[0].max() - ends[1].min())
     # share of a ring's radius along which its rim counts as straight: it turns by 14 degrees
-    return Face(thing, at.actInv(center + radius * e), local, np.array([0.0, 0.0, 0.25 * radius]))
+    return Face(thing, at.actInv(center + radius * e), local, np.array([thick, thick, 0.25 * radius]))
 
 
 class Crossing(NamedTuple):
     """A bar that crosses the palm: one row across the palm, and one along the bar that is zero within its room [m].
 
-    The first row is x . w, with x the axis of the fingers and w the way from the palm to the bar's axis.
+    The first row is what x . w has beyond its room, with x the axis of the fingers and w the way from the palm's middle
+    to the bar's axis.
 
     Attributes:
         place: the palm.
         bar: the bar.
         low, high: where along it the palm may be, from its middle [m].
+        across: largest x . w, either way [m].
     """
 
     place: Place
     bar: Face
     low: float
     high: float
+    across: float = 0.0
 
     @property
     def in_radians(self) -> tuple[bool, ...]:
@@ -106,14 +112,17 @@ class Crossing(NamedTuple):
     def rows(self, state: State) -> tuple[Array, Array]:
         """The two rows, and wrenches."""
         value, rows = self._all(state)
-        excess = value[1] - float(np.clip(value[1], -self.high, -self.low))
-        held = bool(excess) or self.low == self.high
-        return np.array([value[0], excess]), np.array([rows[0], rows[1] if held else np.zeros_like(rows[1])])
+        low, high = np.array([-self.across, -self.high]), np.array([self.across, -self.low])
+        excess = value - np.clip(value, low, high)
+        return excess, np.where(((excess != 0.0) | (low == high))[:, None], rows, 0.0)
 
     def planes(self, state: State) -> SupportingPlanes:
-        """The ends of the room along the bar."""
+        """The ends of the room along the bar, and those across the palm where it has room."""
         value, rows = self._all(state)
-        return one_sided(np.array([value[1] + self.low, -value[1] - self.high]), np.array([rows[1], -rows[1]]))
+        ends = np.array([value[1] + self.low, -value[1] - self.high])
+        across = np.array([value[0] - self.across, -value[0] - self.across])
+        sides = 4 if self.across else 2
+        return one_sided(np.r_[ends, across][:sides], np.vstack([rows[1], -rows[1], rows[0], -rows[0]])[:sides])
 
     def _all(self, state: State) -> tuple[Array, Array]:
         """What is across the palm and how far the bar's middle is along the bar (2,), and their derivative (2, nv)."""

@@ -66,8 +66,6 @@ class SupportingPlanes(NamedTuple):
         value: (k,) [m].
         jacobian: (k, nv) their derivative.
         key: (k,) numbers that name a plane from one posture to the next, each less than `MOST_PLANES`.
-        slack: (k,) what the tolerance to which terms are met leaves: a plane is at work where its value is above -slack
-            [m].
         bend: (b, nv) rows b with the second derivatives of the term's rows as sums of b' b, where they are positive.
         bend_row: (b,) the row of the term that a bend is of.
     """
@@ -75,7 +73,6 @@ class SupportingPlanes(NamedTuple):
     value: Array
     jacobian: Array
     key: Indices
-    slack: Array
     bend: Array
     bend_row: Indices
 

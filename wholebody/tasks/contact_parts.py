@@ -18,7 +18,7 @@ from wholebody.figures.state import State
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes
 from wholebody.tasks.inputs import Place
-from wholebody.tasks.kinks import MOST_FACES, bends, edge_normals, faces_met
+from wholebody.tasks.kinks import MOST_FACES, bends, crossed_edges, faces_met
 from wholebody.tasks.surfaces import Face, Nearest, Surface, foot, nearest
 
 FOOT_STEP = 1e-4  # m: of the difference that tells how the nearest point moves; coal has it to 1e-9
@@ -49,23 +49,46 @@ class RoundEnd(NamedTuple):
     """A point on the round surface of its own piece, which touches there only where the two normals are opposed.
 
     With c the centre of curvature, p the point and P(c) the point of the other surface nearest to c, they are where
-    p = P(c). The distance of the piece says so to second order alone, by r (1 - cos t) for an angle t: its derivative
-    vanishes there. The two rows t_k . (p - P(c)) do not.
+    p = P(c). The distances of point and piece say so to second order alone, by r (1 - cos t) for an angle t: their
+    derivatives are the same there. The two rows t_k . (p - P(c)) do not vanish. They may be as large as leaves the
+    point at most `ROUND_DEPTH` off where the piece touches; within that, the distance is that of the piece.
 
     Attributes:
-        center: (3,) c in the axes of the joint [m].
+        middle: c as a surface.
+        radius: of the piece [m].
         across: (2, 3) t_k, two directions in the axes of the joint, along the surface at the point.
-        room: what the rows may be for the piece to be inside by `ROUND_DEPTH` [m].
     """
 
-    center: Array
+    middle: Surface
+    radius: float
     across: Array
-    room: float
+
+    @property
+    def room(self) -> float:
+        """What the rows may be in any direction along the surface [m]."""
+        return float(np.sqrt(2.0 * self.radius * ROUND_DEPTH))
+
+    def nearest(self, near: Nearest, other: Surface, state: State) -> Nearest:
+        """The nearest points of the piece and the other surface where the point is about there, else of the point.
+
+        Args:
+            near: of the point.
+            other: surface.
+            state: at the posture.
+        """
+        of_middle = nearest(self.middle, other, state)
+        distance = max(of_middle.distance - self.radius, near.distance - ROUND_DEPTH)
+        return with_values(of_middle if distance > near.distance - ROUND_DEPTH else near, distance=distance)
+
+    def bends(self, other: Surface, state: State) -> Array:
+        """Wrenches (b, 6) of how the distance of the piece bends: see `kinks.bends`."""
+        turned = bends(self.middle, other, nearest(self.middle, other, state), state, self.radius)
+        return through(self.middle.placed(0, state).translation, turned)
 
     def rows(self, point: Surface, other: Surface, near: Nearest, state: State) -> tuple[Array, Array]:
         """Values (2,) and derivatives (2, nv)."""
-        place = state.data.oMi[near.against]
-        tip, center, across = point.placed(0, state).translation, place.act(self.center), self.across @ place.rotation.T
+        place, center = state.data.oMi[near.against], self.middle.placed(0, state).translation
+        tip, across = point.placed(0, state).translation, self.across @ place.rotation.T
         there = foot(other, near.pieces[1], center, state)
         moves = np.array([foot(other, near.pieces[1], center + FOOT_STEP * way, state) - there for way in across])
         arm = tip - there
@@ -96,6 +119,8 @@ class Gap(NamedTuple):
     def rows(self, state: State) -> tuple[Array, Array]:
         """The distance, and a force along the normal."""
         near = nearest(self.first, self.second, state)
+        if self.end is not None:
+            near = self.end.nearest(near, self.second, state)
         wrench = through(near.point, near.normal[None])
         return np.array([near.distance]), _between(state, wrench, near.joint, near.against)
 
@@ -104,7 +129,7 @@ class Gap(NamedTuple):
         near = nearest(self.first, self.second, state)
         if near.distance > PLANES_WITHIN:
             return no_planes(state.model.nv)
-        edges = edge_normals(self.first, self.second, near, state)
+        edges = crossed_edges(self.first, self.second, near, state)
         found = [*faces_met(self.first, self.second, near.pieces, state, edges)]
         back = faces_met(self.second, self.first, near.pieces[::-1], state)
         joints = [(near.against, near.joint)] * len(found)
@@ -115,16 +140,18 @@ class Gap(NamedTuple):
         value = np.array([plane.value for plane in found])
         rows = state.rows(wrench, np.ascontiguousarray(of), np.ascontiguousarray(against))
         key = np.array([plane.key for plane in found], dtype=np.intp)
-        turned = bends(self.first, self.second, near, state)
-        bend = _between(state, through(near.point, turned), near.joint, near.against)
         if self.end is None:
-            return SupportingPlanes(value, rows, key, np.zeros(len(value)), bend, np.zeros(len(bend), dtype=np.intp))
+            turned = through(near.point, bends(self.first, self.second, near, state))
+            bend = _between(state, turned, near.joint, near.against)
+            return SupportingPlanes(value, rows, key, bend, np.zeros(len(bend), dtype=np.intp))
+        bend = _between(state, self.end.bends(self.second, state), near.joint, near.against)
         upright, turns = self.end.rows(self.first, self.second, near, state)
+        sides = 2.0 * np.pi * np.arange(8) / 8  # of the octagon within the circle of the room
+        ways, room = np.column_stack([np.cos(sides), np.sin(sides)]), self.end.room * np.cos(np.pi / 8)
         return SupportingPlanes(
-            np.concatenate([value, upright - self.end.room, -upright - self.end.room]),
-            np.vstack([rows, turns, -turns]),
-            np.concatenate([key, 2 * MOST_FACES + np.arange(4)]),
-            np.concatenate([np.zeros(len(value)), np.full(4, 2.0 * self.end.room)]),
+            np.concatenate([value, ways @ upright - room]),
+            np.vstack([rows, ways @ turns]),
+            np.concatenate([key, 2 * MOST_FACES + np.arange(8)]),
             bend,
             np.zeros(len(bend), dtype=np.intp),
         )
@@ -317,13 +344,13 @@ def one_sided(value: Array, jacobian: Array) -> SupportingPlanes:
     """Planes of values (k,) that are to be at most zero, with their derivative (k, nv); without those far beyond."""
     near = np.flatnonzero(np.isfinite(value) & (value <= PLANES_WITHIN))
     none = no_planes(jacobian.shape[1])
-    return with_values(none, value=value[near], jacobian=jacobian[near], key=near, slack=np.zeros(len(near)))
+    return with_values(none, value=value[near], jacobian=jacobian[near], key=near)
 
 
 def no_planes(nv: int) -> SupportingPlanes:
     """None at all."""
     none, rows, index = np.zeros(0), np.zeros((0, nv)), np.zeros(0, dtype=np.intp)
-    return SupportingPlanes(none, rows, index, none, rows, index)
+    return SupportingPlanes(none, rows, index, rows, index)
 
 
 def planes_of(parts: Sequence[Part], state: State) -> SupportingPlanes:

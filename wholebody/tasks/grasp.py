@@ -28,6 +28,7 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
 CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
+THIN = 0.02  # m: thickness of a bar between which and the palm there is no room for a thumb
 APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
 
@@ -42,9 +43,10 @@ class Grasp(ContactTerm):
       over the face, a tenth within its edges. The hand may turn about z.
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
       touches the thing. A ring, such as a wheel, is held by its rim, with the palm outside of it. Where the hand has
-      fingers, the two outer parts of each touch the thing too, and the four fingers oppose the palm.
-    - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the hand has
-      fingers, otherwise their tips.
+      fingers, the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar
+      thinner than 2 cm, where there is no room for it, thumb and fingers oppose the palm.
+    - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
+      segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
       needs fingers.
 
@@ -151,20 +153,26 @@ class Grasp(ContactTerm):
             raise InputError(f"{where}: along is for bars, and {shown(self.thing)} is a ring; leave it out")
         bar = bar_of(thing, state, where) if rim is None else rim
         low, high = self._room(float(bar.half[2]))
+        fingers = self._outer_parts(scene)
         y, z = np.array((0.0, 1.0, 0.0)), np.array((0.0, 0.0, 1.0))
+        thickness = 2.0 * float(bar.half[1])
+        # m: thumb and fingers close around a bar of 5 cm that crosses the palm's middle; thinner ones lie beside it
+        room = max(0.0, 0.05 - thickness) if fingers and thickness >= THIN else 0.0
         parts: list[Part] = [
             Gap(hand, thing),
             Facing(place, across(y), bar, z, either=True),
-            Crossing(place, bar, low, high),
+            Crossing(place, bar, low, high, room),
         ]
         if rim is not None:
             outwards = with_values(rim, axes=rim.axes[[1, 0, 2]])
             parts.append(Over(place, outwards, np.zeros(1), np.full(1, np.inf)))
-        fingers = self._outer_parts(scene)
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
-        if others:
-            parts.append(Opposing(hand, others, thing, rounded(thing), float(self.opposed), CLOSED))
+        thumbs = tuple(finger for name, finger in fingers.items() if name == "thumb")
+        around = not thumbs or thickness < THIN  # then all that there is opposes the palm
+        for first, side in ((hand, others), (hand, thumbs)) if around else ((thumbs[0], others),):
+            if side:
+                parts.append(Opposing(first, side, thing, rounded(thing), float(self.opposed), CLOSED))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
@@ -184,6 +192,12 @@ class Grasp(ContactTerm):
                 raise InputError(
                     f"{where}: kind 'pinch' needs a thumb and an index finger that oppose each other, and "
                     f"{scene.figure.name} has no {shown(missing[0])}; use Touch for a single finger"
+                )
+            if len({inputs.find_place(scene, end, where).joint for end in ends}) == 1:
+                raise InputError(
+                    f"{where}: kind 'pinch' needs a thumb that moves against the index finger, and those of "
+                    f"{scene.figure.name} are one piece; load the person with hands='fingers', or use Touch for a "
+                    "single finger"
                 )
         thumb, *others = (surface(scene, end, where) for end in ends)
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]

@@ -16,7 +16,7 @@ MOST_FACES = 256  # more than a piece ever has
 STEP = 2e-3  # m: nor do those that are farther than this from what touches; surfaces farther apart are at no edge
 EDGE = 1e-3  # m: by which pieces are moved along each other to find the normals of edges that cross near a contact
 
-NO_NORMALS: Array = np.zeros((0, 3))
+NO_EDGES: Array = np.zeros((0, 2, 3))
 
 
 class FacePlane(NamedTuple):
@@ -36,7 +36,7 @@ class FacePlane(NamedTuple):
 
 
 def faces_met(
-    first: Surface, second: Surface, pieces: tuple[int, int], state: State, others: Array = NO_NORMALS
+    first: Surface, second: Surface, pieces: tuple[int, int], state: State, edges: Array = NO_EDGES
 ) -> list[FacePlane]:
     """The faces of the nearest piece of the second surface, as the nearest piece of the first meets them.
 
@@ -48,18 +48,18 @@ def faces_met(
         second: the one that has them.
         pieces: the nearest ones.
         state: at the posture.
-        others: (k, 3) normals that count as those of faces too: where edges cross, neither piece has a face.
+        edges: (k, 2, 3) see `crossed_edges`: their normals count as those of faces, where neither piece has a face.
     """
     i, j = pieces
     swept = second.swept[j]
     if swept.radius or len(swept.faces) < 2 or not np.isfinite(first.reach[i]):
         return []
     ours, theirs = first.placed(i, state), second.placed(j, state)
-    normals = np.vstack([swept.faces[:, :3] @ theirs.rotation.T, others])
+    normals = np.vstack([swept.faces[:, :3] @ theirs.rotation.T, edges[:, 0]])
     corners = swept.points @ theirs.rotation.T + theirs.translation
     faces = swept.faces[:, 3] + normals[: len(swept.faces)] @ theirs.translation
-    offsets = np.append(faces, (corners @ others.T).max(axis=0))
-    points = np.array([_behind(first, i, ours, normal) for normal in normals])
+    offsets = np.append(faces, (corners @ edges[:, 0].T).max(axis=0))
+    points = np.array([*(_behind(first, i, ours, normal) for normal in normals[: len(faces)]), *edges[:, 1]])
     values = np.einsum("ij,ij->i", normals, points) - offsets
     found = []
     # most faces of a piece that are looked at, those first that are nearest or passed
@@ -70,34 +70,37 @@ def faces_met(
     return found
 
 
-def edge_normals(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
-    """Normals (k, 3) from the second surface to the first, of what meets where their pieces slide along each other.
+def crossed_edges(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+    """Normals and points (k, 2, 3) of edges that cross where the pieces slide along each other.
 
-    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has.
-    There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
+    Of sharp pieces that touch: where two edges cross, the least depth is along the normal of both, which no face has,
+    and at the point of the first piece where they cross, which no corner is. A normal is from the second surface to the
+    first. There are none of round pieces, whose normal turns steadily, and of a point, which meets faces alone.
     """
     i, j = near.pieces
     sharp = first.fixed is None and second.fixed is None and not _roundness(first, i) + _roundness(second, j)
     if not sharp or abs(near.distance) > STEP:
-        return NO_NORMALS
+        return NO_EDGES
     a, b, found = first.placed(i, state), second.placed(j, state), []
     for way in across(near.normal)[:2]:
         for step in (-EDGE, EDGE):
             slid = pin.SE3(b.rotation, b.translation + step * way)
-            found.append(-np.array(between_pieces(first.shapes[i], a, second.shapes[j], slid).normal))
-    normals = np.array(found)
-    sound: Array = normals[np.linalg.norm(normals, axis=1) > 0.5]
+            met = between_pieces(first.shapes[i], a, second.shapes[j], slid)
+            found.append((-np.array(met.normal), np.array(met.getNearestPoint1())))
+    crossed = np.array(found)
+    sound: Array = crossed[np.linalg.norm(crossed[:, 0], axis=1) > 0.5]
     return sound
 
 
-def bends(first: Surface, second: Surface, near: Nearest, state: State) -> Array:
+def bends(first: Surface, second: Surface, near: Nearest, state: State, radius: float = 0.0) -> Array:
     """Directions (b, 3), each times the root of the distance's second derivative when the pieces slide along it.
 
-    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none.
+    Of pieces that are round where they meet: the normal turns as they slide. Where both are sharp there are none. A
+    first surface that is the middle of a round piece has the radius of that.
     """
     i, j = near.pieces
     a, b = first.placed(i, state), second.placed(j, state)
-    round_by = _roundness(first, i) + _roundness(second, j)
+    round_by = max(_roundness(first, i), radius) + _roundness(second, j)
     if round_by == 0.0:
         return np.zeros((0, 3))
     along = across(near.normal)[:2]

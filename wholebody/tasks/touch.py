@@ -6,16 +6,18 @@ from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass, field
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import shown
 from wholebody.base.errors import InputError
+from wholebody.base.records import with_values
 from wholebody.figures.state import State
 from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks import inputs
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import Surroundings, filled
-from wholebody.tasks.contact_parts import ROUND_DEPTH, ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
+from wholebody.tasks.contact_parts import ContactTerm, Facing, Gap, Part, RoundEnd, owner_pairs
 from wholebody.tasks.surfaces import Surface, carried_by, face, nearest, surface
 
 
@@ -24,8 +26,9 @@ class Touch(ContactTerm):
     """Bring a surface to another one: their distance is zero, and they may slide along each other.
 
     The value is the signed distance of the two surfaces [m]: positive apart, negative in an overlap. Its derivative is
-    that of the nearest points along the normal. Use it as a goal or as a constraint. The clearance of what is to touch
-    is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
+    that of the nearest points along the normal. A frame on the round end of its own piece counts as touching where the
+    piece does, if it is at most 8e-6 m off there. Use it as a goal or as a constraint. The clearance of what is to
+    touch is zero, for a frame that of the segment which carries it. A thing that is moved is touched where it is.
 
     Attributes:
         part: name of a segment, of a piece such as "left_hand:0", or of a frame, whose origin then touches. Of a link
@@ -135,8 +138,8 @@ def round_end(scene: Surroundings, point: Surface) -> RoundEnd | None:
         # m: a point this near to a surface of its own piece is on it
         if abs(float(np.linalg.norm(there - center)) - swept.radius) <= 1e-6:
             basis = across(place.rotation @ (there - center) / float(np.linalg.norm(there - center)))
-            room = float(np.sqrt(ROUND_DEPTH * swept.radius))  # |rows| <= sqrt(2 r d), each the root of half of that
-            return RoundEnd(place.act(center), basis[:2], room)
+            middle = with_values(point, fixed=pin.SE3(np.eye(3), place.act(center)))
+            return RoundEnd(middle, float(swept.radius), basis[:2])
     return None
 
 

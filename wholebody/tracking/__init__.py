@@ -2,10 +2,9 @@
 
 from wholebody.tracking.dragging import Dragged, DragJudgement, drag_along, judge_drag
 from wholebody.tracking.frame import Frame
-from wholebody.tracking.judging import Judgement, judge
 from wholebody.tracking.loop import FrameLoop, follow
 from wholebody.tracking.paths import circle, read_path, spread
-from wholebody.tracking.recording import Recording
+from wholebody.tracking.recording import Judgement, Recording, judge
 from wholebody.tracking.rooms import gallery
 from wholebody.tracking.scenes import SCENES, InteractionScene, build_scene
 from wholebody.tracking.track_files import read_track, write_track

@@ -1,11 +1,17 @@
-"""overlap="ccd": cyclic coordinate descent removes the overlap of an articulated figure limb by limb."""
+"""overlap="ccd": overlap is removed limb by limb by coordinate descent, or by a displacement of a rigid figure."""
 
 from __future__ import annotations
 
+import time
+
 import numpy as np
 import pinocchio as pin
+from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
+from wholebody.base.errors import InputError
+from wholebody.geometry.continuous.passing_through import last_free
+from wholebody.geometry.penetration import global_depth
 from wholebody.methods.ccd.frames import resolve_overlap
 from wholebody.scene.scene import Scene
 from wholebody.tracking.frame import Resolution
@@ -51,3 +57,111 @@ class CCDStrategy:
             note=note,
             swept=result.swept,
         )
+
+
+class RigidTranslation:
+    """Follows tracked postures of a figure with a free root that is displaced as a rigid body.
+
+    Schmidl and Lin find that "even a complicated object, such as an articulated hand, can be handled in this way": the
+    fingers follow the glove, and the hand with its present fingers is displaced by pure translation. PD_g is the sum of
+    pd_i^2 n_i over the sum of pd_i (their equation 1), with n_i out of the obstacle; it is computed again until nothing
+    overlaps.
+    """
+
+    sweep_tolerance = 2e-4
+
+    def __init__(self, scene: Scene) -> None:
+        """Prepare the strategy.
+
+        Raises:
+            InputError: the figure is fixed to the world.
+        """
+        if scene.figure.root != "free":
+            raise InputError(f"{scene.figure.name} is fixed to the world and cannot be displaced; leave rigid out")
+        self.scene, self.model, self._workspace = scene, scene.model, scene.workspace()
+        segments = set(scene.figure.segments) | {n for n, thing in scene.objects.items() if thing.segment is not None}
+        self._mine = np.array([owner in segments for owner in scene.piece_owner])
+        owners = list(dict.fromkeys(scene.piece_owner))
+        self._owner = np.array([owners.index(owner) for owner in scene.piece_owner])
+
+    def resolve(self, shown: Array, tracked: Array) -> Resolution:
+        """One frame from the overlap-free posture `shown` towards `tracked`, both (nq,)."""
+        self._workspace.refresh()
+        began, queried = time.perf_counter(), self._workspace.proximity.seconds
+        self._displacements, self._pairs = 0, 0
+        self._out: list[Array] = []
+        note, q = "", self._with_fingers(shown, tracked)
+        if q is None:
+            q, note = shown, "the fingers would be inside each other or have no room; they stay"
+        for _ in range(6):  # most steps a frame: 3.6 m/s at 60 frames a second
+            following = self._freed(q, self._toward(q, tracked))
+            # m, rad: a step that brings the hand nearer by less than this ends the frame
+            if self._root_distance(following, tracked) > self._root_distance(q, tracked) - 1e-5:
+                break
+            q = following
+        queried = self._workspace.proximity.seconds - queried
+        spent = time.perf_counter() - began - queried
+        return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
+
+    def _with_fingers(self, shown: Array, tracked: Array) -> Array | None:
+        """The shown hand with the tracked fingers, displaced out of overlap; None if that fails."""
+        return self._displaced(np.concatenate([shown[:7], tracked[7:]]))
+
+    def _toward(self, q: Array, tracked: Array) -> Array:
+        """A step of the root towards the tracked one, tangential to the obstacles of this frame, so that it slides."""
+        way = np.asarray(pin.difference(self.model, q, tracked))
+        turn = pin.Quaternion(q[3:7]).toRotationMatrix()
+        for out in self._out:
+            way[:3] -= min(0.0, float(way[:3] @ (turn.T @ out))) * (turn.T @ out)
+        # largest motion of the hand in one step, metres: less than half the width of thin pieces (a table's
+        # top, a finger), so that it does not leave them on the other side
+        # rad: largest rotation of the hand in one step
+        long = max(float(np.linalg.norm(way[:3])) / 0.01, float(np.linalg.norm(way[3:6])) / 0.1, 1.0)
+        way[:6] /= long
+        way[6:] = 0.0
+        return np.asarray(pin.integrate(self.model, q, way))
+
+    def _freed(self, free: Array, drawn: Array) -> Array:
+        """The moved hand displaced, or else the last free position of the motion (algorithm 1, step 4)."""
+        displaced = self._displaced(drawn)
+        if displaced is not None:
+            return displaced
+        return last_free(self.model, free, drawn, lambda q: len(self._overlaps(q)[0]), 8)  # halvings
+
+    def _displaced(self, q: Array) -> Array | None:
+        """The hand displaced by PD_g until nothing overlaps; None if that does not end."""
+        q = q.copy()
+        # most displacements a step; one is enough for one pair, and in a corner the walls alternate
+        for _ in range(30):
+            depths, normals, obstacles = self._overlaps(q)
+            if not len(depths):
+                return q
+            self._displacements += 1
+            self._pairs = max(self._pairs, len(depths))
+            if (obstacles < 0).any():
+                return None  # two of its own pieces: no translation separates them
+            for obstacle in np.unique(obstacles):
+                of = obstacles == obstacle
+                push = global_depth(depths[of], normals[of])
+                length = float(np.linalg.norm(push))
+                if length < 1e-6:  # m: a shorter PD_g has no direction
+                    return None  # opposed normals cancel (figure 4b)
+                # m beyond PD_g: room for the arcs of fingertips from frame to frame
+                q[:3] += push * (1.0 + 5e-4 / length)
+                self._out = [*self._out[-1:], push / length]
+        return None
+
+    def _overlaps(self, q: Array) -> tuple[Array, Array, NDArray[np.intp]]:
+        """Depths (k,), normals (k, 3) out of the obstacle, and the obstacles (k,), -1 for pieces of its own."""
+        contacts = self._workspace.near(q, 0.0).nearest_first()
+        first, second = contacts.pair[:, 0], contacts.pair[:, 1]
+        mine = self._mine[first]
+        normals = np.where(mine[:, None], -contacts.normal, contacts.normal)
+        obstacle = self._owner[np.where(mine, second, first)]
+        obstacle = np.where(self._mine[first] & self._mine[second], -1, obstacle)
+        return -contacts.distance, normals, obstacle
+
+    def _root_distance(self, q: Array, tracked: Array) -> float:
+        """Remaining distance of the root, metres, with radians converted by a hand's length of 0.2 m."""
+        way = np.asarray(pin.difference(self.model, q, tracked))
+        return float(np.linalg.norm(way[:3]) + 0.2 * np.linalg.norm(way[3:6]))

@@ -31,9 +31,8 @@ from wholebody.scene.moving_obstacles import Collision, FrameMotion
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import NotCopyable
 from wholebody.tasks import ReachCones
-from wholebody.tracking.attraction import Attraction
 from wholebody.tracking.frame import FRAME, Frame, OverlapStrategy, Resolution
-from wholebody.tracking.qp_strategy import CLEARANCE, QPStrategy, weights
+from wholebody.tracking.qp_strategy import CLEARANCE, Attraction, QPStrategy, weights
 from wholebody.tracking.recording import Recording
 from wholebody.tracking.tracks import Track
 
@@ -223,7 +222,7 @@ class FrameLoop(NotCopyable):
         if overlap == "qp":
             return QPStrategy(self.scene, self.shown, dt, rigid, self._touching)
         if rigid:
-            from wholebody.tracking.rigid_translation import RigidTranslation
+            from wholebody.tracking.ccd_strategy import RigidTranslation
 
             return RigidTranslation(self.scene)
         from wholebody.tracking.ccd_strategy import CCDStrategy

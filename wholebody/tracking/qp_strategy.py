@@ -6,14 +6,18 @@ import time
 from collections.abc import Sequence
 
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
+from wholebody.figures.state import State
 from wholebody.methods.ccd.resolver import OverlapResolver
 from wholebody.methods.qp.method import QP
 from wholebody.problem import Problem
 from wholebody.scene.scene import Scene
 from wholebody.tasks import ReachCones
-from wholebody.tracking.attraction import Attraction, FrameMotionLimit
+from wholebody.tasks.base import Bound
+from wholebody.tasks.bounds import clipped
+from wholebody.tasks.distance import DistanceMeasure, SquaredDistance
 from wholebody.tracking.entanglement import Entanglement
 from wholebody.tracking.frame import Resolution
 
@@ -21,16 +25,51 @@ CLEARANCE = 1e-3
 """Clearance of pieces, metres. A step is exact to first order only; the clearance must exceed its error."""
 
 
-SPEED = 8.0
-"""Velocity limit of joints, rad/s: above that of people, so that a released figure returns soon but does not jump."""
+class Attraction(DistanceMeasure):
+    """Weighted squared distance from the tracked posture: ``sum_i w_i d_i^2``, d the tangent vector from there.
 
-ROOT_SPEED = 3.0  # m/s
-ROOT_WEIGHT = 1000.0
-"""Weight of the root relative to that of a joint, 1/m^2 to 1/rad^2: limbs give way before the whole body."""
+    Unlike other terms it and the motion limit change between steps, because the tracker is read in every frame.
 
-RIGID_WEIGHT = 100.0
-"""Weight of joints and of the root's rotation relative to that of the root's position, for a rigid figure. A finger
-8 cm long then takes a ten-thousandth of a displacement."""
+    Its unconstrained minimum is the tracked posture itself, which one program reaches in one step without contact. In
+    contact the minimum is the nearest posture that touches. A goal would behave differently: it is met at any cost in
+    the other joints, and its force does not grow with the distance.
+    """
+
+    def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
+        """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
+        self.distance = SquaredDistance.build(model, q, weights)
+        self._weights = self.distance.weights.copy()
+
+    def toward(self, q: Array) -> None:
+        """Attract to another posture (nq,)."""
+        self.distance.reference[:] = q
+
+    def weigh(self, factors: Array) -> None:
+        """Multiply the weights of the beginning by factors (nv,), which are positive."""
+        np.multiply(self._weights, factors, out=self.distance.weights)
+        np.multiply(2.0, self.distance.weights, out=self.distance.curvature)
+
+
+class FrameMotionLimit(Bound):
+    """Bounds the motion of a whole frame, whatever the number of its steps."""
+
+    def __init__(self, model: pin.Model, limit: Array) -> None:
+        """Allow `limit` (nv,) a frame to either side, radians and metres."""
+        self._limit = limit
+        self._begin = pin.neutral(model)
+
+    def begin(self, q: Array) -> None:
+        """Begin a frame at the posture q (nq,)."""
+        self._begin = np.array(q)
+
+    def kept(self, model: pin.Model, q: Array) -> Array:
+        """The posture q (nq,), or the nearest one within the motion of a frame."""
+        return clipped(model, self._begin, q, np.stack([-self._limit, self._limit]))
+
+    def bounds(self, state: State, dt: float | None) -> tuple[Array, Array]:
+        """The remaining motion of the frame."""
+        gone = np.asarray(pin.difference(state.model, self._begin, state.q))
+        return np.minimum(-self._limit - gone, 0.0), np.maximum(self._limit - gone, 0.0)
 
 
 class QPStrategy:
@@ -104,17 +143,21 @@ class QPStrategy:
 
 
 def weights(scene: Scene, rigid: bool) -> Array:
-    """Weights (nv,) of the attraction."""
-    result = np.full(scene.model.nv, RIGID_WEIGHT if rigid else 1.0)
+    """Weights (nv,) of the attraction, 1/m^2 and 1/rad^2.
+
+    Limbs give way before the whole body. Of a rigid figure the root's position gives way: a finger 8 cm long then takes
+    a ten-thousandth of a displacement.
+    """
+    result = np.full(scene.model.nv, 100.0 if rigid else 1.0)
     if scene.figure.root == "free":
-        result[:3] = 1.0 if rigid else ROOT_WEIGHT
-        result[3:6] = RIGID_WEIGHT if rigid else ROOT_WEIGHT
+        result[:3] = 1.0 if rigid else 1000.0
+        result[3:6] = 100.0 if rigid else 1000.0
     return result
 
 
 def largest_motions(scene: Scene, dt: float) -> Array:
-    """Largest motion of every degree of freedom in a frame, (nv,)."""
-    result = np.full(scene.model.nv, SPEED * dt)
+    """Largest motion of every degree of freedom in a frame, (nv,): a released figure returns soon but does not jump."""
+    result = np.full(scene.model.nv, 8.0 * dt)  # rad/s: above that of people
     if scene.figure.root == "free":
-        result[:3] = ROOT_SPEED * dt
+        result[:3] = 3.0 * dt  # m/s
     return result

@@ -12,7 +12,6 @@ from wholebody.methods.base import Tracker
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-WITHIN = 0.06  # m: query distance when a motion is tested; larger = more distances and fewer sweeps
 PASSING = 1e-3  # m: if the motion to a solution gets deeper, a nearer solution is tried
 
 
@@ -43,5 +42,6 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
 def _passes_through(problem: Problem, before: Array, after: Array) -> bool:
     """Whether the motion between two postures (nq,) passes through something."""
     with problem.borrow() as workspace:
-        first, last = (QueryResult(workspace.near(q, WITHIN), WITHIN) for q in (before, after))
+        within = 0.06  # m: larger = more distances and fewer sweeps
+        first, last = (QueryResult(workspace.near(q, within), within) for q in (before, after))
         return passes_through(workspace, first, last, before, after)

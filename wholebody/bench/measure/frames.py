@@ -11,8 +11,7 @@ from wholebody.base.arrays import Array
 from wholebody.bench.rows import Figure, Panel, Row, report
 from wholebody.dynamics.world import WorldFrame
 from wholebody.tracking.dragging import Dragged, DragJudgement
-from wholebody.tracking.judging import Judgement
-from wholebody.tracking.recording import Recording
+from wholebody.tracking.recording import Judgement, Recording
 
 PAPER = tuple(
     Row(

@@ -89,7 +89,6 @@ class Iteration:
         self.objective = np.flatnonzero(self.system.objective)
         self.one_sided = np.flatnonzero(self.system.inequality)
         self._move(x, None)
-        self.multiplier = np.zeros(len(self.residual))
         self.state: Inequalities = inequalities(self.kind, self.residual[self.one_sided])
 
     def mark(self) -> tuple[Array, tuple[Array, ...], bool]:
@@ -123,7 +122,7 @@ class Iteration:
             early_exit: end at the first step that gains little, as in a frame whose goal lies inside something.
         """
         self.stationary, active, norms = False, self.active_system, self._norms(self.residual)
-        trust = _Trust(self.least_damping, max(min(STEPS.funnel * norms[1], STEPS.widest), self.tolerance))
+        trust = _Trust(self.least_damping, max(STEPS.funnel * norms[1], self.tolerance))
         least, stagnant = sum(norms), 0
         enough = FRAMES.least_progress if early_exit else STEPS.least_progress
         patience = FRAMES.patience if early_exit else STEPS.patience
@@ -249,9 +248,6 @@ class Iteration:
         asked[self.objective] = 0.0
         if measures == "lower":
             asked[self.objective] = self.residual[self.objective] / (1.0 + damping / STEPS.first_damping)
-        if damping == 0.0 and goals and max(self.hard, self.goal) < STEPS.near:
-            base = np.where(self.system.goal, STEPS.goal_damping, STEPS.hard_damping)
-            asked -= np.where(self.system.objective | self.system.inequality, 0.0, base) * self.multiplier
         diagonal[self.objective] = FREE if measures == "ignore" else 1.0 / self.system.stiffness[self.objective]
         gradient = np.zeros_like(self.x)
         rows, phi = self.one_sided, self.residual[self.one_sided]
@@ -264,7 +260,6 @@ class Iteration:
             system = LinearSystem(self.values, proximity * self.system.weight, diagonal, gradient, asked)
             step, y = self.algebra.solve(system)
             self.systems += 1
-            self.multiplier = y
             if not len(rows):
                 return step
             change = self.system.pattern.times(self.values, step)[rows]
@@ -305,8 +300,7 @@ class Iteration:
             return True
         gain = before[1] - promised[1]
         # after a full step towards the goals curved equations are violated by its square
-        bend = min(before[1] * before[1], STEPS.widest)
-        if hard <= max(funnel, bend) and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
+        if hard <= max(funnel, before[1] * before[1]) and gain > 0.0 and before[1] - goal >= STEPS.gain * gain:
             return True
         restored = before[0] - hard >= STEPS.restored * max(before[0] - promised[0], 0.0) and hard < before[0]
         return restored and (before[0] > self.tolerance or goal <= before[1])

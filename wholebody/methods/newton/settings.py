@@ -21,14 +21,12 @@ class Steps(NamedTuple):
         amplified: motion per metre of target beyond which a step is damped: the equations are nearly singular there.
         far: m or rad: goal error from which that is tested; nearer, the measures may move more than the goals.
         funnel: m or rad of violation allowed for a metre of goal; beyond it a step only restores. Larger: longer steps.
-        widest: m or rad: largest violation allowed after any step.
         narrow: factor on the funnel after a step that only restores.
         gain: least ratio of actual to predicted reduction of a step.
         restored: the same for a step that only restores the constraints.
         least_progress: relative reduction below which a step counts as no progress.
         patience: steps without progress in a row after which the iteration counts as stationary.
         systems: most linear systems a step, while the active set changes.
-        near: m or rad: errors below which the last multipliers compensate the damping of equations.
     """
 
     hard_damping: float = 1e-10
@@ -44,14 +42,12 @@ class Steps(NamedTuple):
     amplified: float = 6.0
     far: float = 0.05
     funnel: float = 0.5
-    widest: float = 0.5
     narrow: float = 0.7
     gain: float = 0.05
     restored: float = 0.2
     least_progress: float = 1e-6
     patience: int = 12
     systems: int = 25
-    near: float = 1e-2
 
 
 class Frames(NamedTuple):

@@ -22,6 +22,7 @@ from wholebody.geometry.continuous.passing_through import passes_through
 from wholebody.methods.control import Control
 from wholebody.methods.qp.iterates import Iterate, LocalSolution, PredictedReduction, Step, StepAcceptance, judge
 from wholebody.methods.qp.quadratic_program import QPSolution, QuadraticProgram
+from wholebody.methods.qp.rows import Multipliers
 from wholebody.methods.qp.settings import DESCENT, PROGRAM
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.subproblem import Subproblem, lagrangian, multipliers_of
@@ -74,6 +75,8 @@ class SQP:
         self._watched: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
         self._kept: Iterate | None = None  # best posture that fits
+        self._gain = 1.0  # share of the way to the least measures that a step is to go
+        self._multipliers: Multipliers | None = None  # of the last program near the goals
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
     def run(self, start: Array) -> LocalSolution:
@@ -98,6 +101,7 @@ class SQP:
                 self._shift,
                 self.measures,
             )
+            program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
             if self._settled(here, step):
@@ -124,7 +128,14 @@ class SQP:
 
     def _better_than_kept(self, here: Iterate) -> bool:
         fits = here.violation.worst <= self.tolerance
-        return fits and (self._kept is None or here.at.measure < self._kept.at.measure)
+        return fits and (self._kept is None or self._worth(here) < self._worth(self._kept))
+
+    def _worth(self, here: Iterate) -> float:
+        """The measures, as the Lagrangian of the last program counts them where nothing is left to spare."""
+        if self._multipliers is None:
+            return here.at.measure
+        beyond = np.maximum(here.rows.elastic_violation, 0.0)
+        return lagrangian(self._multipliers, here.at.measure, with_values(here.rows, elastic_violation=beyond))
 
     def _bent(self, here: Iterate) -> Linearisation:
         """With the second derivatives of goals and equalities, times their multipliers, as squares of the measures.
@@ -136,6 +147,18 @@ class SQP:
             return here.at
         pull = np.maximum(self._tension[self.subproblem.soft_row(planes.bend_row)], 0.0)
         return with_values(here.at, squares=np.vstack([here.at.squares, np.sqrt(pull)[:, None] * planes.bend]))
+
+    def _shortened(self, program: QuadraticProgram, soft: int) -> QuadraticProgram:
+        """With the measures' curvature such that the part of the answer along the constraints is `_gain` times as long.
+
+        Joints keep their shares of it. A shorter radius would let those with much gradient go as far as those with
+        little, although what is asked holds back most of the gradient.
+        """
+        if self._gain == 1.0:
+            return program
+        weight = program.weight.copy()
+        weight[soft:] /= self._gain
+        return with_values(program, diagonal=program.diagonal / self._gain, weight=weight)
 
     @property
     def _pull(self) -> float:
@@ -149,7 +172,7 @@ class SQP:
         if parts is None:
             saved = self.subproblem.saving(program, here.rows, x)
         else:
-            multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
+            multipliers = self._multipliers = multipliers_of(program, answer, here.rows, self.subproblem.scale)
             if here.at.planes is not None:
                 self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
@@ -157,7 +180,8 @@ class SQP:
                 saved = self.subproblem.saving(program, here.rows, parts.tangential)
                 saved -= multipliers.change(program, parts.tangential)
             bent = here.at.planes is not None and len(here.at.planes.bend)
-            flat = saved <= (BENT if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
+            flat = saved / self._gain <= (BENT if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
+            flat = flat and self.subproblem.violation(here.rows, parts.normal).total <= here.violation.total
             x = parts.normal if flat else x  # what is asked is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
@@ -173,10 +197,10 @@ class SQP:
         )
         if violation.worst > self.tolerance and predicted.violation > worth:
             return False
-        if not self.measures or step.flat:
-            return True
         still = float(np.abs(step.dq).max(initial=0.0)) <= 10.0 * self.tolerance
-        return still or predicted.measure <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
+        if still or not self.measures:
+            return True
+        return not step.flat and predicted.measure / self._gain <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
 
     def _advance(self, here: Iterate, program: QuadraticProgram, step: Step) -> Iterate | None:
         """Go where the program says, or farther along what the last steps foretell; None if neither is good."""
@@ -219,8 +243,11 @@ class SQP:
             self._damping = DESCENT.full_step_damping[1] if self._full_step else 0.0
             return
         self._stretch = 1.0
-        self._radius = 0.3 * min(longest, self._radius)
-        self._damping = max(0.3, 2.0 * self._damping) if by != "rejected measure" else self._damping
+        if by == "rejected measure":
+            self._gain *= 0.3
+        else:
+            self._radius = 0.3 * min(longest, self._radius)
+            self._damping = max(0.3, 2.0 * self._damping)
         self._shift = np.zeros_like(self._shift)
         self._ahead.reset()
 
@@ -238,10 +265,13 @@ class SQP:
         if not self._full_step and here.violation.left > self._pull and there.longest < 0.25 * self._radius:
             self._stretch *= 2.0
         if acceptance.good:
+            self._gain = min(1.0, 2.0 * self._gain)
             if not self._full_step:
                 self._damping *= 0.3
             if there.longest > 0.5 * self._radius or here.violation.left > PROGRAM.error_clamp * self._radius:
                 self._radius = min(2.0 * self._radius, DESCENT.largest_radius)
+        elif acceptance.poor and acceptance.by == "measure":
+            self._gain *= 0.5
         elif acceptance.poor:
             self._radius = 0.5 * self._radius
         self._watched = None

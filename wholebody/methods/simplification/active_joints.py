@@ -27,9 +27,7 @@ from wholebody.tasks.distance import Displacement, Effort, RotationEffort
 from wholebody.tasks.rhythm import Rhythm
 
 SEPARABLE = (Effort, Displacement, Discomfort)  # measures that are sums over joints; `Rhythm` is one over its squares
-SAMPLES = 6  # postures at which the dependence of rows that are no wrenches on joints is tested
 NOTHING = 1e-9  # entries of a Jacobian below this are rounding
-STEPS = 200  # between a joint's limits, in the search for its least share of the measures
 
 
 @dataclass(frozen=True)
@@ -118,7 +116,7 @@ class _Walk:
 
     def __init__(self, problem: Problem) -> None:
         self.state = State(problem.scene.model)
-        self.postures = np.vstack([problem.start, random_postures(problem.scene.model, SAMPLES, seed=0)])
+        self.postures = np.vstack([problem.start, random_postures(problem.scene.model, 6, seed=0)])
         if problem.scene.figure.root == "free":
             self.postures[:, :7] = problem.start[:7]
 
@@ -201,14 +199,14 @@ def _excess(problem: Problem, locked: Mask) -> float:
         return 0.0
     idx_q, idx_v, low, high = idx_q[chosen], idx_v[chosen], low[chosen], high[chosen]
     begin = np.clip(problem.start[idx_q], low, high)
-    share = np.linspace(0.0, 1.0, STEPS + 1)
+    share = np.linspace(0.0, 1.0, 201)
     slopes = []
     q = problem.start.copy()
     for part in share:
         q[idx_q] = low + part * (high - low)
         state.update(q)
         slopes.append(sum((term.weight * term.gradient(state)[idx_v] for term in terms), np.zeros(len(idx_v))))
-    slope = np.array(slopes) * ((high - low) / STEPS)
+    slope = np.array(slopes) * (share[1] * (high - low))
     along = np.vstack([np.zeros(len(idx_v)), np.cumsum(0.5 * (slope[1:] + slope[:-1]), axis=0)])
     at = np.divide(begin - low, high - low, out=np.zeros_like(begin), where=high > low)
     now = np.array([np.interp(x, share, values) for x, values in zip(at, along.T, strict=True)])

@@ -21,8 +21,7 @@ from wholebody.figures.self_pairs import random_postures
 from wholebody.figures.state import State
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure, Surroundings, Term
 
-SAMPLES = 3  # postures at which a resolved term is compared with that of the whole figure
-SAME = 1e-7  # largest difference in its values and derivatives, relative to their size
+SAME = 1e-7  # largest difference in the values and derivatives of one function, relative to their size
 
 _T = TypeVar("_T", bound=Term)
 
@@ -206,7 +205,7 @@ def restated_term(
 
 def _values(term: Term, state: State, start: Array) -> list[Array]:
     """Values of a term at a few postures: all that a method reads, except the constant part of a measure."""
-    postures = [start, *random_postures(state.model, SAMPLES, seed=1)]
+    postures = [start, *random_postures(state.model, 3, seed=1)]
     ask: list[Callable[[], object]] = []
     if isinstance(term, Goal):
         ask = [lambda: term.error(state), lambda: state.dense_jacobian(term.jacobian(state)), lambda: term.angular]

@@ -16,7 +16,6 @@ from wholebody.methods.simplification.reach import Balls, Reach, about_point, pl
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.hold import Hold
 
-HELD_WITHIN = 1e-3  # m: largest displacement of a piece by errors of holds; an accepted answer has less
 PROBE = 1e-4  # m: radius of the ball that represents a point in coal
 
 
@@ -50,7 +49,8 @@ def reachable_pairs(
     center = np.array([piece.placement.translation for piece in pieces]).reshape(-1, 3)
     reach = Reach(model, start, Balls(center, size, np.arange(len(pieces))), joint, frozen)
     views = [(seat, reach.seen_from(seat), 0.0) for seat in np.unique(joint[pairs]).tolist()]
-    views += [(0, balls, HELD_WITHIN) for balls in held_balls(figure, reach, constraints)]
+    # m: largest displacement of a piece by errors of holds; an accepted answer has less
+    views += [(0, balls, 1e-3) for balls in held_balls(figure, reach, constraints)]
     open_ = np.ones(len(pairs), dtype=bool)
     for seat, balls, slack in views:
         place, radius = _by_piece(balls, len(pieces))

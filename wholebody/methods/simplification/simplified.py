@@ -11,8 +11,6 @@ from wholebody.methods.simplification.embedding import Embedding
 from wholebody.problem import Problem
 from wholebody.solution import Solution
 
-HOLDS = 1e-4  # m, rad: tolerance of limits, constraints and clearances of the whole problem for "solved"
-
 
 @dataclass(frozen=True)
 class LeftOut:
@@ -114,6 +112,6 @@ class Simplified:
         q = self.posture(solution.q)
         judged = assess(self.whole, q)
         status, message = solution.status, solution.message
-        if status == "solved" and not judged.holds(HOLDS):
+        if status == "solved" and not judged.holds(1e-4):  # m, rad
             status, message = "infeasible", "what was left out does matter here; solve the whole problem from this one"
         return replace(solution, q=q, status=status, assessment=judged, message=message)

@@ -256,10 +256,6 @@ def _left_out(
     )
 
 
-FEW = 64  # corners: simplifying pieces with at most as many saves no measurable time
-CORNERS = (8, 16, 32, 48)  # tried in turn
-
-
 def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.GeometryObject, float] | None:
     """A piece with fewer corners around a hull.
 
@@ -273,7 +269,7 @@ def simplified_piece(piece: pin.GeometryObject, growth: float) -> tuple[pin.Geom
     if not isinstance(piece.geometry, coal.Convex):
         return None
     points = np.array(piece.geometry.points())
-    if len(points) <= FEW:
+    if len(points) <= 64:  # simplifying fewer corners saves no measurable time
         return None
     found = _around(points.tobytes(), growth)
     if found is None:
@@ -291,7 +287,7 @@ def _around(corners: bytes, growth: float) -> tuple[Piece, float] | None:
     """The simplest hull around these corners that protrudes no farther, and how far it does."""
     points = np.frombuffer(corners).reshape(-1, 3)
     whole = hull_piece(points)
-    for most in CORNERS:
+    for most in (8, 16, 32, 48):
         outer = simplified_hull(points, most)
         out = farthest(outer - whole.placement.translation, whole.geometry)
         if out <= growth:

@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import cache, partial
 from importlib import import_module
 from importlib.util import find_spec
+from inspect import signature
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
@@ -15,10 +16,12 @@ from wholebody.base.errors import MissingPackageError, UnknownNameError
 from wholebody.base.files import parsed_toml
 from wholebody.base.records import with_values
 from wholebody.bench.measure.track import Track
-from wholebody.bench.suite.adapters.base import Adapter, Tool
+from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool
 from wholebody.bench.suite.adapters.own import NEWTONS, ccd_adapter, dls_adapter, newton_adapter, one_start, qp_adapter
 from wholebody.bench.suite.adapters.starts import ONE, STARTS, restarted
+from wholebody.methods.base import Method
 from wholebody.methods.qp.solvers.registry import solver_names
+from wholebody.methods.solve import imported
 
 
 class _Row(NamedTuple):
@@ -43,12 +46,13 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     """The adapters of these names, in the order given; where None, one of each algorithm that is installed.
 
     The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
-    "all" means every method that is installed. Methods that differ from another in their starts alone, such as
-    "qp/one_start" and "mink/starts", are among several only if `starts` is true.
+    "all" means every method that is installed, "module:Class" a method of one's own. Methods that differ from another
+    in their starts alone, such as "qp/one_start" and "mink/starts", are among several only if `starts` is true.
 
     Raises:
         UnknownNameError: there is no such adapter.
         MissingPackageError: what it needs is not installed.
+        InputError: a method of one's own cannot be imported.
     """
     rows = _rows()
     if names is None:
@@ -59,7 +63,10 @@ def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[
     plain = [name for name in rows if starts or not name.endswith((f"/{ONE}", f"/{STARTS}"))]
     chosen: dict[str, None] = {}
     for name in names:
-        if name == "all":
+        if ":" in name:
+            rows[name] = _Row(partial(_own, name))
+            chosen[name] = None
+        elif name == "all":
             chosen.update(dict.fromkeys(key for key in plain if rows[key].installed()))
         elif name in rows:
             chosen[name] = None
@@ -114,6 +121,19 @@ def _outside(name: str) -> Adapter:
     build = getattr(import_module(f"wholebody.bench.suite.adapters.{module}"), f"{module}_adapter")
     made: Adapter = build(variant) if variant else build()
     return made
+
+
+def _own(name: str) -> Adapter:
+    """A method of one's own; it gets a budget as far as its class has arguments for it."""
+    kind = imported(name)
+    known = signature(kind).parameters
+    loose = LADDER if "tolerance" in known else ((1e-3, None),)
+    return Adapter(name, partial(_made, kind, frozenset(known)), loose, setup="A method of one's own.")
+
+
+def _made(kind: Callable[..., Method], known: frozenset[str], tolerance: float, iterations: int | None) -> Method:
+    asked = {"tolerance": tolerance, "iterations": iterations}
+    return kind(**{name: value for name, value in asked.items() if name in known and value is not None})
 
 
 def _described(name: str, row: _Row) -> Adapter:

@@ -1,0 +1,70 @@
+"""A method of one's own in forty lines: the Jacobian transpose, accepted wherever a method is named.
+
+wholebody pose examples/tasks/shelf.toml --method own_method:JacobianTranspose     # in the folder of this file
+wholebody bench compare free_reach --methods own_method:JacobianTranspose qp
+"""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+import wholebody as wb
+from wholebody.methods.base import SolvesAnew
+from wholebody.methods.conclusion import Ending, concluded
+from wholebody.methods.control import Control
+from wholebody.solution import TraceEntry
+
+
+@dataclass(frozen=True)
+class JacobianTranspose(SolvesAnew):
+    """Steps down the squared errors of goals and equalities (Wolovich and Elliott 1984); the rest is only assessed."""
+
+    tolerance: float = 1e-3
+    iterations: int = 2000
+    name = "transpose"
+
+    def accepts(self, problem):
+        """Take any problem: what it does not see, the assessment judges."""
+
+    def solve(self, problem, progress=None):
+        """Descend from the start with exact steps of the linearised errors."""
+        began, trace, figure = time.perf_counter(), [], problem.scene.figure
+        holds = [term for term in problem.constraints if np.array_equal(term.lower, term.upper)]
+        q = figure.clamp(problem.start)
+        with problem.borrow() as workspace, Control(None, progress) as control:
+            for _ in range(self.iterations):
+                state = workspace.state.update(q)
+                error = np.concatenate([*(g.error(state) for g in problem.goals), *(h.value(state) for h in holds)])
+                rows = np.vstack([state.dense_jacobian(term.jacobian(state)) for term in (*problem.goals, *holds)])
+                trace.append(TraceEntry(float(np.linalg.norm(error)), 0.0, 0.0, 0.0))
+                control.tell(trace[-1])
+                if trace[-1].goal_error <= self.tolerance or control.over:
+                    break
+                down = -rows.T @ error
+                along = rows @ down
+                share = -(along @ error) / max(along @ along, 1e-12)
+                q = figure.clamp(pin.integrate(figure.model, q, share * down))
+        done = trace[-1].goal_error <= self.tolerance
+        ending = Ending(q, done, len(trace), tuple(trace), "by the Jacobian transpose", contradictions=())
+        return concluded(
+            problem, ending, method=self.name, tolerance=self.tolerance, control=control, began=began
+        )  # fmt: skip
+
+
+def main() -> None:
+    """Reach with a hand, and compare with the QP method."""
+    problem = wb.Problem(
+        wb.Scene(wb.load("human")), "standing", goals=[wb.Point("right_palm", (0.5, -0.3, 1.2))],
+        constraints=[wb.Freeze("root")], range_of_motion=False,
+    )  # fmt: skip
+    for method in (JacobianTranspose(), wb.QP()):
+        solution = wb.solve(problem, method)
+        print(f"{solution.method}: {solution.message}, {solution.iterations} iterations")
+
+
+if __name__ == "__main__":
+    main()
