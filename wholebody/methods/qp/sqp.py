@@ -73,6 +73,7 @@ class SQP:
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._watched: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
         self._ahead = Extrapolation()
+        self._unimproved = 0  # postures that fit, one after the other, and are hardly better than the best
         self._kept: Iterate | None = None  # best posture that fits
         self._gain = 1.0  # share of the way to the least measures that a step is to go
         self._multipliers: Multipliers | None = None  # of the last program near the goals
@@ -103,7 +104,7 @@ class SQP:
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
-            if self._settled(here, step):
+            if self._settled(here, step) or self._unimproved >= 4:  # measures swing along curved constraints
                 converged = True
                 break
             there = self._advance(here, program, step)
@@ -122,6 +123,11 @@ class SQP:
 
     def _keep(self, here: Iterate) -> None:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
+        if here.violation.worst > self.tolerance or not self.measures:
+            return
+        worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
+        clearly = self._kept is None or self._kept.at.measure - here.at.measure > worth
+        self._unimproved = 0 if clearly else self._unimproved + 1
         if self._better_than_kept(here):
             self._kept = here
 

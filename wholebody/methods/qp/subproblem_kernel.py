@@ -36,7 +36,7 @@ def sort_rows(
 ) -> None:
     """`fill_rows` for a call from Python, which gives the parts of `LinearRows`, of `Terms` and of `Rows`.
 
-    Records of as many arrays would take twice as long as the call.
+    See `active_set_kernel.solve_growing` for what records would cost.
     """
     there = LinearRows(error, error_jacobian, value, value_jacobian, gap, gap_jacobian, gap_contact, clearance, number)
     rows = rows_in(soft, soft_values, elastic, elastic_values, labels, len(error), 0)

@@ -47,7 +47,7 @@ def solve(
 ) -> tuple[bool, int, float, float, float, float, float, float, float, float]:
     """Sort the rows of a linearisation, build the program of a step and solve it from the last active set.
 
-    Records of these arrays would cost 30 us of a step of 100 us: twice as much at the call, and to be made.
+    It takes arrays, not records; see `active_set_kernel.solve_growing` for what a record costs at a call.
 
     Args:
         value: (g + c,) errors of goals and values of constraints; see `PackedLinearisation`, like the next eight.
