@@ -3,8 +3,9 @@
 Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it
 leads to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is
 far, a step must lessen the violation; near, it must lessen the measures, as the Lagrangian counts them, and stay inside
-a funnel of violation that narrows. No penalty weight has to be guessed, and measures may improve along curved
-constraints in long steps. Steps that could have jumped over something are swept.
+a funnel of violation, which narrows where a descent strays from a posture that fits. No penalty weight has to be
+guessed, and measures may improve along curved constraints in long steps. Steps that could have jumped over something
+are swept.
 """
 
 from __future__ import annotations
@@ -104,7 +105,11 @@ class SQP:
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
             step = self._foreseen(here, program, answer)
-            if self._settled(here, step) or self._unimproved >= 4:  # measures swing along curved constraints
+            swings = self._unimproved >= 4  # the measures, along curved constraints
+            if swings or self._radius < LEAST_RADIUS or self._settled(here, step):
+                if strayed := self._strayed(here):
+                    here = self._return_to(strayed)
+                    continue
                 converged = True
                 break
             there = self._advance(here, program, step)
@@ -113,13 +118,26 @@ class SQP:
                 self._keep(here)
             elif self._watched is not None:
                 here, self._watched = self._watched, None
-            elif self._radius < LEAST_RADIUS:
-                converged = True
-                break
         here = here if self._watched is None else self._watched
         if self._kept is not None and not self._better_than_kept(here):
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
+
+    def _strayed(self, here: Iterate) -> Iterate | None:
+        """The best posture that fits, where steps along the measures led from it to one that cannot be made to fit.
+
+        None for an offset: goals that stay where they were left, out of reach, are singular, and every step strays.
+        """
+        lost = self.offset is None and here.violation.worst > self.tolerance
+        return self._kept if lost and self._width > self.tolerance else None
+
+    def _return_to(self, kept: Iterate) -> Iterate:
+        """Go on from a posture that fits with a narrower funnel, so that no step strays as far again."""
+        self._width *= 0.3  # 0.5 strays again; 0.1 creeps along contacts
+        self._radius, self._gain, self._damping = DESCENT.first_radius, 1.0, 0.0
+        self._shift, self._watched = np.zeros_like(self._shift), None
+        self._ahead.reset()
+        return kept
 
     def _keep(self, here: Iterate) -> None:
         """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
@@ -181,9 +199,9 @@ class SQP:
             if here.at.planes is not None:
                 self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
-            if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
-                saved = self.subproblem.saving(program, here.rows, parts.tangential)
-                saved -= multipliers.change(program, parts.tangential)
+            if (answer.active.lower | answer.active.upper).any():
+                # Bounds hold back more than the curvature says, and the normal part too has a gain on the way to a gap.
+                saved = self.subproblem.saving(program, here.rows, x) - multipliers.change(program, x)
             bent = here.at.planes is not None and len(here.at.planes.bend)
             # share of a gain that is worth a step, where its curvature is known
             flat = saved / self._gain <= (1e-2 if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
