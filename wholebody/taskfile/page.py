@@ -75,7 +75,8 @@ def _types(table: Table, before: Mapping[str, Table]) -> list[str]:
         same = [name for name, form in forms.items() if _has(other, name, form)]
         if same:
             lost = any(len(forms[name].keys) < len((other.forms or {})[name].keys) for name in same)
-            shared += f"- {', '.join(f'`{name}`' for name in same)}: as of `[[{earlier}]]`{', without `weight`' if lost else ''}\n"
+            names, lacks = ", ".join(f"`{name}`" for name in same), ", without `weight`" if lost else ""
+            shared += f"- {names}: as of `[[{earlier}]]`{lacks}\n"
             forms = {name: form for name, form in forms.items() if name not in same}
     weights = [key for form in forms.values() for key in form.keys if key.name == "weight"]
     if weights:  # one row for all types, which have the unit alone
