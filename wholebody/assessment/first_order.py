@@ -122,7 +122,7 @@ class FirstOrder:
 
 
 def _optimality(asked: _Asked, state: State, active: _Active) -> float:
-    """What is left of the objective's gradient after the best combination of all active gradients."""
+    """Residual of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
     goals = [(*values_and_rows(goal, goal.error, state), goal) for goal in asked.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
@@ -243,7 +243,7 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
-    """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
+    """How hard each labelled row pushes against the objective's gradient (nv,), and its residual (nv,)."""
     equal, one_way = np.vstack(signed.rows), np.vstack(one_sided.rows)
     basis = _row_space(equal)
     room = objective - objective @ basis.T @ basis

@@ -70,7 +70,7 @@ def concluded(
     """The solution.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         ending: the end of the search.
         method: name of the method and of its solver.
         tolerance: metres and radians to which the method meets goals and constraints.

@@ -63,7 +63,7 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
     """All contradictions, those of constraints first.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         workspace: of the run; its state is left at the problem's start.
     """
     finder = _Finder(problem, workspace)
@@ -299,7 +299,7 @@ def in_words(found: tuple[Contradiction, ...]) -> str:
     if not found:
         return ""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return f"what is asked contradicts itself: {found[0].text}{more}"
+    return f"the problem contradicts itself: {found[0].text}{more}"
 
 
 def least_left(found: tuple[Contradiction, ...]) -> float | None:

@@ -53,7 +53,7 @@ class NewtonTracker(NotCopyable):
     remembers the previous frame, so it serves one motion and one thread at a time.
 
     Attributes:
-        problem: the problem whose goals it follows.
+        problem: to be solved whose goals it follows.
         dt: seconds a frame; None for frames without a time step.
         workspace: its own workspace; between calls others may move it.
         unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
@@ -69,7 +69,7 @@ class NewtonTracker(NotCopyable):
         """Build the equations.
 
         Args:
-            problem: the problem whose goals it follows.
+            problem: to be solved whose goals it follows.
             settings: of whole solves.
             dt: seconds a frame; None for frames without a time step.
             solve: the method, for solves with measures relative to another posture.

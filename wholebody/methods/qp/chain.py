@@ -151,7 +151,7 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
     """A posture that meets the goals with everything held: the first that is found, or of the first few the best.
 
     Args:
-        problem: what is asked.
+        problem: to be solved.
         workspace: of the run.
         budget: of the method.
         control: is told of every descent.

@@ -1,6 +1,6 @@
 """Feasibility first: from a start to a posture that fits, by whole Gauss-Newton steps in a small box, without measures.
 
-Each program asks for all that is left of the goals and lets no degree of freedom go farther than the box. So the step
+Each program asks for the whole residual of the goals and lets no degree of freedom go farther than the box. So the step
 slides along what is in the way with all of its length: the joints that are held up stay, and the others go on. A step
 that asks for a piece of the way and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
 where they go to and fro the box shrinks.
@@ -39,7 +39,7 @@ class Feasibility:
     """One attempt; call `run` once.
 
     Attributes:
-        problem: what is asked.
+        problem: to be solved.
         subproblem: builds the programs.
         lineariser: linearises the problem.
         solver: solves the programs.

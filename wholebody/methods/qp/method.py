@@ -94,7 +94,7 @@ class QP(Checked):
         raises for a goal out of reach or a start in penetration: the status says so.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:

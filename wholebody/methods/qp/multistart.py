@@ -76,8 +76,8 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._left = budget.programs  # that attempts after the first may still solve
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
-        self._least = 0.0  # what is known to be left of the goals at least, metres
-        self._minima = Minima()  # where relaxed probes ended that were pushed out of things
+        self._least = 0.0  # lower bound of the goals' residual, metres
+        self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._out_of_reach = False  # which is known
@@ -182,8 +182,8 @@ class Multistart:
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe, and a descent from where it reaches the goals.
 
-        It first goes through things, where limbs can change sides, and then is pushed out of them. Where many in a row,
-        although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
+        It first goes through things, where limbs can change sides, and then is separated from them. Where many in a
+        row, with nothing in their way, came no nearer than the best posture, the goals are out of reach.
         """
         tolerance = self.budget.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
@@ -370,7 +370,7 @@ class Multistart:
         )  # fmt: skip
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
-        """Keep the better one; whether what is asked holds now."""
+        """Keep the better one; whether the problem is solved now."""
         if self._best is None or better(local, self._best, self.budget.tolerance):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.budget.tolerance

@@ -62,7 +62,7 @@ class Subproblem:
         """Read off which constraint rows are equalities.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             state: of the run; it is moved to the problem's start.
         """
         lower, upper, weight = [], [], []
@@ -177,7 +177,7 @@ class Subproblem:
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought. The squares
                 that they are the sum of are soft rows, after those of `rows`.
-            gain: share of the way to the least measures that the step is to go.
+            gain: share of its tangential part that the step has.
         """
         squares = at.squares if measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature

@@ -101,5 +101,5 @@ class Extrapolation:
         self._longest = max(SHORTER * self._longest, 1.0)
 
     def reset(self) -> None:
-        """Begin anew: a step was rejected, or the goals are far."""
+        """Forget the past steps: one was rejected, or the goals are far."""
         self._memory.reset()

@@ -22,7 +22,7 @@ from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.steps import FrameStep, QPStep
-from wholebody.methods.qp.turning import foreseen, least_unseen, unseen_by_rows
+from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
@@ -275,7 +275,7 @@ class QPTracker(NotCopyable):
         rows, groups = self._program.rows, None
         for _ in range(TRACKING.corrections):
             short, q = self._shortfall(
-                at, displacement, np.maximum(began, foreseen(rows, asked, displacement)), began, midway
+                at, displacement, np.maximum(began, predicted_distances(rows, asked, displacement)), began, midway
             )
             if not (short > unseen).any():
                 return displacement, share, q
