@@ -25,7 +25,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import values_and_rows
 
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
-MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
+MET = 1e-4  # m, rad: goals nearer than this count as met, and constraints as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
 
 
@@ -148,7 +148,7 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
-    """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
+    """What keeps a posture from meeting the goals, or the constraints; the hardest first.
 
     If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """

@@ -287,7 +287,7 @@ class _Finder:
         said = [f"{owners[k]} (kept by {self._fixed[group].by})" if (group := self._group[joint[k]]) in self._fixed
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
-        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are asked" if asked else "")
+        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
 
 
 def _entry(value: Callable[[State], Array], row: int, state: State) -> float:

@@ -24,7 +24,7 @@ class Try(NamedTuple):
     Attributes:
         place: its number.
         reached: whether a posture was found.
-        inside: whether the place contradicts what must hold, so that it was not searched.
+        inside: whether the place contradicts the constraints, so that it was not searched.
         left: distance to the nearest posture that was found, metres.
         sure: whether the search says that there is nothing nearer, so that places within that distance are left out.
         measure: weighted sum of the measures at the posture.

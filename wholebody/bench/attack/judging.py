@@ -182,7 +182,7 @@ class _Body:
         raise TypeError(f"the judge does not know the goal {type(term).__name__}")
 
     def constraint(self, term: Any) -> Iterator[float]:
-        """By how much a constraint or a frozen joint misses what must hold; nothing for bounds on speeds."""
+        """By how much a constraint or a frozen joint is violated; nothing for bounds on speeds."""
         if isinstance(term, wb.Hold):
             wanted = self._at(term.frame, self._before) if term.at is None else _placement(term.at)
             yield apart(self._at(term.frame), wanted, term.orientation)

@@ -127,7 +127,7 @@ class NewtonTracker(NotCopyable):
             if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
-            # where the time of a frame was not enough to restore what must hold, the next goes on from here
+            # where the time of a frame was not enough to restore the constraints, the next goes on from here
             cut = BUDGET.spent > 1.0 and not found.hard <= FRAMES.tolerance
             end = q if cut else active_system.posture(found.x)
             return NewtonStep(end, spent, found.systems, active_system.structures)

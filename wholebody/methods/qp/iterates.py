@@ -111,12 +111,12 @@ def judge(
 
 
 def held(local: LocalSolution, tolerance: float) -> bool:
-    """Whether what must hold does where a descent ended."""
+    """Whether the constraints hold where a descent ended."""
     return broken(local) <= tolerance
 
 
 def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
+    """Whether one descent ended better: where all is met, then in the constraints, the goals, the measures."""
     met = one.violation.worst <= tolerance
     if met != (other.violation.worst <= tolerance):
         return met
@@ -131,5 +131,5 @@ def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
 
 
 def broken(local: LocalSolution) -> float:
-    """By how much what must hold is missed where a descent ended [m, rad]."""
+    """Largest violation of constraints where a descent ended [m, rad]."""
     return max(local.violation.hold, local.violation.elastic)

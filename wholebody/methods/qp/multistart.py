@@ -319,7 +319,7 @@ class Multistart:
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
 
     def _approach(self, begin: Array) -> None:
-        """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
+        """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
         tolerance = self.budget.tolerance
         local = self._closest().with_contacts(begin, tolerance, self._at_most(SEARCH.coming_near))
         self.spent += local.iterations
@@ -335,7 +335,7 @@ class Multistart:
         return Closest(self.problem, self.lineariser, self.solver, self.control)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
-        """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""
+        """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
         most = self._at_most(SEARCH.staying) if held(local, self.budget.tolerance) else self.budget.iterations
         stayed = self._descent(most, nearest, "nearest").run(local.q)

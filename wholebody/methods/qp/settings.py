@@ -33,7 +33,7 @@ class Corrections(NamedTuple):
         rounds: most times that violated rows are added before all rows are in.
         most: corrections of one set before another solver is asked.
         of_guess: corrections of a set that was guessed from an approximate answer.
-        at_once: how many of them put right all that is wrong; as that may cycle, later ones change the worst entry.
+        at_once: how many of them correct all that is wrong; as that may cycle, later ones change the worst entry.
         tolerance: by which x may be out of its box and a row violated, radians and metres.
     """
 
@@ -305,7 +305,7 @@ class TrackingNumbers(NamedTuple):
         programs: most of a frame, and of one that is asked for more exactly than that; more = nearer to a goal that
             turns quickly, dearer frames where it cannot be met. With 3 for both, one exact frame in twenty ends 1e-5 m
             short.
-        braked: m, rad: what must hold is missed by more where joints brake for their limits: they do not then.
+        braked: m, rad: constraints are violated by more where joints brake for their limits: they do not then.
         out: m: overlap with what came into the figure that is left; half of what counts as an overlap.
         worth: share of the error that another program must leave at most for one more to follow.
         room: times what a pair may get nearer by turning: with more room after a step it is not looked at.

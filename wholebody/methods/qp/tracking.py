@@ -85,7 +85,7 @@ class QPTracker(NotCopyable):
         Things that move (`Scene.move` with `over`) are followed by as many programs as their speed needs; what
         they could not be kept apart from is named in the answer.
 
-        Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
+        Without `measures` it is the least step that meets the goals, which corrects what a step with them left: it
         ends as near to the goals as its own curvature lets it, and does not go on to improve the measures.
 
         Raises:
@@ -210,7 +210,7 @@ class QPTracker(NotCopyable):
         at = self._linearised(q)
         answer = program.solve(at, measures)
         if self._left is None and answer.missed > TRACKING.braked:
-            answer = program.solve(self._unbraked(at), measures)  # what must hold comes before soft stops
+            answer = program.solve(self._unbraked(at), measures)  # constraints come before soft stops
         motion = answer.motion
         if motion > 0.5 * self._query_distance and answer.worst > TRACKING.unseen:
             # something came in fast: to get out of its way, one must look as far as one has to go
