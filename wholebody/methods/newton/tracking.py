@@ -101,7 +101,7 @@ class NewtonTracker(NotCopyable):
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
-        weights if that lessened light goals at the expense of heavy ones.
+        weights if that reduced light goals at the expense of heavy ones.
 
         Args:
             q: posture at the beginning of the frame.
@@ -149,9 +149,9 @@ class NewtonTracker(NotCopyable):
             active_system.even = False
 
     def _trades(self, before: Array, after: Array) -> bool:
-        """Whether light goals were lessened at the expense of heavy ones, from one posture (nq,) to another.
+        """Whether light goals were reduced at the expense of heavy ones, from one posture (nq,) to another.
 
-        They were where the weighted error lessened by a smaller share than half of that of the error without weights.
+        They were where the weighted error decreased by a smaller share than half of that of the error without weights.
         """
         goals = self.problem.goals
         weights = np.sqrt([goal.weight for goal in goals])

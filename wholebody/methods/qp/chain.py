@@ -214,7 +214,7 @@ def _is_free(problem: Problem, workspace: Workspace, q: Array) -> bool:
 
 
 def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
-    """The measure, where it is one squared distance that the other joints cannot lessen; else None."""
+    """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
     measures = problem.measures
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None

@@ -90,7 +90,7 @@ def judge(
 ) -> StepAcceptance:
     """Judge a step.
 
-    Far from the goals it must lessen the violation. Near, it must lessen the measures and stay inside a funnel, the
+    Far from the goals it must reduce the violation. Near, it must reduce the measures and stay inside a funnel, the
     violation that is allowed meanwhile (Gould and Toint 2010, whose funnel narrows).
 
     Args:

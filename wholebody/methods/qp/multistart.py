@@ -60,7 +60,7 @@ class Attempt(NamedTuple):
 
 
 class Multistart:
-    """The search for one problem, remembering the best posture."""
+    """The search for one problem; it keeps the best posture."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, budget: Budget, control: Control
@@ -171,7 +171,7 @@ class Multistart:
         return local
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
-        """A posture that fits, without regard to the measures; where there is one, they improve from there."""
+        """Find a feasible posture without measures, and descend with measures from there."""
         local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
         self.spent += local.iterations
         if local.violation.worst > self.budget.tolerance or not self.budget.measures:
@@ -204,9 +204,9 @@ class Multistart:
         return local
 
     def _restart_for_measure(self) -> None:
-        """Where all is met, look for a lower minimum of the measures, from other starts that are screened first.
+        """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
 
-        A posture that fits costs a few programs, and its measure tells which minimum it is near; a descent costs many.
+        A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
         """
         count, tolerance = self.budget.restarts_for_measure, self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
@@ -225,7 +225,7 @@ class Multistart:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
-        """Look whether the goals can be met from a start, by few programs and without regard to the measures.
+        """Test whether the goals can be met from a start, by few programs and without measures.
 
         Args:
             start: (nq,).
@@ -245,7 +245,7 @@ class Multistart:
         )  # fmt: skip
 
     def _find_closest(self) -> None:
-        """Where the goals are not reached, come as near as goes, then improve the measures from there."""
+        """Where the goals are not reached, find the closest posture, then improve the measures from there."""
         tolerance = self.budget.tolerance
         if self.control.over:
             return
@@ -264,7 +264,7 @@ class Multistart:
                 self._best = local
 
     def _proven(self) -> bool:
-        """Whether the best posture is known to be as near to the goals as any."""
+        """Whether the best posture is known to be the closest to the goals."""
         near = self.best.violation.left <= NEAREST * self._least
         return near and bool(self._least) and held(self.best, self.budget.tolerance)
 
@@ -309,7 +309,7 @@ class Multistart:
         return int(rows.soft[: rows.goals].any(axis=0).sum())
 
     def _closest_from_best(self) -> None:
-        """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
+        """Find the closest posture from the best one; where that is stationary no closer one is near."""
         nearest = self._closest().with_contacts(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
         self.spent += nearest.iterations
         if not nearest.converged:
@@ -328,7 +328,7 @@ class Multistart:
         self._accept(local, self.how)
 
     def _at_most(self, programs: int) -> int:
-        """So many programs, or what one descent may have where that is less."""
+        """The smaller of this number of programs and that of one descent."""
         return min(programs, self.budget.iterations)
 
     def _closest(self) -> Closest:
@@ -351,7 +351,7 @@ class Multistart:
     def _descend(
         self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
     ) -> LocalSolution:
-        """Descend from a start; where that ends with something that must hold not holding, restore it."""
+        """Descend from a start; restore constraints that are violated at its end."""
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
         local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
         self.spent += local.iterations

@@ -261,8 +261,8 @@ class StepNumbers(NamedTuple):
         radius: rad, m. A goal that jumps asks for `error_clamp` times this in a step. Larger: faster, and more to
             second order.
         damping: of the pull of goals out of reach. Larger: slower to close in; smaller: limbs oscillate at obstacles.
-        settling: s in which measures lessen by 1/e beside goals. Longer: slower to settle; shorter: joints swing about
-            the optimum.
+        settling: s in which measures decrease by 1/e beside goals. Longer: slower to settle; shorter: joints swing
+            about the optimum.
         resting: m, rad: a goal missed by less than this, and more than predicted, rests; less is reached.
         curved: m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps.
         little: damping that makes no difference to how a step looks. Larger: limbs jump where a goal is just blocked.

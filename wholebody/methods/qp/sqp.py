@@ -1,4 +1,4 @@
-"""Sequential quadratic programming from one start to the nearest posture that fits.
+"""Sequential quadratic programming from one start to a local solution.
 
 Each iteration linearises, solves one quadratic program, and judges its step by the violation and the measures, with a
 funnel (Gould and Toint 2010): far from the goals a step must reduce the violation; near, it must reduce the Lagrangian
@@ -46,7 +46,7 @@ class SQP:
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
-            posture that fits is the end.
+            feasible posture is the end.
         full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
             steps are rejected or gain little; else for a piece of it.
         control: what may end it.
@@ -71,8 +71,8 @@ class SQP:
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
         self._watched: Iterate | None = None  # where to return if a tentative step is not repaired
         self._ahead = Extrapolation()
-        self._unimproved = 0  # postures that fit, one after the other, and are hardly better than the best
-        self._kept: Iterate | None = None  # best posture that fits
+        self._unimproved = 0  # feasible postures in a row that are hardly better than the best
+        self._kept: Iterate | None = None  # best feasible posture
         self._gain = 1.0  # share of its tangential part that a step has
         self._multipliers: Multipliers | None = None  # of the last program near the goals
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
@@ -83,7 +83,7 @@ class SQP:
         self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
-        self._keep(here)  # a start that fits is an answer, should the descent end early
+        self._keep(here)  # a feasible start is an answer, should the descent end early
         count, converged = 0, False
         while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
@@ -120,7 +120,7 @@ class SQP:
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
     def _keep(self, here: Iterate) -> None:
-        """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
+        """Remember the best feasible posture: along curved constraints the measures swing near an optimum."""
         if here.violation.worst > self.tolerance or not self.measures:
             return
         worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))

@@ -116,7 +116,7 @@ class StepProgram:
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
 
-        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would lessen light ones at the
+        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would reduce light ones at the
         expense of heavy ones, which conflict then, weights count.
 
         Args:
@@ -183,9 +183,9 @@ class StepProgram:
         return answer, damping
 
     def _trades(self, x: Array) -> bool:
-        """Whether the displacement x (nv,) lessens light goals at the expense of heavy ones.
+        """Whether the displacement x (nv,) reduces light goals at the expense of heavy ones.
 
-        It does where the weighted error lessens by a smaller share than half of that of the error without weights.
+        It does where the weighted error decreases by a smaller share than half of that of the error without weights.
         """
         rows = self._parts.rows
         error = rows.soft_error[: self.goals]

@@ -39,7 +39,7 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     """
     count = len(planes.value)
     weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
-    # keys of supporting planes are below this, out of the way of all others
+    # keys of supporting planes are below this, apart from all others
     return with_values(
         rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
@@ -142,7 +142,7 @@ class Subproblem:
         )  # fmt: skip
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
-        """By how much the measures of a program lessen, to second order, with the displacement x (nv,)."""
+        """By how much the measures of a program decrease, to second order, with the displacement x (nv,)."""
         return -float(program.linear @ x) / self.scale - self.quadratic_part(program, rows, x)
 
     def quadratic_part(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
