@@ -18,7 +18,7 @@ CASES = {
     "piece on an edge": (wb.Touch("right_hand:2", "thing"), 2),
     "segment across an edge": (wb.Touch("right_hand", "thing"), 7),  # no face has the normal of two edges that cross
     "palm on a box": (wb.Grasp("right", "thing"), 5),
-    "piece on a board": (wb.Touch("right_hand:2", "thing"), None),  # long steps stray from the first posture that fits
+    "piece on a board": (wb.Touch("right_hand:2", "thing"), None),  # long steps leave the first feasible posture
 }
 
 
@@ -61,7 +61,7 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
 
 
 def test_feet_that_stand_cost_no_more_than_their_places() -> None:
-    """Toes that come down nearly parallel to what they stand on turn far for micrometres of their gap."""
+    """Toes nearly parallel to the step turn by degrees while their gap changes by micrometres."""
     scene = wb.Scene(wb.load("human", sex="female"))
     scene.add(wb.Box((0.6, 0.8, 0.3)), name="step", at=(0.18, 0.078, 0.036))
     problem = wb.Problem(scene, constraints=[wb.Stand("step")])

@@ -25,7 +25,7 @@ from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import values_and_rows
 
 ACTIVE = 1e-4  # m, rad: a constraint nearer to its bound than this counts as active
-MET = 1e-4  # m, rad: goals nearer than this count as met, and what must hold as holding
+MET = 1e-4  # m, rad: goals nearer than this count as met, and constraints as holding
 INDEPENDENT = 1e-9  # share of its length that a direction must have of its own to count as independent of others
 
 
@@ -122,7 +122,7 @@ class FirstOrder:
 
 
 def _optimality(asked: _Asked, state: State, active: _Active) -> float:
-    """What is left of the objective's gradient after the best combination of all active gradients."""
+    """Residual of the objective's gradient after the best combination of all active gradients."""
     nv = state.model.nv
     goals = [(*values_and_rows(goal, goal.error, state), goal) for goal in asked.goals]
     met = all(np.abs(error).max(initial=0.0) <= MET for error, _, _ in goals)
@@ -148,7 +148,7 @@ def _optimality(asked: _Asked, state: State, active: _Active) -> float:
 
 
 def _blockers(asked: _Asked, state: State, near: NearPairs, clearances: Array) -> tuple[Blocker, ...]:
-    """What keeps a posture from meeting the goals, or from holding what must hold; the hardest first.
+    """What keeps a posture from meeting the goals, or the constraints; the hardest first.
 
     If something is violated, the violated constraints come first, ordered by violation, then those that block repair.
     """
@@ -243,7 +243,7 @@ def _of_joint(model: pin.Model, column: int, limited: bool) -> Label:
 
 
 def _balanced(objective: Array, signed: _Rows, one_sided: _Rows) -> tuple[Array, Array]:
-    """How hard each labelled row pushes against the objective's gradient (nv,), and what is left of it (nv,)."""
+    """How hard each labelled row pushes against the objective's gradient (nv,), and its residual (nv,)."""
     equal, one_way = np.vstack(signed.rows), np.vstack(one_sided.rows)
     basis = _row_space(equal)
     room = objective - objective @ basis.T @ basis

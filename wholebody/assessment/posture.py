@@ -120,7 +120,7 @@ def assess(problem: Problem, q: Array) -> Assessment:
     """Judge a posture.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         q: (nq,) the posture.
 
     Raises:

@@ -234,7 +234,7 @@ class RigidBodies:
         time, stopped = self._until_impact(program, time, together)
         before = StepStart(state, self._near, self._margin, self._finder)
         start, weight = self._old, float(np.linalg.norm(self.gravity))
-        halvings, foreseen = 0, 0
+        halvings, predicted = 0, 0
         while True:
             self._move(program, time, together, start, before.kept)
             impulse = program.world_impulse()
@@ -246,14 +246,14 @@ class RigidBodies:
                 record.given_up += 1
                 break
             shares: tuple[float, ...] = (1.0,)
-            if least >= -(1e-4 if foreseen else 2e-5):  # m: less is made again more often, and parted less often
+            if least >= -(1e-4 if predicted else 2e-5):  # m: less is made again more often, and parted less often
                 free, shares = check_passing(state, before, self._near, self._margin, self._travel(time), time, weight)
                 if free:
                     break
-            start, met = program.remembered(time), bool(shares) and foreseen < 2
+            start, met = program.remembered(time), bool(shares) and predicted < 2
             if met:
-                self._add_foreseen(program, before, time, shares)
-                foreseen += 1
+                self._add_predicted(program, before, time, shares)
+                predicted += 1
             state.restore(before.kept)
             if met:
                 program.read_velocities(falling)
@@ -305,7 +305,7 @@ class RigidBodies:
             start = program.remembered(time)
             state.restore(kept)
 
-    def _add_foreseen(self, program: StepProgram, before: StepStart, time: float, shares: tuple[float, ...]) -> None:
+    def _add_predicted(self, program: StepProgram, before: StepStart, time: float, shares: tuple[float, ...]) -> None:
         """Let a program know the contact points where pieces are in each other at shares of its step."""
         state, end = self.state, self.state.copies()
         for share in shares:

@@ -96,7 +96,8 @@ NECK = (
     ("rotation", ("neck1_rotation", "neck2_rotation"), -80.0, 80.0),
 )
 """Angles of the neck with the limits of each alone, degrees: extension 60, flexion 50, to a side 45, rotation 80 (AMA,
-AAOS). That they end on an ellipsoid is an ESTIMATE: rotation lessens with flexion and extension (Walmsley et al. 1996).
+AAOS). That they end on an ellipsoid is an ESTIMATE: rotation decreases with flexion and extension (Walmsley et
+al. 1996).
 """
 
 

@@ -27,7 +27,7 @@ class Anderson:
         self.reset()
 
     def reset(self) -> None:
-        """Begin anew: after a rejected step, or far from the goals."""
+        """Forget the past steps: after a rejected step, or far from the goals."""
         self._step: Array | None = None  # whose displacement is not known yet
         self._steps: list[Array] = []
         self._displacements: list[Array] = []

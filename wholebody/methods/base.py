@@ -173,7 +173,7 @@ class SolvingTracker(NotCopyable):
     A step goes towards the answer as far as bounds on velocities allow.
 
     Attributes:
-        problem: the problem whose goals it follows.
+        problem: to be solved whose goals it follows.
         dt: seconds a step.
         workspace: its own workspace; between calls others may move it.
         unswept: 0: no step is tested for passing through things.
@@ -188,7 +188,7 @@ class SolvingTracker(NotCopyable):
 
         Args:
             method: solves the steps.
-            problem: the problem.
+            problem: to be solved.
             dt: seconds a step.
 
         Raises:

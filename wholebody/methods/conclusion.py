@@ -70,7 +70,7 @@ def concluded(
     """The solution.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         ending: the end of the search.
         method: name of the method and of its solver.
         tolerance: metres and radians to which the method meets goals and constraints.
@@ -127,7 +127,7 @@ def _message(problem: Problem, status: Status, judgement: Assessment, ending: En
     if judgement.holds(enough):
         return f"ran out of {ending.unit}: {left}"
     name, missed = _worst(problem, judgement, ending.q)
-    why = "what must hold cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
+    why = "the constraints cannot all hold" if status == "infeasible" else f"ran out of {ending.unit}"
     caveat = f"; {ending.caveat}" if ending.caveat else ""
     return f"{why}: {name} is missed by {missed:.3g} m or rad{caveat}"
 

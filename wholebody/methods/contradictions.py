@@ -63,7 +63,7 @@ def contradictions(problem: Problem, workspace: Workspace) -> tuple[Contradictio
     """All contradictions, those of constraints first.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         workspace: of the run; its state is left at the problem's start.
     """
     finder = _Finder(problem, workspace)
@@ -287,7 +287,7 @@ class _Finder:
         said = [f"{owners[k]} (kept by {self._fixed[group].by})" if (group := self._group[joint[k]]) in self._fixed
                 else f"{owners[k]} (frozen)" for k in (a, b)]  # fmt: skip
         what = f"{-1e3 * distance:.3g} mm inside" if distance < 0.0 else f"{1e3 * distance:.3g} mm from"
-        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are asked" if asked else "")
+        return f"{said[0]} is {what} {said[1]}" + (f", where {1e3 * asked:.3g} mm are required" if asked else "")
 
 
 def _entry(value: Callable[[State], Array], row: int, state: State) -> float:
@@ -299,7 +299,7 @@ def in_words(found: tuple[Contradiction, ...]) -> str:
     if not found:
         return ""
     more = f" (and {len(found) - 1} more)" if len(found) > 1 else ""
-    return f"what is asked contradicts itself: {found[0].text}{more}"
+    return f"the problem contradicts itself: {found[0].text}{more}"
 
 
 def least_left(found: tuple[Contradiction, ...]) -> float | None:

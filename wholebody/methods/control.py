@@ -117,7 +117,8 @@ class Control:
             return ""
         left = f"{1e3 * judgement.goal_error:.3g} mm and {np.degrees(judgement.goal_angle):.3g} degrees are left"
         broken = max(judgement.clearance_violation, judgement.constraint_violation, judgement.limit_violation)
-        return f"{self.reason}: {left}" + (f", and what must hold is missed by {broken:.3g} m or rad" * (broken > 1e-4))
+        also = f", and constraints are violated by {broken:.3g} m or rad" if broken > 1e-4 else ""
+        return f"{self.reason}: {left}{also}"
 
     def step_back(self, error: UndefinedTermError) -> None:
         """Note that a step was taken back: a term of one's own is not finite where it leads."""

@@ -46,7 +46,7 @@ class Descends(ABC):
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: the problem.
+            problem: to be solved.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:

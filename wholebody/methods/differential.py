@@ -28,7 +28,7 @@ REGULAR = 1e-3  # share of the measures' weight: weight of the motion itself
 DAMPING = 1e-3  # weight of the motion after a step opposed to the previous one, against goals of weight 1
 STIFFER, LOOSER = 4.0, 0.5  # factors on that, after another such step and after any other
 MOST_DAMPING = 10.0
-NEGLIGIBLE = 1e-4  # m, rad: what must hold and is missed by less than this is no reason to prefer an earlier posture
+NEGLIGIBLE = 1e-4  # m, rad: a constraint violated by less than this is no reason to prefer an earlier posture
 
 
 class Stopwatch(threading.local):

@@ -115,7 +115,7 @@ def solve(problem: Problem, method: str | Method = "qp", progress: Progress | No
     Ctrl-C ends the solve with the best posture so far, whose status is then "stalled".
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         method: "qp", "ccd", "newton", "placo", "dls", or a configured method such as
             `QP(solver="daqp", time_limit=0.1)`.
         progress: called after every iteration with its entry of the trace (see `TraceEntry`); the solve ends if it

@@ -145,7 +145,7 @@ def _nearest(clip: Clip, q: Array) -> int:
 
 
 class _Judge:
-    """What a clip is before it is freed, and what is asked of the answer.
+    """What a clip is before it is freed, and the requirements of the answer.
 
     Attributes:
         feet: segments or frames on which the figure stands.

@@ -209,7 +209,7 @@ class MethodResult(NamedTuple):
 
     Attributes:
         q: (n, nq) postures.
-        repair: whether the shared repair puts right what is left.
+        repair: whether the shared repair corrects what is left.
         frozen: joints and groups that the repair keeps as they are in the original postures.
         message: what did not succeed, one sentence; empty where all did, or where the judge sees it by itself.
         times: (n,) seconds of the clip as it was at which each frame is; None where the timing stays.

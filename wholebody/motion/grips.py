@@ -163,7 +163,7 @@ def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: f
     P = sp.csc_matrix(sp.kron(sp.csc_matrix(bands), sp.eye(3)) + 100.0 * across)  # c is 100
     shifts = np.zeros((count, 3))
     places = [*map(float, range(window.first, window.end)), *(gap + share for gap in passing for share in SHARES)]
-    room = 3e-4  # m: beyond what is asked; things come nearer by less between places that are looked at
+    room = 3e-4  # m: beyond the required distance; things come nearer by less between places that are looked at
     for _ in range(8):  # the normals turn less each time
         rows = [row for place in places for row in _rows_at(grip, place, q, shifts, clearance, window.first)]
         if min((row.distance for row in rows), default=NEAR) >= 0.5 * room:

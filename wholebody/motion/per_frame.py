@@ -1,7 +1,7 @@
 """Method "frames": every frame by tracking the original posture, from the deviation of the frame before.
 
 A forward pass follows the original motion as contacts let it. It is late where contact begins, so a backward pass
-follows it from the last frame to the first, and both are blended. What overlaps after that is put right by steps of the
+follows it from the last frame to the first, and both are blended. What overlaps after that is corrected by steps of the
 tracker, and what is left then, such as dips between frames, by the shared repair.
 """
 

@@ -1,8 +1,8 @@
-"""What a method left, put right: frames and motions between frames, and what is too rough, in windows of all frames.
+"""Corrects what a method left: frames and motions between frames, and what is too rough, in windows of all frames.
 
 Methods that make posture after posture leave motions that dip between two free frames, frames in which contact and what
-is held contradict each other, and kinks where contact begins and interpolation ends. All are mended by the program of
-the method "trajectory", which begins at the method's postures, so on the sides of things that they are on:
+is held contradict each other, and kinks where contact begins and interpolation ends. All are corrected by the program
+of the method "trajectory", which begins at the method's postures, so on the sides of things that they are on:
 
 - `repaired` finds the least smooth change of a few tenths of a second around each fault, with rows of contact in every
   frame and at the places between frames that dip. What passes right through something is kept on one side before.

@@ -112,7 +112,7 @@ class FrameMotion:
         pairs, table = near.pair, self._both.table
         coming = self.way[pairs].sum(axis=1)
         # Share of the width of two pieces by which one may come into the other before the figure gives way. More =
-        # fewer steps a frame; from a half on a figure may be pushed out on the far side.
+        # fewer steps a frame; from a half on a figure may end on the far side.
         room = np.clip(0.25 * table.widths[near.number], LEAST_APPROACH, LARGEST_APPROACH)
         room += np.maximum(near.distance, 0.0)
         least = float((room / np.maximum(coming, 1e-12)).min(initial=np.inf))

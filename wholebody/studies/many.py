@@ -326,7 +326,7 @@ def _alone(method: Any) -> Any:
 
 
 def fingerprint(*asked: Any) -> str:
-    """Fingerprint of what is asked.
+    """Fingerprint of a request.
 
     Raises:
         InputError: it cannot be sent to another process.

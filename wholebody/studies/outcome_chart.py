@@ -38,7 +38,7 @@ class Cell(NamedTuple):
         row: name of its row.
         column: name of its column.
         outcome: a name of `COLORS`.
-        left: distance that is left of the goals, metres; 0 writes nothing.
+        left: residual distance of the goals, metres; 0 writes nothing.
     """
 
     row: str

@@ -91,7 +91,7 @@ def heat(found: Any) -> Array:
 
 
 def _slice(axis: Any, found: Any, values: Array, k: int) -> Any:
-    """Draw one height: reached places green, the others by what is left, places inside of things gray."""
+    """Draw one height: reached places green, the others by their residual, places inside of things gray."""
     from matplotlib.colors import LinearSegmentedColormap
 
     colors = LinearSegmentedColormap.from_list(

@@ -15,7 +15,7 @@ from wholebody.methods.contradictions import contradictions
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
-SURE = 0.95  # share of what is left of a place within which no place is searched: 1 trusts descents to the last digit
+SURE = 0.95  # share of the distance to a missed place within which no place is searched: 1 trusts descents wholly
 
 
 class Try(NamedTuple):
@@ -24,7 +24,7 @@ class Try(NamedTuple):
     Attributes:
         place: its number.
         reached: whether a posture was found.
-        inside: whether the place contradicts what must hold, so that it was not searched.
+        inside: whether the place contradicts the constraints, so that it was not searched.
         left: distance to the nearest posture that was found, metres.
         sure: whether the search says that there is nothing nearer, so that places within that distance are left out.
         measure: weighted sum of the measures at the posture.
@@ -42,7 +42,7 @@ class Try(NamedTuple):
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked at every place.
+    """The problem of every place.
 
     Attributes:
         problem: its goals are met at every place too.
@@ -66,7 +66,7 @@ class Asked:
 
     @cached_property
     def alone(self) -> bool:
-        """Whether the place is the only goal, so that what is left of it is its distance from the reach."""
+        """Whether the place is the only goal, so that its residual is its distance from the reach."""
         return not self.problem.goals
 
 
@@ -176,7 +176,7 @@ _known: dict[str, Asked] = {}
 
 
 def search_brick(sent: tuple[str, bytes, Brick]) -> list[tuple[Try, int]]:
-    """Search a brick, in any process; what is asked is unpacked once a process."""
+    """Search a brick, in any process; the problem is unpacked once a process."""
     key, packed_asked, brick = sent
     if key not in _known:
         _known.clear()

@@ -52,7 +52,7 @@ class Task:
     Attributes:
         path: the file.
         title: its title, or its name.
-        problem: the problem, ready to be solved.
+        problem: to be solved, ready to be solved.
         method: the method that it names, with its settings.
         goal_names: the name of each goal in tables: its type and its frame.
         view: the camera of a picture.

@@ -114,7 +114,7 @@ class StepLimit(Bound):
 
     def braking(self, dt: float | None) -> Array:
         """(nv,) largest share of the way to its limit that each freedom goes in a step of dt seconds."""
-        # s in which the way to a joint's limit lessens by 1/e at most: longer = softer stops, shorter = jolts
+        # s in which the distance to a joint's limit decreases by 1/e at most: longer = softer stops, shorter = jolts
         share = 1.0 if dt is None else 1.0 - float(np.exp(-dt / 0.05))
         return np.where(np.isfinite(self._velocity), share, 1.0)
 

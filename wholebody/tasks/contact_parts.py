@@ -319,7 +319,7 @@ class ContactTerm(Goal, Constraint):
         return np.array([flag for part in self.parts for flag in part.in_radians], dtype=bool)
 
     def value(self, state: State) -> Array:
-        """(m,) what is left of the contact [m, rad]."""
+        """(m,) residual of the contact [m, rad]."""
         return np.concatenate([part.rows(state)[0] for part in self.parts])
 
     def error(self, state: State) -> Array:

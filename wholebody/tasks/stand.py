@@ -118,7 +118,7 @@ class Stand(Constraint):
         return np.array(flags + [False] * self._counts()[1], dtype=bool)
 
     def value(self, state: State) -> Array:
-        """(m,) what is left of the contacts [m, rad], then distances of the centre of mass inside the edges [m]."""
+        """(m,) residuals of the contacts [m, rad], then distances of the centre of mass inside the edges [m]."""
         rows = [part.rows(state)[0] for part in self.parts]
         return np.concatenate(rows if self.polygon is None else [*rows, self.polygon.rows(state)[0]])
 

@@ -38,7 +38,7 @@ class ProblemDrag:
     """Follows a goal of a problem; see `Drag`.
 
     Attributes:
-        problem: the problem; its goals are replaced as they move.
+        problem: to be solved; its goals are replaced as they move.
         q: (nq,) the present posture.
         tracker: the method's tracker of these goals.
     """

@@ -22,7 +22,7 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
     the posture is kept too.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         tracker: of a method for this problem.
         q: the present posture.
     """

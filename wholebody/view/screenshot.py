@@ -105,7 +105,7 @@ class Screenshots:
         """Bring the page to what the commands draw."""
         width, height = check_size(size)
         browser, before = self._sized((width, height)), self._shown
-        self._shown = None  # until all is drawn: after an error the next picture begins anew
+        self._shown = None  # until all is drawn: after an error the next picture is drawn whole
         lacking = None if before is None else changes(before, wanted)
         if lacking is None or before is None:
             browser.open_html(picture_page())

@@ -119,7 +119,7 @@ def test_false_claims_are_wrong(solved: Any) -> None:
     assert "its least distance is" in outcome(solved, assessment=better)[1]
     assert outcome(solved, q=np.full(2, np.nan))[0] == "wrong"
     out = np.array([0.0, 3.0])
-    assert "what must hold is missed" in outcome(solved, q=out, assessment=wb.assess(problem, out))[1]
+    assert "constraints are violated" in outcome(solved, q=out, assessment=wb.assess(problem, out))[1]
 
 
 def test_an_answer_inside_of_something_is_wrong() -> None:
@@ -132,6 +132,6 @@ def test_an_answer_inside_of_something_is_wrong() -> None:
     lie = replace(solution, q=inside, status="solved", assessment=wb.assess(problem, inside))
     found = judged(problem, goals, lie, witness=False)
     assert found.outcome == "wrong"
-    assert "missed by 0.1 m" in found.words
+    assert "violated by 0.1 m" in found.words
     honest = judged(problem, goals, solution, witness=False)
     assert honest.outcome == "right"

@@ -31,7 +31,7 @@ class Judged:
         finite: whether it is made of numbers.
         goal: largest goal error [m, rad].
         least: least signed distance of any pair [m]; inf without pairs.
-        shortfall: by how much the worst pair misses what is asked of it [m].
+        shortfall: by how much the worst pair misses its required distance [m].
         closest: the worst pair.
         limits: how far out of its limits the worst joint is [rad, m].
         constraints: how far the worst constraint is from holding [m, rad].
@@ -162,7 +162,7 @@ class _Body:
             pin.centerOfMass(model, data, posture)
 
     def goal(self, term: Any) -> float:
-        """What is left of a goal, metres or radians, the larger."""
+        """Residual of a goal, metres or radians, the larger."""
         if isinstance(term, wb.Point):
             there = self._at(term.frame).act(np.array(term.offset, dtype=float))
             return float(np.linalg.norm(there - np.array(term.target, dtype=float)))
@@ -182,7 +182,7 @@ class _Body:
         raise TypeError(f"the judge does not know the goal {type(term).__name__}")
 
     def constraint(self, term: Any) -> Iterator[float]:
-        """By how much a constraint or a frozen joint misses what must hold; nothing for bounds on speeds."""
+        """By how much a constraint or a frozen joint is violated; nothing for bounds on speeds."""
         if isinstance(term, wb.Hold):
             wanted = self._at(term.frame, self._before) if term.at is None else _placement(term.at)
             yield apart(self._at(term.frame), wanted, term.orientation)

@@ -222,7 +222,7 @@ def _wrongs(problem: Problem, solution: Solution, found: Judged, tolerance: floa
     if solution.status == "solved" and found.goal > allowed:
         wrongs.append(f"goals are missed by {found.goal:.3g} m or rad")
     if solution.status in ("solved", "unreachable") and found.violation > allowed:
-        wrongs.append(f"what must hold is missed by {found.violation:.3g} m or rad")
+        wrongs.append(f"constraints are violated by {found.violation:.3g} m or rad")
     if solution.status == "infeasible" and found.violation < 0.5 * tolerance:
         wrongs.append(f"everything holds to {found.violation:.3g} m or rad")
     said = solution.assessment

@@ -137,7 +137,7 @@ USERS = "users"  # module of the terms below: answers are checked of classes fro
 
 
 class Asked(NamedTuple):
-    """What is asked, and which answer of a term is bad.
+    """A request, and which answer of a term is bad.
 
     Attributes:
         frame: that moves.

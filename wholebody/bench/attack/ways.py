@@ -109,11 +109,11 @@ class Watch:
         if there.limits > max(here.limits, 1e-9) + 1e-9:
             self._wrongs.append(f"frame {number}: a joint is {there.limits:.3g} out of its limits")
         way = pin.difference(model, before, after)
-        # Rows are linear: a step may worsen what must hold by the square of its length, and 5 mm or mrad.
+        # Rows are linear: a step may worsen constraints by the square of its length, and 5 mm or mrad.
         turned = (5e-3 + float(way @ way)) * max(1.0, Pairs(self._problem.scene).size)
         apart = here.least > -5e-4  # what is inside of something and held cannot have both
         if apart and there.constraints > max(here.constraints, turned):
-            self._wrongs.append(f"frame {number}: what must hold is missed by {there.constraints:.3g}")
+            self._wrongs.append(f"frame {number}: constraints are violated by {there.constraints:.3g}")
         if np.abs(way).max(initial=0.0) > self._most * (1.0 + 1e-6) + 1e-9:
             self._wrongs.append(f"frame {number}: a joint moves {np.abs(way).max():.3g}, allowed are {self._most:.3g}")
         self._dip(number, before, after)

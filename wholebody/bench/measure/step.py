@@ -18,8 +18,8 @@ from wholebody.bench.tables import programs_text
 
 REFERENCE = "placo"
 TURN = 50
-"""Steps that a tool makes before the next one does. Fewer: nearer in time, and more steps whose data others pushed out
-of the caches; these are 2 %, so that they do not make the p95."""
+"""Steps that a tool makes before the next one does. Fewer: nearer in time, and more steps whose data
+others evicted from the caches; these are 2 %, so that they do not make the p95."""
 
 
 class Run:

@@ -127,7 +127,7 @@ class AssemblyBodies:
             name: one that no body and no other figure has.
             figure: such as `wb.load("human")`.
             start: (nq,) posture, or the name of one of the figure's; None for its first posture.
-            constraints: what must hold of it, such as `wb.Hold("left_foot")` and `wb.Balance()`.
+            constraints: of it, such as `wb.Hold("left_foot")` and `wb.Balance()`.
             color: of its pieces.
 
         Raises:

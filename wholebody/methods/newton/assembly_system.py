@@ -80,7 +80,7 @@ class AssemblySystem(ActiveSystem):
         """Take the equations.
 
         Args:
-            held: what must hold.
+            held: the constraints.
             weight: (7 n,) of each variable in the least motion.
             algebra: name of the factorisation.
             figures: whose bodies are placed by their postures.

@@ -30,7 +30,7 @@ class Role(NamedTuple):
     """What equations are for.
 
     Attributes:
-        weight: of goals, which may be violated; None for what must hold, and for measures.
+        weight: of goals, which may be violated; None for constraints and measures.
         one_sided: whether they are inequalities, residual >= 0.
         objective: whether they need not hold, and their squares are minimised.
     """

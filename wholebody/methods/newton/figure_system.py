@@ -19,7 +19,7 @@ class FigureSystem(ActiveSystem):
     """A problem's equations, renewed from posture to posture: every iterate is a posture.
 
     Attributes:
-        problem: the problem.
+        problem: to be solved.
         workspace: of the run.
         bodies: of the figure.
         objective: the rows of the measures.
@@ -29,7 +29,7 @@ class FigureSystem(ActiveSystem):
         """Build the equations.
 
         Args:
-            problem: the problem.
+            problem: to be solved.
             workspace: of the run, for as long as this is used.
             algebra: name of the factorisation.
             yielding: minimise the violation of the constraints, in place of the goals.

@@ -56,7 +56,7 @@ class Objective:
         """Prepare the rows for the figure's revolute joints.
 
         Args:
-            problem: the problem.
+            problem: to be solved.
             bodies: of its figure.
             state: of the run; it is moved.
         """

@@ -58,7 +58,7 @@ class Newton(Settings):
         """Find a posture. Goals out of reach and starts in penetration are answers, not errors.
 
         Args:
-            problem: the problem.
+            problem: to be solved.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:
@@ -77,7 +77,7 @@ class Newton(Settings):
         """A tracker of goals that move from call to call; it analyses its equations once.
 
         Args:
-            problem: the problem.
+            problem: to be solved.
             dt: seconds a frame, for velocity bounds; None for no velocity bounds.
 
         Raises:

@@ -40,7 +40,7 @@ def state_equations(problem: Problem, state: State) -> None:
     """Build all equations of a problem once, to find unsupported terms.
 
     Args:
-        problem: the problem.
+        problem: to be solved.
         state: it is moved to the problem's start.
 
     Raises:

@@ -53,7 +53,7 @@ class NewtonTracker(NotCopyable):
     remembers the previous frame, so it serves one motion and one thread at a time.
 
     Attributes:
-        problem: the problem whose goals it follows.
+        problem: to be solved whose goals it follows.
         dt: seconds a frame; None for frames without a time step.
         workspace: its own workspace; between calls others may move it.
         unswept: radians and metres: shorter motions need no sweep, because every iteration of a frame was tested.
@@ -69,7 +69,7 @@ class NewtonTracker(NotCopyable):
         """Build the equations.
 
         Args:
-            problem: the problem whose goals it follows.
+            problem: to be solved whose goals it follows.
             settings: of whole solves.
             dt: seconds a frame; None for frames without a time step.
             solve: the method, for solves with measures relative to another posture.
@@ -101,7 +101,7 @@ class NewtonTracker(NotCopyable):
         """One frame of a drag: from the posture q (nq,) the least motion that meets the problem's present goals.
 
         Weights count where goals conflict. So all goals are first followed alike; the frame is made again with their
-        weights if that lessened light goals at the expense of heavy ones.
+        weights if that reduced light goals at the expense of heavy ones.
 
         Args:
             q: posture at the beginning of the frame.
@@ -127,7 +127,7 @@ class NewtonTracker(NotCopyable):
             if found is None or (not found.met and self._trades(q, active_system.posture(found.x))):
                 found = self._satisfied(active_system, q, enough, even=False)
                 spent += found.iterations
-            # where the time of a frame was not enough to restore what must hold, the next goes on from here
+            # where the time of a frame was not enough to restore the constraints, the next goes on from here
             cut = BUDGET.spent > 1.0 and not found.hard <= FRAMES.tolerance
             end = q if cut else active_system.posture(found.x)
             return NewtonStep(end, spent, found.systems, active_system.structures)
@@ -149,9 +149,9 @@ class NewtonTracker(NotCopyable):
             active_system.even = False
 
     def _trades(self, before: Array, after: Array) -> bool:
-        """Whether light goals were lessened at the expense of heavy ones, from one posture (nq,) to another.
+        """Whether light goals were reduced at the expense of heavy ones, from one posture (nq,) to another.
 
-        They were where the weighted error lessened by a smaller share than half of that of the error without weights.
+        They were where the weighted error decreased by a smaller share than half of that of the error without weights.
         """
         goals = self.problem.goals
         weights = np.sqrt([goal.weight for goal in goals])

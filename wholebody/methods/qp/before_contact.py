@@ -42,7 +42,7 @@ def before_contact(
     The measures count: as nothing is in the way, all that the terms leave open is as the figure likes it.
 
     Args:
-        problem: what is asked.
+        problem: to be solved.
         subproblem: builds the programs.
         lineariser: of the problem.
         solver: of the programs.
@@ -69,7 +69,7 @@ def before_contact(
         else:
             missed.append(local)
             ends.append(local.violation.total)
-        # ends that are the least and equally far: what is asked is out of reach, and others are no nearer
+        # ends that are the least and equally far: the goals are out of reach, and others are no nearer
         # times the least violation up to which ends count as equally far
         alike = sum(end <= 1.1 * min(ends) for end in ends) >= 3
         # of the time limit that the descents may take

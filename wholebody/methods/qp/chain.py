@@ -151,7 +151,7 @@ def from_seeds(problem: Problem, workspace: Workspace, budget: Budget, control: 
     """A posture that meets the goals with everything held: the first that is found, or of the first few the best.
 
     Args:
-        problem: what is asked.
+        problem: to be solved.
         workspace: of the run.
         budget: of the method.
         control: is told of every descent.
@@ -199,7 +199,9 @@ def _from_seeds(
             q, effort = chain.posture(seeds[k], at), float(found[k, 1])
             if _is_free(problem, workspace, q):
                 known = bool(found[k, 2]) and (distance is not None or not budget.measures)
-                return Met(q, tuple(trace), known, blocked if least < SEEDS.worth * effort else None)
+                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks them.
+                free = len(start) > len(room.value) and least < SEEDS.worth * effort
+                return Met(q, tuple(trace), known, blocked if free else None)
             least, blocked = (effort, q) if effort < least else (least, blocked)
         seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS.together)
     return None
@@ -212,7 +214,7 @@ def _is_free(problem: Problem, workspace: Workspace, q: Array) -> bool:
 
 
 def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
-    """The measure, where it is one squared distance that the other joints cannot lessen; else None."""
+    """The measure, where it is one squared distance that the other joints cannot reduce; else None."""
     measures = problem.measures
     if len(measures) != 1 or type(measures[0]) not in (tasks.Effort, tasks.Displacement):
         return None

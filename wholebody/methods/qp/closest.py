@@ -33,7 +33,7 @@ from wholebody.terms.linearisation import Lineariser
 
 ENDLESS = 1e3  # m: of relaxation, with which no pair is looked at
 LEAST_RADIUS = 1e-4
-WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the gain foreseen: a step is taken, was too long, may be longer
+WORTH, POOR, GOOD = 0.05, 0.25, 0.6  # shares of the predicted reduction: a step is taken, was too long, may be longer
 SHRINK = 0.3
 
 
@@ -98,10 +98,10 @@ class Closest:
                 weight=np.concatenate([program.weight, weight]),
             )
             x = working_set.solve(program, rows.key).x
-            foreseen = self._subproblem.violation(rows, x)
+            predicted = self._subproblem.violation(rows, x)
             pull = float(rows.soft_weight[: rows.goals].max(initial=1.0))
-            goal = np.sqrt(foreseen.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
-            gain = here.violation.total - with_values(foreseen, goal=float(goal)).total
+            goal = np.sqrt(predicted.goal**2 + float(weight @ (bend @ x) ** 2) / pull)
+            gain = here.violation.total - with_values(predicted, goal=float(goal)).total
             held = not within or max(here.violation.hold, here.violation.elastic) <= enough
             if gain <= (flat * here.violation.total if held else enough):
                 converged = True
@@ -139,7 +139,7 @@ class Closest:
 
         Args:
             rows: of the linearisation at the state's posture.
-            push: (soft rows,) multipliers of the last program; goals pull with what is left of them.
+            push: (soft rows,) multipliers of the last program; goals pull with their residual.
         """
         state = self._lineariser.state
         force = np.concatenate([rows.soft_weight[: rows.goals] * rows.soft_error[: rows.goals], push[rows.goals :]])

@@ -1,4 +1,4 @@
-"""The end of a frame in which a thing came faster than a figure can go along with: where else is it free?
+"""A free posture for the end of a frame in which a thing came faster than the figure can move.
 
 What is thin and fast is often past the figure at the end of the frame, or the figure may be beside it. So postures
 within what bounds allow are sought with the thing where it ends: from the posture before, from where its root may go,

@@ -1,8 +1,8 @@
-"""Feasibility first: from a start to a posture that fits, by whole Gauss-Newton steps in a small box, without measures.
+"""Feasibility first: from a start to a feasible posture, by whole Gauss-Newton steps in a small box, without measures.
 
-Each program asks for all that is left of the goals and lets no degree of freedom go farther than the box. So the step
+Each program asks for the whole residual of the goals and lets no degree of freedom go farther than the box. So the step
 slides along what is in the way with all of its length: the joints that are held up stay, and the others go on. A step
-that asks for a piece of the way and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
+that asks for a part of the errors and least motion, as `sqp` does, gets no nearer there. Steps are taken as they are;
 where they go to and fro the box shrinks.
 
 Where a joint is held up by its limit, and turning on by what is missing to a full turn leads to its other limit, it is
@@ -39,7 +39,7 @@ class Feasibility:
     """One attempt; call `run` once.
 
     Attributes:
-        problem: what is asked.
+        problem: to be solved.
         subproblem: builds the programs.
         lineariser: linearises the problem.
         solver: solves the programs.
@@ -61,7 +61,7 @@ class Feasibility:
     control: Control = field(default_factory=lambda: Control(np.inf))
 
     def run(self, start: Array) -> LocalSolution:
-        """Go from a posture within limits, shape (nq,), to one that fits; else to where nothing leads nearer."""
+        """Go from a posture within limits, shape (nq,), to a feasible one; else to a stationary one."""
         working_set = WorkingSet(self.solver)
         here, box, last = self._iterate_at(start), FEASIBILITY.step, np.zeros(self.lineariser.state.model.nv)
         history: list[float] = []
@@ -157,7 +157,7 @@ def _end(here: Iterate, converged: bool, count: int) -> LocalSolution:
 
 
 def stalls(history: list[float], tolerance: float) -> bool:
-    """Whether the violation, one figure an iteration, has hardly lessened for a while, and far from the tolerance."""
+    """Whether the violation, one figure an iteration, has hardly decreased for a while, and far from the tolerance."""
     if len(history) <= FEASIBILITY.patience or history[-1] <= 100.0 * tolerance:
         return False
     before = min(history[: -FEASIBILITY.patience])

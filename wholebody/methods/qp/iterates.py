@@ -19,8 +19,8 @@ class StepAcceptance(NamedTuple):
 
     Attributes:
         accepted: whether it is taken.
-        good: whether it brought about what was foreseen.
-        poor: whether it brought much less.
+        good: whether it achieved the predicted reduction.
+        poor: whether it achieved much less.
         by: "measure" or "goal", by which it was judged; "rejected", or "rejected measure" where the measures led.
     """
 
@@ -31,7 +31,7 @@ class StepAcceptance(NamedTuple):
 
 
 class PredictedReduction(NamedTuple):
-    """What a program foresees of its step: how much less violation, and how much less of the measures."""
+    """Reductions of the violation and of the measures that a program predicts."""
 
     violation: float
     measure: float
@@ -42,7 +42,7 @@ class LocalSolution(NamedTuple):
 
     Attributes:
         q: (nq,) posture.
-        violation: what is left there.
+        violation: the residual violation.
         measure: weighted sum of the measures.
         converged: whether it ended because nothing better is near, rather than out of iterations.
         iterations: how many programs were solved.
@@ -73,7 +73,7 @@ class Step(NamedTuple):
         parts: the answer's parts; None far from the goals, and where measures do not count.
         flat: whether the tangential part saves less of the measures than counts.
         answer: (nv,) the program's answer.
-        predicted: what the step is to bring.
+        predicted: the reduction that the program predicts.
         multipliers: of the program; None as for the parts.
     """
 
@@ -90,33 +90,33 @@ def judge(
 ) -> StepAcceptance:
     """Judge a step.
 
-    Far from the goals it must lessen the violation. Near, it must lessen the measures and stay inside a funnel, the
+    Far from the goals it must reduce the violation. Near, it must reduce the measures and stay inside a funnel, the
     violation that is allowed meanwhile (Gould and Toint 2010, whose funnel narrows).
 
     Args:
         before: violation and measures before it; near the goals the Lagrangian stands for the measures.
         after: and after it.
-        predicted: what was foreseen.
+        predicted: the predicted reduction.
         width: of the funnel; None where the measures do not count.
     """
     inside = width is not None and before[0] <= width
     lead = inside and predicted.measure > DESCENT.switch * before[0] ** 2
-    ways = [("goal", before[0] - after[0], predicted.violation, predicted.violation > 0.0)]
+    criteria = [("goal", before[0] - after[0], predicted.violation, predicted.violation > 0.0)]
     if lead and width is not None:
-        ways.insert(0, ("measure", before[1] - after[1], predicted.measure, after[0] <= width))
-    for by, gain, foreseen, allowed in ways:
-        if allowed and gain >= DESCENT.worth * foreseen:
-            return StepAcceptance(True, gain >= DESCENT.good * foreseen, gain < DESCENT.poor * foreseen, by)
+        criteria.insert(0, ("measure", before[1] - after[1], predicted.measure, after[0] <= width))
+    for by, gain, expected, allowed in criteria:
+        if allowed and gain >= DESCENT.worth * expected:
+            return StepAcceptance(True, gain >= DESCENT.good * expected, gain < DESCENT.poor * expected, by)
     return StepAcceptance(False, False, False, "rejected measure" if lead else "rejected")
 
 
 def held(local: LocalSolution, tolerance: float) -> bool:
-    """Whether what must hold does where a descent ended."""
+    """Whether the constraints hold where a descent ended."""
     return broken(local) <= tolerance
 
 
 def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
-    """Whether one descent ended better: where all is met, then in what must hold, the goals, the measures."""
+    """Whether one descent ended better: where all is met, then in the constraints, the goals, the measures."""
     met = one.violation.worst <= tolerance
     if met != (other.violation.worst <= tolerance):
         return met
@@ -131,5 +131,5 @@ def better(one: LocalSolution, other: LocalSolution, tolerance: float) -> bool:
 
 
 def broken(local: LocalSolution) -> float:
-    """By how much what must hold is missed where a descent ended [m, rad]."""
+    """Largest violation of constraints where a descent ended [m, rad]."""
     return max(local.violation.hold, local.violation.elastic)

@@ -38,7 +38,7 @@ class QP(Checked):
             about a millisecond.
         restarts: most seeded starts that are tried.
         restarts_for_measure: how many more descents look for a lower minimum of the measures once the goals are met;
-            four times as many postures that fit are found first, and the best of them are descended from. With
+            four times as many feasible postures are found first, and the best of them are descended from. With
             0, time comes first, and the answer is the minimum that the first descent leads to.
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
@@ -94,7 +94,7 @@ class QP(Checked):
         raises for a goal out of reach or a start in penetration: the status says so.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:

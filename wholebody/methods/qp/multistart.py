@@ -60,7 +60,7 @@ class Attempt(NamedTuple):
 
 
 class Multistart:
-    """The search for one problem, remembering the best posture."""
+    """The search for one problem; it keeps the best posture."""
 
     def __init__(
         self, problem: Problem, workspace: Workspace, solver: QPSolver, budget: Budget, control: Control
@@ -76,8 +76,8 @@ class Multistart:
         self._start = problem.scene.figure.clamp(problem.start)
         self._left = budget.programs  # that attempts after the first may still solve
         self._without_gain = 0  # probes in a row that came no nearer, without contacts or relaxed
-        self._least = 0.0  # what is known to be left of the goals at least, metres
-        self._minima = Minima()  # where relaxed probes ended that were pushed out of things
+        self._least = 0.0  # lower bound of the goals' residual, metres
+        self._minima = Minima()  # where relaxed probes ended after the true clearances were required
         self._relaxed_minima = Minima()  # where the others ended
         self._through: list[Array] = []  # where a descent without contacts from another start reached the goals
         self._out_of_reach = False  # which is known
@@ -171,7 +171,7 @@ class Multistart:
         return local
 
     def _feasibility_first(self, start: Array) -> LocalSolution:
-        """A posture that fits, without regard to the measures; where there is one, they improve from there."""
+        """Find a feasible posture without measures, and descend with measures from there."""
         local = self._feasibility(self.lineariser, self.budget.iterations, "feasibility").run(start)
         self.spent += local.iterations
         if local.violation.worst > self.budget.tolerance or not self.budget.measures:
@@ -182,8 +182,8 @@ class Multistart:
     def _relaxed(self, start: Array) -> LocalSolution | None:
         """A relaxed probe, and a descent from where it reaches the goals.
 
-        It first goes through things, where limbs can change sides, and then is pushed out of them. Where many in a row,
-        although nothing was in their way, came no nearer than the best posture, the goals are out of reach.
+        It first goes through things, where limbs can change sides, and then is separated from them. Where many in a
+        row, with nothing in their way, came no nearer than the best posture, the goals are out of reach.
         """
         tolerance = self.budget.tolerance
         relaxed = self._probe(start, SEARCH.relaxation_depth)
@@ -204,9 +204,9 @@ class Multistart:
         return local
 
     def _restart_for_measure(self) -> None:
-        """Where all is met, look for a lower minimum of the measures, from other starts that are screened first.
+        """Where all is met, search for a lower minimum of the measures from other starts, which are screened first.
 
-        A posture that fits costs a few programs, and its measure tells which minimum it is near; a descent costs many.
+        A feasible posture costs a few programs, and its measure tells which minimum it is near; a descent costs many.
         """
         count, tolerance = self.budget.restarts_for_measure, self.budget.tolerance
         if not (count and self.budget.measures and self.best.violation.worst <= tolerance):
@@ -225,7 +225,7 @@ class Multistart:
             self._accept(self._descend(local.q, note="for measure"), "from a start for the measures")
 
     def _probe(self, start: Array, depth: float) -> LocalSolution:
-        """Look whether the goals can be met from a start, by few programs and without regard to the measures.
+        """Test whether the goals can be met from a start, by few programs and without measures.
 
         Args:
             start: (nq,).
@@ -245,7 +245,7 @@ class Multistart:
         )  # fmt: skip
 
     def _find_closest(self) -> None:
-        """Where the goals are not reached, come as near as goes, then improve the measures from there."""
+        """Where the goals are not reached, find the closest posture, then improve the measures from there."""
         tolerance = self.budget.tolerance
         if self.control.over:
             return
@@ -264,7 +264,7 @@ class Multistart:
                 self._best = local
 
     def _proven(self) -> bool:
-        """Whether the best posture is known to be as near to the goals as any."""
+        """Whether the best posture is known to be the closest to the goals."""
         near = self.best.violation.left <= NEAREST * self._least
         return near and bool(self._least) and held(self.best, self.budget.tolerance)
 
@@ -309,7 +309,7 @@ class Multistart:
         return int(rows.soft[: rows.goals].any(axis=0).sum())
 
     def _closest_from_best(self) -> None:
-        """Come as near as goes from the best posture; where that comes to rest nothing nearer is near."""
+        """Find the closest posture from the best one; where that is stationary no closer one is near."""
         nearest = self._closest().with_contacts(self.best.q, self.budget.tolerance, self._at_most(SEARCH.coming_near))
         self.spent += nearest.iterations
         if not nearest.converged:
@@ -319,7 +319,7 @@ class Multistart:
         self._best = with_values(self.best, converged=self.best.converged or nearest.converged)
 
     def _approach(self, begin: Array) -> None:
-        """Come as near as goes from a posture (nq,); where what must hold does not hold then, restore it."""
+        """Find the closest posture from one (nq,); where constraints do not hold then, restore them."""
         tolerance = self.budget.tolerance
         local = self._closest().with_contacts(begin, tolerance, self._at_most(SEARCH.coming_near))
         self.spent += local.iterations
@@ -328,14 +328,14 @@ class Multistart:
         self._accept(local, self.how)
 
     def _at_most(self, programs: int) -> int:
-        """So many programs, or what one descent may have where that is less."""
+        """The smaller of this number of programs and that of one descent."""
         return min(programs, self.budget.iterations)
 
     def _closest(self) -> Closest:
         return Closest(self.problem, self.lineariser, self.solver, self.control)
 
     def _stay(self, local: LocalSolution) -> LocalSolution:
-        """Descend with the goals' errors to stay as they are: what must hold is restored, then the measures improve."""
+        """Descend with the goals' errors to stay as they are: constraints are restored, then the measures improve."""
         nearest = self._goal_errors(local.q)
         most = self._at_most(SEARCH.staying) if held(local, self.budget.tolerance) else self.budget.iterations
         stayed = self._descent(most, nearest, "nearest").run(local.q)
@@ -351,7 +351,7 @@ class Multistart:
     def _descend(
         self, start: Array, note: str = "", *, measures: bool = True, most: int | None = None, full_step: bool = False
     ) -> LocalSolution:
-        """Descend from a start; where that ends with something that must hold not holding, restore it."""
+        """Descend from a start; restore constraints that are violated at its end."""
         iterations = self.budget.iterations if most is None else min(most, self.budget.iterations)
         local = self._descent(iterations, None, note, measures=measures, full_step=full_step).run(start)
         self.spent += local.iterations
@@ -370,7 +370,7 @@ class Multistart:
         )  # fmt: skip
 
     def _accept(self, local: LocalSolution, how: str) -> bool:
-        """Keep the better one; whether what is asked holds now."""
+        """Keep the better one; whether the problem is solved now."""
         if self._best is None or better(local, self._best, self.budget.tolerance):
             self._best, self.how = local, how
         return self.best.violation.worst <= self.budget.tolerance

@@ -24,7 +24,7 @@ class StepSize(NamedTuple):
         radius: about the largest entry of the step, radians and metres.
         pull: largest error of a goal that is asked for, metres and radians; 0 asks for all of them.
         damping: how much of the goals' neglected second derivative is added.
-        gain: share of the way to the least measures that the step is to go.
+        gain: share of its tangential part that the step has.
         measures: whether they count.
         box: half width of the box, radians and metres.
         overlap: largest violation of an elastic row that is asked for.
@@ -92,7 +92,7 @@ class LinearRows(NamedTuple):
 
 
 class Violation(NamedTuple):
-    """How far a posture is from what is asked: metres and radians.
+    """Violation of goals and constraints at a posture: metres and radians.
 
     Attributes:
         goal: norm of the goal errors, each times the root of its weight's share of the largest.

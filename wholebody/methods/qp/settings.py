@@ -33,7 +33,7 @@ class Corrections(NamedTuple):
         rounds: most times that violated rows are added before all rows are in.
         most: corrections of one set before another solver is asked.
         of_guess: corrections of a set that was guessed from an approximate answer.
-        at_once: how many of them put right all that is wrong; as that may cycle, later ones change the worst entry.
+        at_once: how many of them correct all that is wrong; as that may cycle, later ones change the worst entry.
         tolerance: by which x may be out of its box and a row violated, radians and metres.
     """
 
@@ -89,8 +89,8 @@ class DescentNumbers(NamedTuple):
             they did not see.
         within_step: m per rad of the last step, beyond which pairs have no row either. Larger: more rows; smaller:
             steps that meet what they did not see.
-        least_gain: share of the violation that a step must be foreseen to gain. Smaller: slow to see that a goal is out
-            of reach.
+        least_gain: least predicted reduction, as a share of the violation. Smaller: slow to see that a goal is out of
+            reach.
         least_gain_alone: least share of the violation to gain, with measures and without.
         restorable: m, rad: violation of holds and contacts that the next step is trusted to repair. Larger: more steps
             that are taken back.
@@ -98,8 +98,8 @@ class DescentNumbers(NamedTuple):
         width: violation allowed while measures improve, at first. Wider: longer steps along constraints, more to
             restore.
         switch: measures lead once they gain more than this times the squared violation. Smaller: they lead earlier, far
-            from what is asked.
-        worth: share of what was foreseen that a step must bring. Larger: more steps rejected.
+            from the goals.
+        worth: share of the predicted reduction that a step must achieve. Larger: more steps rejected.
         good: share above which the next step may be longer.
         poor: share below which it must be shorter.
         along: tangential parts that a step is where they grow. Larger: faster down, rejected more often.
@@ -180,9 +180,9 @@ class NearestNumbers(NamedTuple):
         radius: rad, m: trust region of the first step.
         largest_radius: and of any. Larger: fewer programs, more rejected ones.
         held: m, rad: holds missed by more than this do not bend; what they pull with says nothing yet.
-        flat: share of the violation that a step must be foreseen to gain, or it is at rest. Smaller: more programs,
+        flat: share of the violation that a step must be predicted to gain, or it is at rest. Smaller: more programs,
             nearer.
-        nearly_flat: the same where only the size of what is left counts.
+        nearly_flat: the same where only the size of the residual counts.
         damping: share of the largest curvature that every direction has at least. Less: active sets that go in circles,
             dearer programs; more: shorter steps, ends farther off (at 0.2 by centimetres).
         negligible: share of the largest curvature below which a direction is left out.
@@ -204,18 +204,18 @@ class SearchNumbers(NamedTuple):
     Attributes:
         probe_programs: programs of a relaxed probe. More: surer along curved ways, and fewer starts within the budget.
         relaxation_depth: m: depth that a relaxed probe may first have. More: limbs change sides more easily, and are
-            harder to push out. Two upper arms that cross need about as much. Also what may be left of the goals where
-            the start's probe comes before the proof that they are out of reach.
+            harder to separate. Two upper arms that cross need about as much. Also the residual of the goals up to
+            which the start's probe comes before the proof that they are out of reach.
         no_nearer: probes in a row, without contacts or relaxed, that came no nearer before the goals are given up.
             Fewer: faster to know, rare branches of arms are missed.
         reached: tolerances within which such a relaxed probe must come for the second one to follow. More: more second
             ones in vain.
-        nearer: share of what is left that counts as nearer.
+        nearer: share of the residual that counts as nearer.
         reach_trials: most descents without contacts that tell whether goals are out of reach.
         reach_trial_programs: most programs of each.
         far: shares of the joints' ranges that their starts may be away by. Smaller: local minima are taken for the edge
             of reach.
-        held: share of what is left of the goals by which constraints may be missed where one ends that counts. Less:
+        held: share of the goals' residual by which constraints may be missed where one ends that counts. Less:
             ends far from the goals do not count, and probes go on in vain.
         agreeing: of them that must come to rest equally near. Fewer: faster, and reachable goals are given up.
         few: degrees of freedom that move the goals; with fewer, minima lie apart, programs are cheap, and starts are
@@ -261,16 +261,16 @@ class StepNumbers(NamedTuple):
         radius: rad, m. A goal that jumps asks for `error_clamp` times this in a step. Larger: faster, and more to
             second order.
         damping: of the pull of goals out of reach. Larger: slower to close in; smaller: limbs oscillate at obstacles.
-        settling: s in which measures lessen by 1/e beside goals. Longer: slower to settle; shorter: joints swing about
-            the optimum.
-        resting: m, rad: a goal missed by less than this, and more than foreseen, rests; less left of one is reached.
+        settling: s in which measures decrease by 1/e beside goals. Longer: slower to settle; shorter: joints swing
+            about the optimum.
+        resting: m, rad: a goal missed by less than this, and more than predicted, rests; less is reached.
         curved: m, rad: by how much a step runs ahead of a hold as the last one was curved; more overshoots after jumps.
         little: damping that makes no difference to how a step looks. Larger: limbs jump where a goal is just blocked.
         worse: times the damping of a program that its answer may ask for before it is solved again with that.
         bent: m rad: change of a step's motion times its turn above which it is looked at how it curves what is held.
             Larger: feet off by micrometres after jumps; smaller: more looks.
-        straight: m, rad by which what is held may be curved other than foreseen. Smaller: more programs; larger: feet
-            farther off.
+        straight: m, rad by which what is held may be curved differently than predicted. Smaller: more programs;
+            larger: feet farther off.
         traded: see `StepProgram.solve`: greater = weights count in more steps, and light goals wait in more.
         again: times that a program is solved again at most. More: smoother at obstacles, dearer steps there.
     """
@@ -305,7 +305,7 @@ class TrackingNumbers(NamedTuple):
         programs: most of a frame, and of one that is asked for more exactly than that; more = nearer to a goal that
             turns quickly, dearer frames where it cannot be met. With 3 for both, one exact frame in twenty ends 1e-5 m
             short.
-        braked: m, rad: what must hold is missed by more where joints brake for their limits: they do not then.
+        braked: m, rad: constraints are violated by more where joints brake for their limits: they do not then.
         out: m: overlap with what came into the figure that is left; half of what counts as an overlap.
         worth: share of the error that another program must leave at most for one more to follow.
         room: times what a pair may get nearer by turning: with more room after a step it is not looked at.

@@ -1,11 +1,9 @@
-"""Sequential quadratic programming from one start to the nearest posture that fits.
+"""Sequential quadratic programming from one start to a local solution.
 
-Each iteration linearises, solves one quadratic program that asks for a piece of the way, and judges the posture it
-leads to by two figures, the violation and the measures, with a funnel (Gould and Toint 2010): while what is asked is
-far, a step must lessen the violation; near, it must lessen the measures, as the Lagrangian counts them, and stay inside
-a funnel of violation, which narrows where a descent strays from a posture that fits. No penalty weight has to be
-guessed, and measures may improve along curved constraints in long steps. Steps that could have jumped over something
-are swept.
+Each iteration linearises, solves one quadratic program, and judges its step by the violation and the measures, with a
+funnel (Gould and Toint 2010): far from the goals a step must reduce the violation; near, it must reduce the Lagrangian
+and stay inside the funnel, which narrows where a descent leaves the best feasible posture and ends at an infeasible
+one. No penalty weight has to be guessed. Steps that could have jumped over something are swept.
 """
 
 from __future__ import annotations
@@ -49,7 +47,7 @@ class SQP:
         trace: grows by one entry an iteration.
         note: what to call the iterations in the trace.
         measures: whether the measures count from the beginning; without them only the goals are sought, and the first
-            posture that fits is the end.
+            feasible posture is the end.
         full_step: whether to ask for all of the way to the goals in every step, damped by how far they are, until
             steps are rejected or gain little; else for a piece of it.
         control: what may end it.
@@ -72,11 +70,11 @@ class SQP:
         self._radius, self._full_step = DESCENT.first_radius, self.full_step
         self._damping = DESCENT.full_step_damping[0] if self.full_step else 0.0
         self._stretch = 1.0  # share of errors asked for: goals that conflict stay far while steps get short
-        self._watched: Iterate | None = None  # where to go back to if a step that broke a rule is not repaired
+        self._watched: Iterate | None = None  # where to return if a tentative step is not repaired
         self._ahead = Extrapolation()
-        self._unimproved = 0  # postures that fit, one after the other, and are hardly better than the best
-        self._kept: Iterate | None = None  # best posture that fits
-        self._gain = 1.0  # share of the way to the least measures that a step is to go
+        self._unimproved = 0  # feasible postures in a row that are hardly better than the best
+        self._kept: Iterate | None = None  # best feasible posture
+        self._gain = 1.0  # share of its tangential part that a step has
         self._multipliers: Multipliers | None = None  # of the last program near the goals
         self._tension: Array | None = None  # (soft rows,) net multipliers of the last program
 
@@ -86,7 +84,7 @@ class SQP:
         self._width = max(DESCENT.width, here.violation.total)
         self._shift = np.zeros(len(here.rows.soft_error))
         self._working_set = WorkingSet(self.solver)
-        self._keep(here)  # a start that fits is an answer, should the descent end early
+        self._keep(here)  # a feasible start is an answer, should the descent end early
         count, converged = 0, False
         while count < self.iterations and not self.control.over:
             if not self.measures and here.violation.worst <= self.tolerance:
@@ -104,11 +102,11 @@ class SQP:
             )
             program = self._shortened(program, len(here.rows.soft_error))
             answer = self._working_set.solve(program, here.rows.key)
-            step = self._foreseen(here, program, answer)
+            step = self._predicted_step(here, program, answer)
             swings = self._unimproved >= 4  # the measures, along curved constraints
             if swings or self._radius < LEAST_RADIUS or self._settled(here, step):
-                if strayed := self._strayed(here):
-                    here = self._return_to(strayed)
+                if feasible := self._feasible_before(here):
+                    here = self._return_to(feasible)
                     continue
                 converged = True
                 break
@@ -123,24 +121,24 @@ class SQP:
             here = self._kept
         return LocalSolution(here.at.q, here.violation, here.at.measure, converged, count)
 
-    def _strayed(self, here: Iterate) -> Iterate | None:
-        """The best posture that fits, where steps along the measures led from it to one that cannot be made to fit.
+    def _feasible_before(self, here: Iterate) -> Iterate | None:
+        """The best feasible posture, where the descent ended at an infeasible one after it and may return.
 
-        None for an offset: goals that stay where they were left, out of reach, are singular, and every step strays.
+        Not with an offset: goals out of reach are held at a singular posture, where every descent ends so.
         """
         lost = self.offset is None and here.violation.worst > self.tolerance
         return self._kept if lost and self._width > self.tolerance else None
 
     def _return_to(self, kept: Iterate) -> Iterate:
-        """Go on from a posture that fits with a narrower funnel, so that no step strays as far again."""
-        self._width *= 0.3  # 0.5 strays again; 0.1 creeps along contacts
+        """Continue from a feasible posture with a narrower funnel."""
+        self._width *= 0.3  # 0.5 ends at infeasible postures again; 0.1 makes steps along contacts tiny
         self._radius, self._gain, self._damping = DESCENT.first_radius, 1.0, 0.0
         self._shift, self._watched = np.zeros_like(self._shift), None
         self._ahead.reset()
         return kept
 
     def _keep(self, here: Iterate) -> None:
-        """Remember the best posture that fits: curved constraints make the measures go to and fro near an optimum."""
+        """Remember the best feasible posture: along curved constraints the measures swing near an optimum."""
         if here.violation.worst > self.tolerance or not self.measures:
             return
         worth = (10.0 if here.at.planes is None else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
@@ -151,10 +149,10 @@ class SQP:
 
     def _better_than_kept(self, here: Iterate) -> bool:
         fits = here.violation.worst <= self.tolerance
-        return fits and (self._kept is None or self._worth(here) < self._worth(self._kept))
+        return fits and (self._kept is None or self._merit(here) < self._merit(self._kept))
 
-    def _worth(self, here: Iterate) -> float:
-        """The measures, as the Lagrangian of the last program counts them where nothing is left to spare."""
+    def _merit(self, here: Iterate) -> float:
+        """The measures; near the goals the Lagrangian with the last multipliers, where rows that hold count as zero."""
         if self._multipliers is None:
             return here.at.measure
         beyond = np.maximum(here.rows.elastic_violation, 0.0)
@@ -175,7 +173,7 @@ class SQP:
         """With the measures' curvature such that the part of the answer along the constraints is `_gain` times as long.
 
         Joints keep their shares of it. A shorter radius would let those with much gradient go as far as those with
-        little, although what is asked holds back most of the gradient.
+        little, although the constraints cancel most of the gradient.
         """
         if self._gain == 1.0:
             return program
@@ -187,8 +185,8 @@ class SQP:
     def _pull(self) -> float:
         return PROGRAM.error_clamp * self._radius * self._stretch
 
-    def _foreseen(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
-        """What the answer of a program is to bring; near the goals, what its two parts are."""
+    def _predicted_step(self, here: Iterate, program: QuadraticProgram, answer: QPSolution) -> Step:
+        """The step of a program with its predicted reduction; near the goals, with its two parts."""
         x, parts, flat, multipliers = answer.x, None, False, None
         if self.measures and here.violation.total <= DESCENT.width:
             parts = parts_of(program, answer, self._shift, self._working_set.room(program).work)
@@ -200,19 +198,19 @@ class SQP:
                 self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
             if (answer.active.lower | answer.active.upper).any():
-                # Bounds hold back more than the curvature says, and the normal part too has a gain on the way to a gap.
+                # Bounds add to what the curvature says; a normal part that closes a gap reduces the measures too.
                 saved = self.subproblem.saving(program, here.rows, x) - multipliers.change(program, x)
             bent = here.at.planes is not None and len(here.at.planes.bend)
-            # share of a gain that is worth a step, where its curvature is known
+            # share of the tolerance below which a gain counts as none, where its curvature is known
             flat = saved / self._gain <= (1e-2 if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
             flat = flat and self.subproblem.violation(here.rows, parts.normal).total <= here.violation.total
-            x = parts.normal if flat else x  # what is asked is met at once, to second order
+            x = parts.normal if flat else x  # the residual is met at once, to second order
         violation = self.subproblem.violation(here.rows, x).total
         predicted = PredictedReduction(here.violation.total - violation, saved)
         return Step(x, parts, flat, answer.x, predicted, multipliers)
 
     def _settled(self, here: Iterate, step: Step) -> bool:
-        """Whether nothing worth having is foreseen."""
+        """Whether the predicted reductions are within the tolerance."""
         violation, predicted = here.violation, step.predicted
         held = max(violation.hold, violation.elastic) <= self.tolerance
         worth = max(
@@ -227,7 +225,7 @@ class SQP:
         return not step.flat and predicted.measure / self._gain <= 1e-2 * self.tolerance * (1.0 + abs(here.at.measure))
 
     def _advance(self, here: Iterate, program: QuadraticProgram, step: Step) -> Iterate | None:
-        """Go where the program says, or farther along what the last steps foretell; None if neither is good."""
+        """Go where the program says, or farther, as the last steps extrapolate; None if neither is accepted."""
         if step.parts is None:
             self._ahead.reset()
         fast = None if step.parts is None or step.flat else self._ahead.propose(step.parts, program)
@@ -246,7 +244,7 @@ class SQP:
             self._reject(float(np.abs(dq).max(initial=0.0)), "undefined")
             return None
         acceptance = self._judge(here, there, step)
-        watched = not acceptance.accepted and self._is_worth_watching(here, there)
+        watched = not acceptance.accepted and self._is_tentative(here, there)
         if (acceptance.accepted or watched) and self._jumps(here, there):
             acceptance, watched = StepAcceptance(False, False, False, "blocked"), False
         self._record(there, "tentative" if watched else acceptance.by)
@@ -261,7 +259,7 @@ class SQP:
         return self._take(here, there, program, step, dq, acceptance)
 
     def _reject(self, longest: float, by: str) -> None:
-        """Ask for less after a step whose longest entry is this was rejected."""
+        """Shorten the next step after one with this longest entry was rejected."""
         if self._full_step:
             self._full_step = self._damping < DESCENT.full_step_damping[1]
             self._damping = DESCENT.full_step_damping[1] if self._full_step else 0.0
@@ -279,10 +277,10 @@ class SQP:
         self, here: Iterate, there: Iterate, program: QuadraticProgram, step: Step, way: Array,
         acceptance: StepAcceptance,
     ) -> Iterate:  # fmt: skip
-        """Note that a way was gone, and how far the next may go.
+        """Accept a step, and adapt the radius and the share of the next.
 
-        What would be left of the rows' violation after the program's own answer, because the measures pull, is asked
-        for in the next one (method of multipliers).
+        The residual of the rows after the program's own answer, which the measures cause, is asked for in the next one
+        (method of multipliers).
         """
         if self._full_step and there.violation.total > (1.0 - DESCENT.full_step_gain) * here.violation.total:
             self._full_step, self._damping = False, 0.0
@@ -333,15 +331,15 @@ class SQP:
             rows.soft_error[: rows.goals] -= self.offset
         return Iterate(at, rows, self.subproblem.violation(rows), QueryResult(at.contacts, within), longest)
 
-    def _is_worth_watching(self, here: Iterate, there: Iterate) -> bool:
-        """Whether a rejected step went well but for curved constraints: one more may put that right (watchdog)."""
+    def _is_tentative(self, here: Iterate, there: Iterate) -> bool:
+        """Whether a rejected step reduced the goal errors and violates constraints little (watchdog)."""
         if self._watched is not None or not self.measures:
             return False
         broken = max(there.violation.elastic, there.violation.hold)
         return there.violation.goal < here.violation.goal and broken < DESCENT.restorable
 
     def _judge(self, here: Iterate, there: Iterate, step: Step) -> StepAcceptance:
-        """Judge a step, or two if the first one broke a rule: then both together must have been worth it."""
+        """Judge a step, or two if the first one was tentative: then both together must be acceptable."""
         predicted, before = step.predicted, here
         if self._watched is not None:
             before = self._watched

@@ -72,7 +72,7 @@ class StepProgram:
         """Take the terms of a problem.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             workspace: of the run; its state is moved to the problem's start.
             working_set: solves what the compiled call does not.
             dt: seconds a step.
@@ -116,7 +116,7 @@ class StepProgram:
     def solve(self, at: PackedLinearisation, measures: bool) -> Answer:
         """The answer of the step from where the workspace's state is, and its pieces' placements.
 
-        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would lessen light ones at the
+        Goals weigh alike, so that light ones do not wait for heavy ones. Where that would reduce light ones at the
         expense of heavy ones, which conflict then, weights count.
 
         Args:
@@ -130,7 +130,7 @@ class StepProgram:
             answer, damping = self._damped(at, measures, given)
         bend, self._bend = self._bend, answer.motion * answer.turn
         if len(self._held) and (self._curving or abs(self._bend - bend) > STEP.bent):
-            self._curving = self._foresee(at, answer.x)
+            self._curving = self._predict_curving(at, answer.x)
             if self._curving:
                 answer, _, _ = self._once(at, measures, given, damping)
         return answer
@@ -183,9 +183,9 @@ class StepProgram:
         return answer, damping
 
     def _trades(self, x: Array) -> bool:
-        """Whether the displacement x (nv,) lessens light goals at the expense of heavy ones.
+        """Whether the displacement x (nv,) reduces light goals at the expense of heavy ones.
 
-        It does where the weighted error lessens by a smaller share than half of that of the error without weights.
+        It does where the weighted error decreases by a smaller share than half of that of the error without weights.
         """
         rows = self._parts.rows
         error = rows.soft_error[: self.goals]
@@ -231,7 +231,7 @@ class StepProgram:
         answered = (answer.exact, answer.iterations, answer.by)
         return Answer(answer.x, motion, turn, worst, spare, missed, least, *answered), damping, asked
 
-    def _foresee(self, at: PackedLinearisation, displacement: Array) -> bool:
+    def _predict_curving(self, at: PackedLinearisation, displacement: Array) -> bool:
         """Have what is held run ahead of as this displacement (nv,) is curved, not as that of the last step was.
 
         Returns:

@@ -39,7 +39,7 @@ def _with_planes(rows: Rows, planes: TermPlanes) -> Rows:
     """
     count = len(planes.value)
     weights = np.append(rows.soft_weight[: rows.goals], WEIGHTS.hold)
-    # keys of supporting planes are below this, out of the way of all others
+    # keys of supporting planes are below this, apart from all others
     return with_values(
         rows,
         elastic=np.vstack([rows.elastic, -planes.jacobian]),
@@ -62,7 +62,7 @@ class Subproblem:
         """Read off which constraint rows are equalities.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             state: of the run; it is moved to the problem's start.
         """
         lower, upper, weight = [], [], []
@@ -142,7 +142,7 @@ class Subproblem:
         )  # fmt: skip
 
     def saving(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
-        """By how much the measures of a program lessen, to second order, with the displacement x (nv,)."""
+        """By how much the measures of a program decrease, to second order, with the displacement x (nv,)."""
         return -float(program.linear @ x) / self.scale - self.quadratic_part(program, rows, x)
 
     def quadratic_part(self, program: QuadraticProgram, rows: Rows, x: Array) -> float:
@@ -177,7 +177,7 @@ class Subproblem:
             shift: (soft rows,) added to the errors so that weights need not be infinite (method of multipliers).
             measures: whether the measures count; without them the nearest posture to the goals is sought. The squares
                 that they are the sum of are soft rows, after those of `rows`.
-            gain: share of the way to the least measures that the step is to go.
+            gain: share of its tangential part that the step has.
         """
         squares = at.squares if measures else at.squares[:0]
         curvature = at.curvature - at.squared if len(squares) else at.curvature

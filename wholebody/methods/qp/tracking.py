@@ -22,7 +22,7 @@ from wholebody.methods.qp.settings import ESCAPE, TRACKING
 from wholebody.methods.qp.solvers.base import QPSolver
 from wholebody.methods.qp.step_program import StepProgram
 from wholebody.methods.qp.steps import FrameStep, QPStep
-from wholebody.methods.qp.turning import foreseen, least_unseen, unseen_by_rows
+from wholebody.methods.qp.turning import least_unseen, predicted_distances, unseen_by_rows
 from wholebody.methods.qp.working_set import WorkingSet
 from wholebody.problem import Problem
 from wholebody.scene.moving_obstacles import MOST_SHARES, FrameMotion
@@ -85,7 +85,7 @@ class QPTracker(NotCopyable):
         Things that move (`Scene.move` with `over`) are followed by as many programs as their speed needs; what
         they could not be kept apart from is named in the answer.
 
-        Without `measures` it is the least step that meets the goals, which puts right what a step with them left: it
+        Without `measures` it is the least step that meets the goals, which corrects what a step with them left: it
         ends as near to the goals as its own curvature lets it, and does not go on to improve the measures.
 
         Raises:
@@ -210,7 +210,7 @@ class QPTracker(NotCopyable):
         at = self._linearised(q)
         answer = program.solve(at, measures)
         if self._left is None and answer.missed > TRACKING.braked:
-            answer = program.solve(self._unbraked(at), measures)  # what must hold comes before soft stops
+            answer = program.solve(self._unbraked(at), measures)  # constraints come before soft stops
         motion = answer.motion
         if motion > 0.5 * self._query_distance and answer.worst > TRACKING.unseen:
             # something came in fast: to get out of its way, one must look as far as one has to go
@@ -275,7 +275,7 @@ class QPTracker(NotCopyable):
         rows, groups = self._program.rows, None
         for _ in range(TRACKING.corrections):
             short, q = self._shortfall(
-                at, displacement, np.maximum(began, foreseen(rows, asked, displacement)), began, midway
+                at, displacement, np.maximum(began, predicted_distances(rows, asked, displacement)), began, midway
             )
             if not (short > unseen).any():
                 return displacement, share, q

@@ -60,7 +60,7 @@ def solve(
         box: (2, n).
         q: (nq,) the posture.
         before: (nq + m + 2,) where the last step ended: the posture, the errors of its soft rows there to first order,
-            what it left of the goals, and 1 where there was such a step.
+            the residual of its goals, and 1 where there was such a step.
         after: (nq + m + 2,) the same of this step, but for the posture, where the program is solved.
         kind: (c,) see `Terms`, like the next two.
         bound: (2, c).
@@ -224,9 +224,9 @@ def run_ahead(
         before[-2], before[-1] = 0.0, 1.0
     largest = 0.0
     for r in range(goals, len(soft_error)):
-        foreseen = min(max(soft_error[r] - before[last + r], -most), most) if known else 0.0
+        predicted = min(max(soft_error[r] - before[last + r], -most), most) if known else 0.0
         bow = curved[r - goals]
-        largest = max(largest, abs(min(max(bow, -most), most) - foreseen))
+        largest = max(largest, abs(min(max(bow, -most), most) - predicted))
         before[last + r] = soft_error[r] - bow
     return largest > straight
 

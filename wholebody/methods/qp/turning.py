@@ -1,4 +1,4 @@
-"""Which steps turn some pair nearer than its rows foresee: those are looked at where they end, and others are not.
+"""Which steps turn some pair nearer than its rows predict: those are looked at where they end, and others are not.
 
 Rows are straight and bodies turn. How much nearer a pair gets by that is bounded for each pair by itself, from what the
 joints between the root and its two pieces do; an arm that is far from everything costs nothing, however it turns.
@@ -92,8 +92,8 @@ def unseen_by_rows(asked: Array) -> Array:
     return unseen
 
 
-def foreseen(rows: Rows, asked: Array, displacement: Array) -> Array:
-    """Distance (k,) of each contact after a displacement (nv,) as its rows have it, at most what is asked (k,)."""
+def predicted_distances(rows: Rows, asked: Array, displacement: Array) -> Array:
+    """Distance (k,) of each contact after a displacement (nv,) as its rows have it, at most the required one (k,)."""
     violated = np.zeros(rows.contacts)
     np.maximum.at(violated, rows.contact, rows.elastic_violation - rows.elastic @ displacement)
     return np.asarray(asked - violated[rows.contacts - len(asked) :])

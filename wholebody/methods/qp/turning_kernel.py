@@ -1,4 +1,4 @@
-"""How the pieces of a step move, and whether it turns some pair nearer than its rows foresee: see `turning`."""
+"""How the pieces of a step move, and whether it turns some pair nearer than its rows predict: see `turning`."""
 
 from __future__ import annotations
 

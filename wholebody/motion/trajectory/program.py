@@ -170,7 +170,7 @@ def touched(rows: Sequence[Rows], which: Sequence[Mask]) -> Mask:
     return found
 
 
-def foreseen(one: Rows, step: Array) -> Array:
+def predicted(one: Rows, step: Array) -> Array:
     """(r,) gaps of a node's rows after a step (n, nv), to first order."""
     frame = one.node.frame
     after: Array = one.gap.copy()
@@ -181,7 +181,7 @@ def foreseen(one: Rows, step: Array) -> Array:
 
 def active(rows: Sequence[Rows], step: Array) -> list[Mask]:
     """For each node which rows are tight or missed after a step (n, nv), to a micrometre."""
-    return [foreseen(one, step) <= one.node.room + 1e-6 for one in rows]
+    return [predicted(one, step) <= one.node.room + 1e-6 for one in rows]
 
 
 def within_reach(one: Rows, dofs: Indices, radius: float) -> Mask:

@@ -29,9 +29,9 @@ from wholebody.motion.trajectory.program import (
     Limits,
     Step,
     active,
-    foreseen,
     lay_out,
     likely,
+    predicted,
     touched,
     within_reach,
 )
@@ -251,7 +251,7 @@ class WindowProgram:
             x, solved = layout.deviations(minimise(layout.program).z, here.x), solved + 1
             left = [mask & ~keep for mask, keep in zip(possible, kept, strict=True)]
             missed = [
-                mask & (foreseen(one, x - here.x) < one.node.room - MET) if mask.any() else mask
+                mask & (predicted(one, x - here.x) < one.node.room - MET) if mask.any() else mask
                 for one, mask in zip(here.rows, left, strict=True)
             ]
             if not any(mask.any() for mask in missed):

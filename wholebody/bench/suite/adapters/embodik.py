@@ -40,7 +40,7 @@ class EmbodikLoop(Loop):
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""
-        # Near a goal, a step makes up for a tenth of what is left.
+        # Near a goal, a step makes up for a tenth of the residual.
         super().__init__(tolerance, 1000 if iterations is None else iterations)
 
     def build(self, problem: Problem) -> Stepper:

@@ -78,7 +78,7 @@ class Loop(Outside[Stepper], ABC):
         """Find a posture.
 
         Args:
-            problem: what is asked.
+            problem: to be solved.
             progress: see `wholebody.methods.control.Progress`.
 
         Raises:

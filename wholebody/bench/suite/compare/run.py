@@ -183,7 +183,7 @@ def run(
 def _tasks(settings: Settings, plan: Plan, done: set[tuple[str, int]], end: float) -> Iterator[Task]:
     """Cases in turn over all sets, each with those methods that there is time for when it is begun.
 
-    After the time `end`, for which the costs were foreseen too low, only sets are begun of which there is no case yet.
+    After the time `end`, for which the predicted costs were too low, only sets are begun of which there is no case yet.
     """
     for number in range(settings.cases):
         for family in settings.sets:

@@ -21,7 +21,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures.state import State, Wrench
 
 ROOM = 0.005  # m: what limbs and things leave free in a witness, and things at the start
-CLEARANCE = 0.002  # m: what is asked of an answer
+CLEARANCE = 0.002  # m: required of an answer
 TIPS = ("right_index_tip", "left_index_tip")
 FEET = ("left_foot", "right_foot")
 
@@ -111,7 +111,7 @@ def movable(figure: wb.Figure) -> NDArray[np.intp]:
 def standing_problem(
     scene: wb.Scene, start: Array, goals: Sequence[wb.Goal], *constraints: wb.Constraint
 ) -> wb.Problem:
-    """What is asked of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart.
+    """The requirements of a person: both feet stay where they are at the start (nq,), and all pairs `CLEARANCE` apart.
 
     What a person keeps by default is left out: most tools cannot be told of it, and known answers do not keep it.
     """

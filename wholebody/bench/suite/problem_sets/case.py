@@ -24,7 +24,7 @@ class Case:
     Attributes:
         set: name of its set.
         number: within the set.
-        problem: what is asked; methods see this and nothing else of the case.
+        problem: to be solved; methods see this and nothing else of the case.
         witness: (nq,) a posture that meets the goals and keeps everything that must hold.
         frames: goals of each following frame, for a set whose goals move; empty for one that is solved once.
         path: a posture (nq,) for each frame that proves it possible.
@@ -53,7 +53,7 @@ class ProblemSet:
     Attributes:
         name: as typed at the command line.
         title: as written over a chart.
-        about: one sentence: what is asked, and what makes it hard.
+        about: one sentence: the problem, and what makes it hard.
         pose: a problem, its witness, and the frames of a moving set, from a number and a generator of random numbers.
         moving: whether its goals move from frame to frame.
     """

@@ -22,7 +22,7 @@ class Posed:
     """A problem to solve once. Only the answer counts, not a way to it.
 
     Attributes:
-        problem: what is asked.
+        problem: to be solved.
         iterations: most iterations that the method gets; None for its own default.
         hindered: whether the method is asked as `Adapter.hindered` makes it.
     """
@@ -50,7 +50,7 @@ class Stream:
     """A goal to follow frame by frame with `wholebody.Drag`; every frame counts, and the way from one to the next.
 
     Attributes:
-        problem: what is asked; its first goal, a `Point`, is the one that moves.
+        problem: to be solved; its first goal, a `Point`, is the one that moves.
         frames: where the goal and the things are.
         dt: seconds a frame.
         speed: most that a joint may move [rad/s]; inf where nothing bounds it.
@@ -86,7 +86,7 @@ class HardCase:
         title: its heading.
         why: why it is hard.
         acceptable: what an acceptable answer is, in words.
-        question: what is asked, made anew at each call: what a method does to it does not reach the judge.
+        question: makes the problem, a new one at each call: what a method does to it does not reach the judge.
         expected: the best verdict that there can be.
         also: verdicts that are acceptable besides.
         best: goal error of the best possible answer [m, rad]; None where only the best answer of all is known.
@@ -124,7 +124,7 @@ class Answer:
 
     Attributes:
         postures: (k, nq) its answer, or one posture a frame; empty where it gave none.
-        status: what it says of its answer; "" for streams, which say only what is left.
+        status: what it says of its answer; "" for streams, which say only their residual.
         left: (k,) what it says is left to the goal, metres or radians; NaN where it does not say.
         refusal: what it says where it refuses.
         failure: an exception that is no WholebodyError, or how the process ended.

@@ -99,7 +99,7 @@ def _missed(case: HardCase, answer: Answer, judged: Judged) -> str:
     if answer.status == "solved" and judged.goal_error > case.tolerance:
         return f"claims solved, {length(judged.goal_error)} left"
     if judged.misreported > case.tolerance:
-        return f"misreports what is left by {length(judged.misreported)}"
+        return f"misreports its residual by {length(judged.misreported)}"
     return ""
 
 

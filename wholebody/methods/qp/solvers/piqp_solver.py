@@ -18,7 +18,7 @@ from wholebody.methods.qp.solvers.split_form import SCALING
 
 
 class PIQPSolver(NativeSolver):
-    """PIQP with a workspace that lives on; an interior-point method begins anew in each program."""
+    """PIQP with a workspace that lives on; an interior-point method has no warm start."""
 
     name = "piqp"
 

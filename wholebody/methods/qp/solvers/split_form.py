@@ -7,7 +7,7 @@ third of the time and DAQP two thirds.
     subject to  lower <= x <= upper,    T x - r = e,    C x + s >= l
 
 Solvers get it scaled: z = [a x, R r, S s], rows times the roots of their weights as far as those of `HEAVIEST`. The
-objective of the residuals is then 1, and what is left of a weight is in their coefficients. The program is the true
+objective of the residuals is then 1, and the rest of a weight is in their coefficients. The program is the true
 one, however heavy its rows: the heaviest are nearly hard, since their residuals hardly count in them.
 """
 
