@@ -178,3 +178,20 @@ def test_scripts_are_smooth_and_seeded(hand: wb.Figure) -> None:
     farthest = np.linalg.norm(away[:3] - hand.neutral[:3])
     assert np.linalg.norm(speed[:, :3], axis=1).max() == pytest.approx(1.875 * farthest, rel=0.1)
     assert np.abs(np.diff(speed, axis=0)).max() < 0.2
+
+
+def test_a_table_without_names_has_the_order_of_the_figure(tmp_path):
+    """Unitree's LAFAN1 files: root, quaternion, joints, thirty lines a second; another count of numbers is refused."""
+    figure = wb.load("avatar")
+    rng = np.random.default_rng(3)
+    q = np.tile(figure.neutral, (4, 1))
+    q[:, 7:] += rng.uniform(-0.1, 0.1, (4, len(figure.joints)))
+    path = tmp_path / "walk1_subject1.csv"
+    np.savetxt(path, q, delimiter=",", fmt="%.9f")
+    with pytest.warns(UserWarning, match="no names; the columns were taken as root_x to"):
+        track = read_track(path, figure)
+    assert track.dt == pytest.approx(1.0 / 30.0)
+    np.testing.assert_allclose(track.q, q, atol=1e-8)
+    np.savetxt(path, q[:, 1:], delimiter=",", fmt="%.9f")
+    with pytest.raises(wb.FileFormatError, match=rf"no names of columns, and {q.shape[1] - 1} numbers where"):
+        read_track(path, figure)

@@ -95,11 +95,13 @@ def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what
         raise InputError(
             f"{what}: the rotation is not orthonormal (off by {error:.3g}); give a rotation without scale or shear"
         )
-    left, _, right = np.linalg.svd(rotation)
-    nearest = left @ right
-    if np.linalg.det(nearest) < 0:
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
         raise InputError(f"{what}: the rotation is a reflection (determinant -1); give a right-handed rotation")
-    return pin.SE3(rotation.copy() if error < 1e-14 else nearest, translation.copy())
+    if error >= 1e-14:
+        left, _, right = np.linalg.svd(rotation)
+        rotation = left @ right
+    return pin.SE3(rotation.copy(), translation.copy())
 
 
 def _check_values(values: NDArray[np.float64], what: str) -> None:

@@ -39,8 +39,8 @@ class SquaredDistance(NamedTuple):
         weights = np.array(weights, dtype=float)
         curvature = np.maximum(2.0 * weights, LEAST_CURVATURE)
         # A free-flyer without weight has no part in the distance, so its curved tangent space has none either.
-        curved = [joint for joint in model.joints[1:] if joint.nq != joint.nv]
-        straight = not any(weights[joint.idx_v : joint.idx_v + joint.nv].any() for joint in curved)
+        sizes = zip(model.nqs.tolist(), model.nvs.tolist(), model.idx_vs.tolist(), strict=True)
+        straight = not any(nq != nv and weights[first : first + nv].any() for nq, nv, first in sizes)
         return cls(np.array(reference, dtype=float), weights, curvature, straight)
 
     def value(self, state: State) -> float:

@@ -48,8 +48,10 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     """Read a track of a figure; its columns may have any order.
 
     The time step is the mean of the file's, whose times may be rounded to the decimals that they have. A column such as
-    "left_knee_flexion [deg]" is in degrees. Joints without a column stay as in the neutral posture, and a free root
-    without its seven columns where it is in that posture; a warning names them.
+    "left_knee_flexion [deg]" is in degrees. A file without names has the root and the joints in the figure's order, one
+    line for each thirtieth of a second, as Unitree's LAFAN1 files have; a warning says so. Joints without a column stay
+    as in the neutral posture, and a free root without its seven columns where it is in that posture; a warning names
+    them.
 
     Raises:
         FileFormatError: the file cannot be read, a line has another length, a value is no finite number, or the time
@@ -64,6 +66,8 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     lines = _lines(path, text)
     number, first = next(lines, (1, []))
     wanted = [TIME, *(ROOT_COLUMNS if figure.root == "free" else ()), *figure.joints]
+    if first and all(map(is_number, first)):
+        first, lines = _without_names(path, first, wanted, [(number, first), *lines])
     names = _columns(f"{path.name}, line {number}", first, wanted)
     table, places, decimals = _numbers(path, number, lines, names)
     in_degrees = [name.strip().lower().endswith(DEGREES) for name in first]
@@ -87,6 +91,26 @@ def read_track(path: str | os.PathLike[str], figure: Figure) -> Track:
     track = Track.of(figure, q, dt, path.name)
     track.check(figure)
     return track
+
+
+def _without_names(
+    path: Path, first: list[str], wanted: list[str], lines: list[tuple[int, list[str]]]
+) -> tuple[list[str], Iterator[tuple[int, list[str]]]]:
+    """Names for the columns of a file that has none, and its lines with times; a warning says what was taken.
+
+    Raises:
+        FileFormatError: there are not as many columns as the figure has.
+    """
+    if len(first) != len(wanted) - 1:
+        raise FileFormatError(
+            f"{path.name}, line {lines[0][0]}: no names of columns, and {len(first)} numbers where the figure has "
+            f"{len(wanted) - 1}; write time and the names of joints into the first line"
+        )
+    warn(
+        f"{path.name}: the first line has no names; the columns were taken as {wanted[1]} to {wanted[-1]} in the "
+        "figure's order, at 30 frames a second"
+    )
+    return wanted, ((number, [repr(frame / 30.0), *line]) for frame, (number, line) in enumerate(lines))
 
 
 def _columns(place: str, first: list[str], wanted: list[str]) -> list[str]:

@@ -199,7 +199,9 @@ def _from_seeds(
             q, effort = chain.posture(seeds[k], at), float(found[k, 1])
             if _is_free(problem, workspace, q):
                 known = bool(found[k, 2]) and (distance is not None or not budget.measures)
-                return Met(q, tuple(trace), known, blocked if least < SEEDS.worth * effort else None)
+                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks them.
+                free = len(start) > len(room.value) and least < SEEDS.worth * effort
+                return Met(q, tuple(trace), known, blocked if free else None)
             least, blocked = (effort, q) if effort < least else (least, blocked)
         seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS.together)
     return None
