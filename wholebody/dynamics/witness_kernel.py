@@ -2,7 +2,7 @@
 
 The load of a face on a face has many solutions at its ends and at a witness point between them, and the program finds
 that of the points that it visits first: the witness point under the centre of a box bore all of it, and friction at a
-single point does not turn or stop a box that spins. So the ends alone bear it, as in the contact manifolds of Bullet,
+single point does not turn or stop a box that spins. So the ends alone bear it, as between boxes in Bullet,
 MuJoCo and ODE. A witness point that is an end itself has no other row, and stays.
 """
 
