@@ -594,6 +594,7 @@ def calls(path: Path) -> Iterator[tuple[str, Call]]:
     yield "posed(roots)", Call(lambda v: tracking.posed(hand, roots=v, dt=0.1), {"v": [at, at]})
     yield "read_track", Call(tracking.read_track, {"path": path / "track.csv", "figure": arm})
     yield "write_track", Call(tracking.write_track, {"track": track, "path": path / "track.csv"})
+    yield "resampled", Call(tracking.resampled, {"figure": arm, "motion": track, "name": "finer"})
     yield "gallery", Call(tracking.gallery, {"figure": hand})
     yield "build_scene", Call(tracking.build_scene, {"name": "hand_on_table", "frames": 3, "seed": 0, "dt": 0.1})
     along = {"problem": ask, "places": places, "method": "qp", "goal": 0, "dt": 0.1, "progress": print}

@@ -24,6 +24,7 @@ def example(root: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Example]:
         assert spec is not None
         assert spec.loader is not None
         module = importlib.util.module_from_spec(spec)
+        monkeypatch.setitem(sys.modules, spec.name, module)  # dataclasses look their module up
         spec.loader.exec_module(module)
         return module
 

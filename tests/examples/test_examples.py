@@ -26,7 +26,7 @@ OTHERS = (
     *("chair", "console_two_people", "hand_on_table", "avatar_two_arms"),
     *("sit_on_chair", "four_bar", "assemble_shelf", "free_a_clip"),
     *("four_bar_among_obstacles", "scissor_lift", "carry_together", "take_a_seat", "lift_a_box"),
-    *("reach_map", "study_of_people"),
+    *("reach_map", "study_of_people", "own_method"),
 )
 REST_ON = {("pelvis", "pouch"), ("lower_lumbar", "pouch")}  # what the figure wears lies on it
 
@@ -336,6 +336,11 @@ def test_two_people_carry_a_box_over_a_post(example: Example, tmp_path: Path) ->
             assert abs(made.placement(f"{name}/{side}_sole").translation[2]) < 1e-3
     heights = [made.scene.contacts(q, 0.0).distance.min(initial=0.0) for q in states]
     assert min(heights) > -1e-4
+
+
+def test_a_method_of_ones_own_reaches(example: Example, capsys: Any) -> None:
+    example("own_method").main()
+    assert capsys.readouterr().out.count(": solved ") == 2
 
 
 def test_takes_a_seat_and_lifts_a_box(example: Example, tmp_path: Path) -> None:

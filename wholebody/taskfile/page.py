@@ -8,9 +8,12 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
 
 from wholebody.taskfile.schema import TABLES, TOP
 from wholebody.taskfile.tables import Form, Key, Table
+
+_UNIT = re.compile(r" \[[^]]*\]")
 
 INTRODUCTION = """\
 # Task files
@@ -58,17 +61,37 @@ frame = "right_foot"
 
 def page() -> str:
     """Return the page, in Markdown."""
-    parts = [INTRODUCTION, "## Top of the file\n", _rows(TOP)]
+    parts, before = [INTRODUCTION, "## Top of the file\n", _rows(TOP)], dict[str, Table]()
     for name, table in TABLES.items():
-        parts += [f"## {_brackets(name, table)}\n", f"{table.says}\n"]
-        shared = _chooser(table) + _rows(table.keys)
-        if shared:
-            parts.append(shared)
-        known: dict[str, Form] = {}
-        for form_name, form in (table.forms or {}).items():
-            parts.append(_form(table.chooser, form_name, form, known))
-            known[form_name] = form
+        parts += [f"## {_brackets(name, table)}\n", f"{table.says}\n", *_types(table, before)]
+        before[name] = table
     return "\n".join(parts)
+
+
+def _types(table: Table, before: Mapping[str, Table]) -> list[str]:
+    """The keys and types of a table; types that an earlier table has are only named."""
+    forms, shared = dict(table.forms or {}), _chooser(table) + _rows(table.keys)
+    for earlier, other in before.items():
+        same = [name for name, form in forms.items() if _has(other, name, form)]
+        if same:
+            lost = any(len(forms[name].keys) < len((other.forms or {})[name].keys) for name in same)
+            names, lacks = ", ".join(f"`{name}`" for name in same), ", without `weight`" if lost else ""
+            shared += f"- {names}: as of `[[{earlier}]]`{lacks}\n"
+            forms = {name: form for name, form in forms.items() if name not in same}
+    weights = [key for form in forms.values() for key in form.keys if key.name == "weight"]
+    if weights:  # one row for all types, which have the unit alone
+        shared += _rows((replace(weights[0], says=_UNIT.sub("", weights[0].says)),))
+    parts, known = [shared] if shared else [], dict[str, Form]()
+    for name, form in forms.items():
+        parts.append(_form(table.chooser, name, form, known))
+        known[name] = form
+    return parts
+
+
+def _has(other: Table, name: str, form: Form) -> bool:
+    """Whether a table has a type with this name, this meaning and at least these keys."""
+    twin = (other.forms or {}).get(name)
+    return twin is not None and twin.says == form.says and set(form.keys) <= set(twin.keys)
 
 
 def _brackets(name: str, table: Table) -> str:
@@ -92,13 +115,18 @@ def _form(chooser: str, name: str, form: Form, known: Mapping[str, Form]) -> str
         if len(shared) >= 3 and not said:
             said = f"- {', '.join(f'`{key.name}`' for key in shared)}: as of `{earlier}`\n"
             own = tuple(key for key in own if key not in shared)
-    return f"{heading}\n{said}{_rows(own)}" if form.keys else heading
+    return f"{heading}\n{said}{_rows(own, weight=False)}" if form.keys else heading
 
 
-def _rows(keys: tuple[Key, ...]) -> str:
-    names = [f"**`{key.name}`**" if key.required else f"`{key.name}`" for key in keys]
-    said = [re.sub(r"(^|; )([^;,]*) if left out$", r"\1default: \2", key.says) for key in keys]
-    return "".join(f"- {name} ({key.kind.words}): {text}\n" for name, key, text in zip(names, keys, said, strict=True))
+def _rows(keys: tuple[Key, ...], weight: bool = True) -> str:
+    """A row a key; of a weight only its unit where the table has its row."""
+    rows = ""
+    for key in keys:
+        name = f"**`{key.name}`**" if key.required else f"`{key.name}`"
+        says = re.sub(r"(^|; )([^;,]*) if left out$", r"\1default: \2", key.says)
+        unit = _UNIT.search(says) if key.name == "weight" and not weight else None
+        rows += f"- {name}{unit[0]}\n" if unit else f"- {name} ({key.kind.words}): {says}\n"
+    return rows
 
 
 if __name__ == "__main__":

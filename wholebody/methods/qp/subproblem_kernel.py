@@ -197,7 +197,9 @@ def fill_program(
 
 @compiled(inner=True)
 def _middle(values: Array) -> float:
-    """Entry that half of the values (n,) are less than."""
+    """Entry that half of the values (n,) are less than; 1 where there are none."""
+    if len(values) == 0:
+        return 1.0
     order = np.empty(len(values), dtype=np.intp)
     sort(values, order)
     return float(values[order[len(values) // 2]])
