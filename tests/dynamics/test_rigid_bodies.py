@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -85,6 +87,47 @@ def test_a_box_on_a_slope_slides_where_the_slope_is_above_mu(hand: wb.Figure, sl
     expected = max(0.0, 0.5 * G * (np.sin(angle) - 0.3 * np.cos(angle)))
     assert way[0] == pytest.approx(expected, abs=3e-4)
     assert abs(way[2]) < 1e-4
+
+
+@pytest.mark.parametrize(
+    ("shape", "turn", "height", "place"),
+    [
+        (wb.Box((0.2, 0.2, 0.2)), 0.0, 0.1, (0.0, 0.0)),
+        (wb.Box((0.2, 0.2, 0.2)), 0.0, 0.1, (0.1, 0.05)),
+        (wb.Box((0.5, 0.5, 0.1)), 0.0, 0.05, (0.0, 0.0)),  # beyond the turntable on all sides
+        (wb.Capsule(0.05, 0.3), 0.5 * np.pi, 0.05, (0.0, 0.0)),  # on a line
+    ],
+)
+def test_what_stands_on_a_turntable_turns_with_it(
+    hand: wb.Figure, shape: wb.Shape, turn: float, height: float, place: tuple[float, float]
+) -> None:
+    angle, frames = 0.6, 60
+    rubber = wb.dynamics.Material("rubber", others=(0.0, 0.6))
+    scene = wb.Scene(hand).add(wb.Box((0.4, 0.4, 0.2)), name="table", at=(3.0, 0.0, -0.1))
+    start = pin.SE3(pin.utils.rotate("y", turn), np.array([3.0 + place[0], place[1], height + SKIN]))
+    scene.add(shape, name="thing", at=start, body=wb.Body(mass=2.0, material=rubber))
+    engine = RigidBodies(scene)
+    energy = engine.energy()
+    ways = [pin.SE3(pin.utils.rotate("z", angle * k / frames), np.array([3.0, 0.0, -0.1])) for k in range(frames + 1)]
+    for before, after in pairwise(ways):
+        frame = engine.advance(1 / 60, {"table": (before, after)})
+        assert frame.energy <= energy + frame.work + 1e-9
+        energy = frame.energy
+    at = engine.placement("thing")
+    way = at.translation - ways[-1].rotation @ (start.translation - ways[0].translation) - ways[0].translation
+    assert 0.95 * angle < pin.log3(at.rotation @ start.rotation.T)[2] <= angle + 1e-4
+    assert np.abs(way).max() < 1e-3
+
+
+def test_friction_at_its_corners_stops_a_box_that_spins(hand: wb.Figure) -> None:
+    spin, mu, size = 6.0, 0.3, 0.2
+    body = wb.Body(mass=1.0, angular_velocity=(0.0, 0.0, spin))
+    engine = RigidBodies(floor(hand).add(wb.Box((size,) * 3), name="box", at=(3, 0, -1.9 + SKIN), body=body))
+    slowing = mu * G * (size / np.sqrt(2.0)) / (size**2 / 6.0)  # rad/s2: torque over moment of inertia, per kg
+    for k in range(1, 8):
+        engine.advance(1 / 60)
+        assert engine.twist("box")[5] == pytest.approx(max(0.0, spin - slowing * k / 60), abs=0.03)
+    assert engine.placement("box").translation == pytest.approx([3.0, 0.0, -1.9 + SKIN], abs=1e-5)
 
 
 def test_a_stack_of_ten_stands_and_sleeps(hand: wb.Figure) -> None:

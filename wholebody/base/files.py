@@ -211,7 +211,7 @@ def _named(path: str | PathLike[str]) -> str:
 
 
 def write(path: str | PathLike[str], content: str | bytes) -> Path:
-    """Write a file whole or not at all; text as UTF-8.
+    """Write a file whole or not at all; text as UTF-8. A link is followed; devices and pipes are written into.
 
     A process that is killed during the call may leave a temporary file; the next process that writes to the folder
     removes it.
@@ -225,6 +225,10 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
     target = Path(path)
     data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
     try:
+        target = target.resolve() if target.is_symlink() else target
+        if target.exists() and not (target.is_file() or target.is_dir()):  # a file in their place would end them
+            target.write_bytes(data)
+            return Path(path)
         _remove_left_behind(target.parent)
         descriptor, name = tempfile.mkstemp(prefix=f".{PREFIX}", suffix=".part", dir=target.parent)
     except (OSError, ValueError) as error:
@@ -245,7 +249,7 @@ def write(path: str | PathLike[str], content: str | bytes) -> Path:
         if isinstance(error, (OSError, ValueError)):
             raise _unwritable(path, error) from None
         raise
-    return target
+    return Path(path)
 
 
 def check_writable(path: Path) -> Path:

@@ -10,7 +10,7 @@ import pinocchio as pin
 from wholebody.base import checks
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
-from wholebody.dynamics import motion_kernel
+from wholebody.dynamics import motion_kernel, witness_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, Kinematics, PairTable, Proximity
@@ -295,5 +295,7 @@ class ContactFinder:
         middle = 0.5 * (contacts.point_a + contacts.point_b)
         height = (normal * middle[owner]).sum(axis=1)
         point = np.cross(normal, rows.wrench[:, 3:]) + height[:, None] * normal
+        kept = witness_kernel.needed(owner, len(contacts.distance), normal, point, rows.gap, 1e-5)  # m: see `TOUCH`
+        owner, normal, point = owner[kept], normal[kept], point[kept]
         bodies: Indices = self.pieces.body[contacts.pair[owner]]
-        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap)
+        return ContactPoints(contacts.number[owner], bodies, normal, point, rows.gap[kept])

@@ -407,6 +407,13 @@ def test_a_drag_folds_a_straight_chain() -> None:
     assert max(drag.to((x, 0, 0)).error for x in np.linspace(1.0, 0.6, 15)) < 1e-3
 
 
+def test_a_drag_whose_time_is_spent_looks_no_further_for_a_way_out() -> None:
+    made = _straight(5, "spherical").point_goal("link4", (0, 0, 9.0), place=(0.2, 0, 0))
+    drag = Drag(made, budget=1e-9)
+    # a step towards the goal out of reach, and one that closes the joints
+    assert max(drag.to((0, 0, 9.0)).iterations for _ in range(4)) <= 2
+
+
 def _straight(count: int, joint: str, limits: tuple[float, float] | None = None) -> Assembly:
     if joint == "revolute":
         return _chain(count, limits)

@@ -61,9 +61,9 @@ def satisfy(
         kind: treatment of inequalities.
         goal_tolerance: of the goals, if it differs.
         early_exit: end at the first steps that gain little, and do not minimise the error of goals that are not met.
-        thorough: where no step lowers the error, go on from states nearby; and, unless `early_exit`, from where goals
-            out of reach pulled the constraints open and these were restored, with goals that give way: the end is
-            nearer to the goals then.
+        thorough: where no step lowers the error, go on from states nearby, in a frame if its time lasts; and, unless
+            `early_exit`, from where goals out of reach pulled the constraints open and these were restored, with goals
+            that give way: the end is nearer to the goals then.
     """
     run = Iteration(active_system, x, tolerance, tolerance if goal_tolerance is None else goal_tolerance, kind)
     far = run.goal
@@ -73,7 +73,8 @@ def satisfy(
     improve_goals = thorough and not early_exit
     _restore(run, iterations, improve_goals)
     stuck = run.goal > (1.0 - FRAMES.least_progress) * far if early_exit else run.stationary
-    if thorough and stuck and not run.met:
+    late = early_exit and active_system.control.spent > FRAMES.time_share
+    if thorough and stuck and not late and not run.met:
         _leave_saddle(run, 1 if early_exit else ENDINGS.nudges, iterations, improve_goals)
     return FeasibilityResult(run.x, run.met, run.hard, run.goal, tuple(run.residuals), run.systems, run.stationary)
 

@@ -59,7 +59,8 @@ class Frames(NamedTuple):
         hard_tolerance: m, rad: of joints and contacts of assemblies.
         least_progress: relative reduction below which a step counts as no progress.
         patience: steps without progress in a row after which a frame ends.
-        time_share: of a frame's processor time, where that is bounded, for steps towards the goals; the others restore.
+        time_share: of a frame's processor time, where that is bounded, for steps towards the goals and for trying
+            states nearby; the others restore.
     """
 
     iterations: int = 12

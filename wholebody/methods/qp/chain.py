@@ -179,15 +179,12 @@ def _from_seeds(
     if distance is not None:
         nearest = np.array([chain.angles(distance.reference), distance.weights[chain.idx_v]])
     more = 1 + budget.restarts_for_measure
+    together = SEEDS.together * more
     enough = 1 if distance is None else SEEDS.compared * more
     asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
     goals, room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
-    found, trace, begun, least, blocked = np.empty((SEEDS.together, 4)), [], 0, np.inf, None
-    seeds = (
-        np.concatenate([[start], chain.seeds(start, rng, SEEDS.together - 1)])
-        if budget.restarts
-        else start[None].copy()
-    )
+    found, trace, begun, least, blocked = np.empty((together, 4)), [], 0, np.inf, None
+    seeds = np.concatenate([[start], chain.seeds(start, rng, together - 1)]) if budget.restarts else start[None].copy()
     while begun < (SEEDS.most * more if budget.restarts else 1) and not control.over:
         taken = compiled_kernel().reach(chain.chain, goals, room, seeds, nearest, asked, found)
         begun += taken
@@ -203,7 +200,7 @@ def _from_seeds(
                 free = len(start) > len(room.value) and least < SEEDS.worth * effort
                 return Met(q, tuple(trace), known, blocked if free else None)
             least, blocked = (effort, q) if effort < least else (least, blocked)
-        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, SEEDS.together)
+        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, together)
     return None
 
 
