@@ -28,7 +28,7 @@ FINGERS = ("thumb", "index", "middle", "ring", "little")
 MIDDLE = 0.8  # share of a face, about its middle, in which the palm may be
 ALONG = 0.8  # share of a handle, about its middle, that the hand may take
 CLOSED = 0.03  # m: the same of a pinch, and of fingers around a bar, which first close
-THIN = 0.02  # m: thickness of a bar between which and the palm there is no room for a thumb
+THIN = 0.023  # m: thickness of a bar around which the thumb lies over the fingers
 APPROACHES = {"overhand": -1.0, "underhand": 1.0, "side": 0.0}  # z of the direction in which the palm looks
 
 
@@ -44,7 +44,7 @@ class Grasp(ContactTerm):
     - "power": the hand is around a bar: the thing's longest axis lies along y and crosses the palm, and the hand
       touches the thing. A ring, such as a wheel, is held by its rim, with the palm outside of it. Where the hand has
       fingers, the two outer parts of each touch the thing too, and the thumb opposes the four fingers; around a bar
-      thinner than 2 cm, where there is no room for it, thumb and fingers oppose the palm.
+      thinner than 23 mm the thumb lies over the fingers, which oppose the palm.
     - "pinch": thumb and index finger touch the thing and oppose each other; their last parts where the figure has such
       segments, otherwise their tips, which have to move apart.
     - "fingertips": the last parts of all five fingers touch the thing, and the thumb opposes the others; the hand
@@ -169,10 +169,9 @@ class Grasp(ContactTerm):
         parts += [Gap(finger, thing) for finger in fingers.values()]
         others = tuple(finger for name, finger in fingers.items() if name != "thumb")
         thumbs = tuple(finger for name, finger in fingers.items() if name == "thumb")
-        around = not thumbs or thickness < THIN  # then all that there is opposes the palm
-        for first, side in ((hand, others), (hand, thumbs)) if around else ((thumbs[0], others),):
-            if side:
-                parts.append(Opposing(first, side, thing, rounded(thing), float(self.opposed), CLOSED))
+        if others:
+            first = thumbs[0] if thumbs and thickness >= THIN else hand
+            parts.append(Opposing(first, others, thing, rounded(thing), float(self.opposed), CLOSED))
         return parts
 
     def _fingers(self, scene: Surroundings, thing: Surface, state: State, where: str) -> list[Part]:
