@@ -60,20 +60,6 @@ def test_a_contact_costs_no_more_than_its_place(name: str) -> None:
     assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, [goal])
 
 
-def test_feet_that_stand_cost_no_more_than_their_places() -> None:
-    """Toes nearly parallel to the step turn by degrees while their gap changes by micrometres."""
-    scene = wb.Scene(wb.load("human", sex="female"))
-    scene.add(wb.Box((0.6, 0.8, 0.3)), name="step", at=(0.18, 0.078, 0.036))
-    problem = wb.Problem(scene, constraints=[wb.Stand("step")])
-    solution = wb.solve(problem)
-    assert solution.status == "solved"
-    state, goals = scene.state(solution.q), list[wb.Goal]()
-    for foot in ("left_foot", "right_foot"):
-        place = state.frame(scene.figure.frame_id(foot))
-        goals.append(wb.Frame(foot, np.r_[place.translation, pin.Quaternion(place.rotation).coeffs()]))
-    assert solution.assessment.measure < AS_CHEAP * effort_there(problem, solution.q, goals)
-
-
 SEATS = {"with a back": (-0.35, 0.05, 0.42), "without": (-0.425, 0.179, 0.347)}
 
 

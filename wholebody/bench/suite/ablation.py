@@ -187,7 +187,7 @@ def mechanisms(method: str) -> dict[str, tuple[Any, str, Any]]:
 
     search, descent = multistart.Multistart, sqp.SQP
     return {
-        "watchdog": (descent, "_is_worth_watching", lambda self, here, there: False),
+        "watchdog": (descent, "_is_tentative", lambda self, here, there: False),
         "acceleration": (Anderson, "propose", lambda self, step, stretch=0.0: None),
         "normal and tangential parts": (sqp, "parts_of", lambda *given: None),
         "Lagrangian in the judgement of steps": (sqp, "lagrangian", lambda multipliers, measure, rows: measure),

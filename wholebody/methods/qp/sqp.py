@@ -198,9 +198,9 @@ class SQP:
             if here.at.planes is not None:
                 self._tension = multipliers.net(here.rows)
             saved = self.subproblem.quadratic_part(program, here.rows, parts.tangential)
-            if (answer.active.lower | answer.active.upper).any():
-                # Bounds add to what the curvature says; a normal part that closes a gap reduces the measures too.
-                saved = self.subproblem.saving(program, here.rows, x) - multipliers.change(program, x)
+            if (answer.active.lower | answer.active.upper).any():  # they hold back more than the curvature says
+                saved = self.subproblem.saving(program, here.rows, parts.tangential)
+                saved -= multipliers.change(program, parts.tangential)
             bent = here.at.planes is not None and len(here.at.planes.bend)
             # share of the tolerance below which a gain counts as none, where its curvature is known
             flat = saved / self._gain <= (1e-2 if bent else 1.0) * self.tolerance * (1.0 + abs(here.at.measure))
