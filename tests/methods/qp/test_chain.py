@@ -275,6 +275,23 @@ def test_joints_without_limits_and_joints_that_follow_elsewhere(tmp_path):
 LIMIT = '<limit lower="-1.5" upper="1.5" effort="1" velocity="1"/>'
 
 
+@pytest.mark.parametrize("far", [0.3, 5.0])
+def test_joints_that_slide_without_limits(tmp_path, far):
+    pytest.importorskip("mujoco")
+    path = tmp_path / "cart.xml"
+    path.write_text(
+        '<mujoco><worldbody><body name="cart"><joint name="slide" type="slide" axis="1 0 0" limited="false"/>'
+        '<geom type="sphere" size="0.05"/><body name="arm" pos="0 0 0.2"><joint name="turn" axis="0 1 0" '
+        'range="-100 100"/><geom type="capsule" fromto="0 0 0.1 0 0 0.4" size="0.02"/></body></body></worldbody>'
+        "</mujoco>",
+        encoding="utf-8",
+    )
+    scene = wb.Scene(wb.load(path))
+    for measures in (True, False):
+        problem = wb.Problem(scene, goals=[wb.Point("arm", (far, 0.0, 0.5), offset=(0.0, 0.0, 0.4))])
+        assert wb.QP(measures=measures).solve(problem).solved
+
+
 def test_every_descent_is_told_and_counted(arm):
     goal = place_of(arm, np.array([0.4, 0.8, 0.9, 0.0, 0.5, 0.0]), "tip").translation
     problem, told = wb.Problem(wb.Scene(arm), START, goals=[wb.Point("tip", goal)]), []

@@ -110,8 +110,12 @@ class PlainChain:
         )  # fmt: skip
 
     def seeds(self, start: Array, rng: np.random.Generator, count: int) -> Array:
-        """Values (count, n) all over the limits, but not farther from a start (n,) than half a turn."""
-        half = np.where(self.chain.turns.any(axis=1), np.pi, np.inf)
+        """Values (count, n) all over the limits, but not farther from a start (n,) than half a turn.
+
+        Joints that slide without limits begin within a metre of it.
+        """
+        limited = np.isfinite(self.chain.upper - self.chain.lower)
+        half = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
         lower, upper = np.maximum(self.chain.lower, start - half), np.minimum(self.chain.upper, start + half)
         values: Array = rng.uniform(lower, upper, (count, len(start)))
         return values
