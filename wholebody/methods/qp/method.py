@@ -45,8 +45,8 @@ class QP(Checked):
         seed: of the restarts.
         measures: whether the measures are to be least. Without, the first posture is the answer that meets the goals
             with everything held, which is there in a fifth to nine tenths of the time. This is for `solve`.
-        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None, the
-            numbers of programs end it, and at last ten seconds of processor time.
+        time_limit: seconds after which a solve ends with the best posture so far, infinite for no limit. Where None,
+            the numbers of programs end it, and at last ten seconds of processor time.
     """
 
     solver: str = "osqp"
