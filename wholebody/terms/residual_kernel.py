@@ -72,9 +72,7 @@ def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, va
                 value[row + i] = angle[i]
                 for j in range(3):
                     wrench[row + i, j] = 0.0
-                    wrench[row + i, 3 + j] = (
-                        left[i, 0] * base[0, j] + left[i, 1] * base[1, j] + left[i, 2] * base[2, j]
-                    )
+                    wrench[row + i, 3 + j] = left[i, 0] * base[0, j] + left[i, 1] * base[1, j] + left[i, 2] * base[2, j]
 
 
 @compiled(inner=True, error_model="numpy")

@@ -191,16 +191,16 @@ def _least_effort(
     """
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
-    moved, before, share = np.zeros(size), np.zeros(size), 1.0
+    moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
+    released = np.empty(size, dtype=np.bool_)
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
         rows_of(chain, goals, room)
         for i in range(size):
-            room.free[i], shift[i] = True, nearest[0, i] - q[i]
-            dq[i] = 0.0
-        held = True
-        while held:
+            room.free[i], released[i], shift[i] = True, False, nearest[0, i] - q[i]
+        changed = True
+        while changed:  # every round holds a joint or releases one for the first time
             for r in range(rows):
                 right[r] = room.value[r]
                 for i in range(size):
@@ -219,21 +219,18 @@ def _least_effort(
                     dq[i] = shift[i]
                     for r in range(rows):
                         dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
-            held = _hold(chain, room.free, q, dq)
+            changed = _hold_first(chain, room.free, q, dq)
+            if not changed:
+                wrong = _held_wrongly(chain, room, q, dq, nearest, right)
+                changed = wrong >= 0 and not released[wrong]
+                if changed:
+                    room.free[wrong] = released[wrong] = True
         longest = 0.0
         for i in range(size):
             longest = max(longest, abs(dq[i]))
         left = _norm(room.value)
         if longest < 1e-5 and left <= tolerance:
-            found[0] = left
-            for i in range(size):  # a joint that is held must be pushed against its limit
-                if not room.free[i]:
-                    slope = nearest[1, i] * (q[i] - nearest[0, i])
-                    for r in range(rows):
-                        slope += room.jacobian[r, i] * right[r]
-                    if (slope < -1e-6 and q[i] < chain.upper[i]) or (slope > 1e-6 and q[i] > chain.lower[i]):
-                        return count
-            found[2] = 1.0
+            found[0], found[2] = left, 1.0 if wrong < 0 else 0.0
             return count
         if count:
             square, bent = 0.0, 0.0
@@ -257,6 +254,37 @@ def _hold(chain: Chain, free: Mask, q: Array, dq: Array) -> bool:
             dq[i] = min(max(dq[i], chain.lower[i] - q[i]), chain.upper[i] - q[i])
             free[i], held = False, True
     return held
+
+
+@compiled(inner=True, error_model="numpy")
+def _hold_first(chain: Chain, free: Mask, q: Array, dq: Array) -> bool:
+    """Stop the joint that reaches its limit first on a step; whether there is one that would leave them."""
+    first, share = -1, 1.0
+    for i in range(len(q)):
+        if free[i] and not chain.lower[i] <= q[i] + dq[i] <= chain.upper[i]:
+            part = ((chain.upper[i] if dq[i] > 0.0 else chain.lower[i]) - q[i]) / dq[i]
+            if first < 0 or part < share:
+                first, share = i, part
+    if first < 0:
+        return False
+    free[first] = False
+    dq[first] = (chain.upper[first] if dq[first] > 0.0 else chain.lower[first]) - q[first]
+    return True
+
+
+@compiled(inner=True)
+def _held_wrongly(chain: Chain, room: Room, q: Array, dq: Array, nearest: Array, multipliers: Array) -> int:
+    """The held joint that the effort pulls most away from its limit; -1 where there is none."""
+    worst, most = -1, 1e-6
+    for i in range(len(q)):
+        if not room.free[i]:
+            slope = nearest[1, i] * (q[i] + dq[i] - nearest[0, i])
+            for r in range(len(multipliers)):
+                slope += room.jacobian[r, i] * multipliers[r]
+            pull = slope if q[i] + dq[i] > 0.5 * (chain.lower[i] + chain.upper[i]) else -slope
+            if pull > most:
+                worst, most = i, pull
+    return worst
 
 
 @compiled(inner=True)
