@@ -70,7 +70,7 @@ class AllPairs:
             self.distance = view[:, 0].copy()
         else:
             self.distance = np.array([result.min_distance for result in results.distanceResults], dtype=float)
-        self.least = float(self.distance.min(initial=np.inf))
+        self.least = float(np.minimum.reduce(self.distance, initial=np.inf))
         if np.isnan(self.least):
             raise InputError(NOT_A_NUMBER)
 
@@ -109,11 +109,12 @@ class AllPairs:
     def nearer(self, within: Array) -> NearPairs:
         """What there is to know of pairs nearer than `within` (pairs,), metres; it outlives the next `move`."""
         self.ask(within)
+        number = (self.distance < within).nonzero()[0]
+        if not len(number):
+            return NearPairs(self._built, number, number.reshape(0, 2), np.zeros((0, 10)), np.zeros((0, 2, 4, 3)))
         if not self._kept:
-            number = np.flatnonzero(self.distance < within)
             pair = self._built.table.pairs[number]
             return NearPairs(self._built, number, pair, self._rows[number], self._placed[pair])
-        number = np.flatnonzero(self.distance < within)
         results, (near, placed) = self._results, self._views or (None, None)
         found = near[number] if near is not None else [read_result(results.distanceResults[k]) for k in number.tolist()]
         pair = self._built.table.pairs[number]

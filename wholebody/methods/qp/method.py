@@ -108,16 +108,17 @@ class QP(Checked):
             self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
             self.restarts_for_measure,
         )  # fmt: skip
-        with problem.borrow() as workspace, Control(self.time_limit, progress, LONGEST) as control:
+        control = Control(self.time_limit, progress, LONGEST)
+        with problem.borrow() as workspace:
             met = from_seeds(problem, workspace, budget, control)
-            known = met is not None and met.stationary and met.blocked is None
-            judgement = assess(problem, met.q) if met is not None and known else None
+            judgement = assess(problem, met.q) if met is not None and met.complete else None
             if met is not None and judgement is not None and meets(judgement, self.tolerance):
                 ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
             else:
-                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
-                begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
-                best = search.run(begin, None if met is None else met.blocked)
+                with control:
+                    search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+                    begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
+                    best = search.run(begin, None if met is None else met.blocked)
                 ending = Ending(
                     best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
                     contradictions=search.contradictions, programs=search.solver.counted(),

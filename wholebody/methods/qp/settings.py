@@ -134,17 +134,17 @@ class SeedNumbers(NamedTuple):
         damping: m, rad: of the steps at the goals, as in `DampedLeastSquares`. Less: errors vanish in fewer steps,
             steps near singular postures are wild.
         steps: most of a descent; those that reach their goals take 5 to 20.
-        together: seeds at a time.
-        most: seeds in all. More: fewer problems are left to the slower search, which then begins later.
+        together: seeds of a batch.
+        batches: most. More: fewer problems are left to the slower search, which then begins later.
         compared: ends of which the one of least effort is taken. More: less effort, more time.
         worth: share of the effort of an answer below which a rejected end is descended from too.
     """
 
     damping: float = 1e-3
     steps: int = 60
-    together: int = 16
-    most: int = 256
-    compared: int = 8
+    together: int = 10
+    batches: int = 25
+    compared: int = 5
     worth: float = 0.9
 
 
