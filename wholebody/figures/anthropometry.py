@@ -1,7 +1,7 @@
 """Lengths, masses and radii of a body from sex, stature and mass.
 
 Masses are fractions (de Leva 1996). Radii are linear fits to ANSUR II, ``c0 + cq sqrt(mass / stature) + cH stature``.
-Lengths of limbs, joint centres and some thicknesses are of the same form; `wholebody.figures.fit` chooses their
+Lengths of limbs, joint centres and some thicknesses are of the same form; `tests.audits.sizes` chooses their
 coefficients so that the dimensions of the model are those of ANSUR II. The tables in ``figures/data`` name the source
 of every column.
 """
@@ -235,9 +235,7 @@ def table(name: str) -> tuple[Row, ...]:
     """Return the rows of one table, each a mapping from column to text.
 
     Args:
-        name: "joints", "segments", "radii_ansur", "percentiles", "design_cases", "spheres39", "sphere_exclusions",
-            "reach_cones", "coupled_ranges", "hand", "fit", "residuals", "dimensions", "correlations", "age_ranges" or
-            "strength".
+        name: of a file in `figures/data`, such as "joints".
 
     Raises:
         UnknownNameError: there is no such table.
@@ -246,6 +244,16 @@ def table(name: str) -> tuple[Row, ...]:
     if not path.is_file():
         raise UnknownNameError("table", name, [file.stem for file in FOLDER.glob("*.csv")])
     return packaged_table(path)
+
+
+@cache
+def named_angles(of: str) -> dict[str, dict[str, float]]:
+    """Return the angles of the table "postures", degrees by joint, of each posture of "human", "hand" or "fingers"."""
+    found: dict[str, dict[str, float]] = {}
+    for row in table("postures"):
+        if row["of"] == of:
+            found.setdefault(row["name"], {}).update({row["joint"]: float(row["degrees"])} if row["joint"] else {})
+    return found
 
 
 @cache

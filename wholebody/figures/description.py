@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 import pinocchio as pin
@@ -90,46 +90,8 @@ class Follower(NamedTuple):
         return (value - self.offset) / self.slope
 
 
-class Articulated(Protocol):
-    """The part of a `Figure` from which postures and smaller figures are made; see `Figure`."""
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model."""
-
-    @property
-    def geometry(self) -> Any:
-        """The convex pieces and their pairs."""
-
-    @property
-    def visual(self) -> Any:
-        """The geometry that is drawn."""
-
-    @property
-    def root(self) -> str:
-        """Whether the root is "free" or "fixed"."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints, without the free root."""
-
-    def joint_id(self, name: str) -> int:
-        """Index of a joint in the model."""
-
-    def posture(self, name: str) -> Array:
-        """A copy of a named posture."""
-
-    def joint_values(self, q: Array) -> dict[str, float]:
-        """The value of each one-degree joint by name."""
-
-    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A copy of a posture with some joints at other values."""
-
-    def clamp(self, q: Array) -> Array:
-        """A copy of a posture with every joint within its limits."""
-
-    def describe(self) -> Description:
-        """Its named parts."""
+Articulated: TypeAlias = Any
+"""A `Figure`, for the functions that make its parts: the module of figures imports this one."""
 
 
 class Description(NamedTuple):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any
 
 import coal
 import numpy as np
@@ -15,30 +15,8 @@ from wholebody.figures.postures import support
 DEEPEST_FALL = 10.0  # m: farther down nothing is looked for
 
 
-class SceneLike(Protocol):
-    """The part of a scene that is asked for."""
-
-    @property
-    def geometry(self) -> Any:
-        """The pin.GeometryModel with all pieces."""
-
-    @property
-    def piece_owner(self) -> tuple[str, ...]:
-        """The segment or thing that every piece is part of."""
-
-
-def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: SceneLike) -> Array:
-    """Copy (nq,) of a posture whose root is moved vertically until its lowest segments touch the things below.
-
-    Args:
-        model: of the figure, with a free root.
-        segments: its segments.
-        q: (nq,) the posture.
-        scene: the figure among things.
-
-    Raises:
-        InputError: nothing is below, or what the figure is inside of has no top near.
-    """
+def grounded(model: pin.Model, segments: tuple[str, ...], q: Array, scene: Any) -> Array:
+    """Copy (nq,) of a posture of a model with a free root; see `Figure.grounded`."""
     data = model.createData()
     pin.forwardKinematics(model, data, q)
     own = set(segments)

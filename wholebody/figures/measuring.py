@@ -9,36 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import cache
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array
-from wholebody.figures.anthropometry import table
+from wholebody.figures.anthropometry import Person, table
+from wholebody.figures.body_spec import geometry_of, model_of
+from wholebody.figures.dimensions import Dimensions
+from wholebody.figures.human import capsules
+from wholebody.figures.human.spec import human_spec
 from wholebody.figures.postures import support
-
-
-class Measured(Protocol):
-    """The part of a figure that is measured."""
-
-    @property
-    def model(self) -> Any:
-        """Pinocchio's model."""
-
-    @property
-    def geometry(self) -> Any:
-        """The convex pieces."""
-
-    def with_joints(self, q: Array, values: Mapping[str, float]) -> Array:
-        """A copy of a posture with some joints at other values."""
 
 
 class _Pose:
     """A figure at one posture: frames and the extent of its pieces along the axes."""
 
-    def __init__(self, figure: Measured, degrees: Mapping[str, float]) -> None:
+    def __init__(self, figure: Any, degrees: Mapping[str, float]) -> None:
         self.figure = figure
         names = set(figure.model.names)
         values = {
@@ -69,8 +60,11 @@ class _Pose:
 UP, DOWN, FRONT, BACK, LEFT = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0), (0.0, 1.0, 0.0)
 THIGHS = ("left_thigh", "right_thigh")
 
+TOLERANCE = 0.005
+"""Metres: a dimension that is off by this counts as one unit of a fit."""
 
-def measure(figure: Measured) -> dict[str, float]:
+
+def measure(figure: Any) -> dict[str, float]:
     """Return the fifteen dimensions of a person in metres, by the names of `DIMENSIONS`.
 
     The arm that reaches overhead is straight and vertical, with the clavicle raised as far as it goes.
@@ -107,6 +101,21 @@ def measure(figure: Measured) -> dict[str, float]:
         "forearm_hand_length": bent.frame("left_middle_tip")[0] + bent.extent(BACK, ("left_forearm",)),
         "hip_breadth_sitting": 2.0 * sit.extent(LEFT, ("pelvis", *THIGHS)),
     }
+
+
+def measured(person: Person, deviations: tuple[tuple[str, float], ...] = ()) -> dict[str, float]:
+    """Return the dimensions of a person, metres, with some of the fitted sizes changed."""
+    person = replace(person, deviations=deviations, age=None)
+    model = model_of(human_spec(person))
+    geometry = geometry_of(model, capsules.solids(Dimensions(person)), ())
+
+    def with_joints(q: Array, values: Mapping[str, float]) -> Array:
+        q = q.copy()
+        for name, value in values.items():
+            q[model.joints[model.getJointId(name)].idx_q] = value
+        return q
+
+    return measure(SimpleNamespace(model=model, geometry=geometry, with_joints=with_joints))
 
 
 @cache

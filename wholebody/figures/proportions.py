@@ -18,8 +18,8 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import known, shown
 from wholebody.base.errors import InputError
 from wholebody.base.fields import Range
-from wholebody.figures.anthropometry import Person, table
-from wholebody.figures.fit import DIRECT, PRIORS, TOLERANCE, measured
+from wholebody.figures.anthropometry import Person, keyed, table
+from wholebody.figures.measuring import TOLERANCE, measured
 
 DIMENSION = Range(0.0, 3.0, "m")
 
@@ -170,11 +170,12 @@ def _measured(person: Person) -> dict[str, float]:
 
 def _sized(person: Person, sizes: Mapping[str, float], wanted: Mapping[str, float], stated: set[str]) -> Person:
     """The person whose measured dimensions are nearest to the wanted ones: Gauss and Newton with one Jacobian."""
-    free = [name for name in PRIORS if name not in DIRECT]
+    priors = keyed("priors", "name")
+    free = list(priors)
     names = list(wanted)
     # Metres: a stated dimension that is off by this counts as one unit, one that follows counts by `TOLERANCE`.
     unit = np.array([0.0002 if name in stated else TOLERANCE for name in names])
-    pull = np.diag([1.0 / PRIORS[name].spread for name in free])
+    pull = np.diag([1.0 / float(priors[name]["spread"]) for name in free])
 
     def made(x: Array) -> Person:
         changes = {**sizes, **dict(zip(free, map(float, x), strict=True))}

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -17,21 +16,10 @@ from wholebody.figures.motion_ranges import CoupledRange, EllipseAxis, EllipticR
 from wholebody.figures.self_pairs import drop_pairs
 
 
-class ReducedParts(NamedTuple):
-    """The parts from which a smaller figure is made."""
-
-    model: pin.Model
-    geometry: pin.GeometryModel
-    visual: pin.GeometryModel
-    description: Description
-
-
-def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> ReducedParts:
-    """Return the parts of a figure of which only the joints in `keep` move; see `Figure.reduced`.
-
-    Raises:
-        InputError: `keep` is empty.
-    """
+def reduced_parts(
+    figure: Articulated, keep: tuple[str, ...], q: Array
+) -> tuple[pin.Model, pin.GeometryModel, Description, pin.GeometryModel]:
+    """Model, pieces, named parts and what is drawn of a figure of which only some joints move; see `Figure.reduced`."""
     if not keep:
         raise InputError("a reduced figure needs at least one joint; name joints, groups or 'root'")
     model = figure.model
@@ -70,7 +58,7 @@ def reduced_parts(figure: Articulated, keep: tuple[str, ...], q: Array) -> Reduc
         person=old.person,
         outer=old.outer,
     )
-    return ReducedParts(small, geometry, visual, description)
+    return small, geometry, description, visual
 
 
 def _ranges(

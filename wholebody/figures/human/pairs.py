@@ -7,7 +7,7 @@ from itertools import combinations
 from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid
 from wholebody.figures.hand import finger_pair, is_finger
-from wholebody.figures.human.spheres import sphere_names
+from wholebody.figures.human.details import sphere_names
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
 

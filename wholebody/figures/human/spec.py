@@ -16,12 +16,12 @@ from wholebody.figures.anthropometry import Person, describe, make_person, table
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, place
 from wholebody.figures.dimensions import MIDDLE_TIP, Dimensions
 from wholebody.figures.hand import palm_axes
-from wholebody.figures.human import capsules, fingers, hulls, spheres
+from wholebody.figures.human import capsules, details, fingers
 
 DETAILS: dict[str, Callable[[Dimensions], tuple[Solid, ...]]] = {
-    "spheres": spheres.solids,
+    "spheres": details.spheres,
     "capsules": capsules.solids,
-    "hulls": hulls.solids,
+    "hulls": details.polyhedra,
 }
 
 

@@ -274,7 +274,7 @@ def _placed(figure: Articulated, root: Array | None, values: dict[str, float]) -
     q = pin.neutral(figure.model)
     if root is not None and figure.root == "free":
         q[:7] = root
-    return figure.with_joints(q, values)
+    return np.asarray(figure.with_joints(q, values))
 
 
 def _add_ranges(made: Element, ranges: Mapping[str, MotionRange]) -> None:
