@@ -45,9 +45,6 @@ _ENDS = {
 }
 """Joints at the ends of segments with a fitted length."""
 
-# Expected mass at a stature, log-log fit to ANSUR II: mass = a stature^b.
-
-
 FOLDER = Path(__file__).parent / "data"
 
 Row = dict[str, str]
@@ -83,10 +80,9 @@ class Person:
 
     def fitted(self, name: str) -> float:
         """Return a size of the table "fit", metres: a length of a limb, a joint centre or a thickness."""
-        row = _row("fit", "name", name)
-        c0, cq, ch = (float(row[f"{self.column}_{part}"]) for part in ("c0", "cq", "cH"))
-        size = c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
-        return size + sum(more for which, more in self.deviations if which == name)
+        return self._linear(_row("fit", "name", name), f"{self.column}_") + sum(
+            more for which, more in self.deviations if which == name
+        )
 
     def length(self, segment: str) -> float:
         """Length of a segment, metres."""
@@ -147,8 +143,10 @@ class Person:
 
     def radius(self, part: str) -> float:
         """Radius of a body part, metres: circumference / 2 pi, or half a breadth (``*_y``) or depth (``*_x``)."""
-        row = _row("radii_ansur", "part", part)
-        c0, cq, ch = (float(row[f"{self.column}_fit_{name}"]) for name in ("c0", "cq", "cH"))
+        return self._linear(_row("radii_ansur", "part", part), f"{self.column}_fit_")
+
+    def _linear(self, row: Mapping[str, str], start: str) -> float:
+        c0, cq, ch = (float(row[start + name]) for name in ("c0", "cq", "cH"))
         return c0 + cq * math.sqrt(self.mass / self.stature) + ch * self.stature
 
 
@@ -184,6 +182,7 @@ def make_person(
         stature = 0.01 * _percentile(column, "stature", share) if stature is None else stature
         mass = _percentile(column, "mass", share) if mass is None else mass
     if mass is None and stature is not None:
+        # log-log fit to ANSUR II
         factor, exponent = {"M": (27.41, 1.999), "F": (23.00, 2.192)}[column]
         mass = factor * STATURE(stature, "stature") ** exponent
     height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
@@ -232,10 +231,7 @@ def _row(name: str, column: str, key: str) -> Mapping[str, str]:
 
 @cache
 def table(name: str) -> tuple[Row, ...]:
-    """Return the rows of one table, each a mapping from column to text.
-
-    Args:
-        name: of a file in `figures/data`, such as "joints".
+    """Return the rows of a table in `figures/data`, each a mapping from column to text.
 
     Raises:
         UnknownNameError: there is no such table.

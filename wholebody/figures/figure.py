@@ -98,7 +98,7 @@ class Figure(checks.FixedAttributes):
         self.root = "free" if has_free_root(model) else "fixed"
         self._frame_ids = {frame.name: index for index, frame in reversed(list(enumerate(model.frames)))}
         self._joint_ids = {name: index for index, name in enumerate(model.names) if index > 0}
-        self.joints = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
+        self.joints: tuple[str, ...] = tuple(name for name in self._joint_ids if name != ROOT_JOINT)
         self.limits = limits_of(model)
         self._turning = Turning(model)
         self.followers = MappingProxyType(followers_of(model))
@@ -270,7 +270,7 @@ class Figure(checks.FixedAttributes):
         return lower, upper
 
     def within_limits(self, q: Array, tolerance: float = 1e-9) -> bool:
-        """Whether every limited joint is within its limits at q (nq,), to a tolerance for rounding, radians or metres."""
+        """Whether every limited joint is within its limits at q (nq,), to a tolerance in radians or metres."""
         tolerance = checks.number(tolerance, "tolerance", 0.0, LARGEST)
         value = self._checked(q)[self.limits.idx_q]
         return bool(((value >= self.limits.lower - tolerance) & (value <= self.limits.upper + tolerance)).all())

@@ -132,7 +132,7 @@ def _polyhedron(size: Dimensions, part: str) -> tuple[object, pin.SE3]:
 
 
 def finger_base(size: Dimensions, side: str, finger: str) -> pin.SE3:
-    """Placement of a finger's first joint in the hand: its knuckle, or the thumb's joint after the resting metacarpal."""
+    """Placement of a finger's first joint in the hand: its knuckle, or the end of the thumb's resting metacarpal."""
     if finger == "thumb":
         return thumb_metacarpal(size, side) * place(z=-keyed_hand("thumb_mc", "length") * size.hand_length)
     return pin.SE3(np.eye(3), _knuckle(size, finger))

@@ -65,12 +65,9 @@ TOLERANCE = 0.005
 
 
 def measure(figure: Any) -> dict[str, float]:
-    """Return the fifteen dimensions of a person in metres, by the names of `DIMENSIONS`.
+    """Return the fifteen dimensions of a person in any detail, metres, by the names of the table "dimensions".
 
     The arm that reaches overhead is straight and vertical, with the clavicle raised as far as it goes.
-
-    Args:
-        figure: the person, in any detail.
     """
     stand = _Pose(figure, {})
     sit = _Pose(figure, {"hip_flexion": 90.0, "knee_flexion": 90.0})
@@ -120,11 +117,6 @@ def measured(person: Person, deviations: tuple[tuple[str, float], ...] = ()) -> 
 
 @cache
 def ansur(sex: str, percentile: int) -> dict[str, float]:
-    """Return ANSUR II's value of each dimension, metres.
-
-    Args:
-        sex: "male" or "female".
-        percentile: 5, 50 or 95.
-    """
+    """Return ANSUR II's value of each dimension at a percentile of 5, 50 or 95, metres."""
     column = f"{'M' if sex == 'male' else 'F'}{percentile}"
     return {row["name"]: float(row[column]) for row in table("dimensions")}

@@ -62,7 +62,7 @@ def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Per
 @lru_cache(maxsize=64)
 def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Person:
     names = dimension_names()
-    usual = _usual(replace(person, age=None))
+    usual = _measured(replace(person, age=None))
     which = [names.index(name) for name, _ in stated]
     change = likely_change(person, which, np.array([value - usual[name] for name, value in stated]))
     wanted = {name: usual[name] + float(change[k]) for k, name in enumerate(names)}
@@ -82,15 +82,9 @@ def _proportioned(person: Person, stated: tuple[tuple[str, float], ...]) -> Pers
 
 
 def likely_change(person: Person, which: list[int], change: Array) -> Array:
-    """Return by how much all dimensions differ from the usual ones, given the difference of some.
+    """Return by how much all dimensions (n,) differ from those usual for a person's stature and mass, metres.
 
-    Args:
-        person: whose stature and mass the usual dimensions belong to.
-        which: (k,) indices of the given dimensions in `dimension_names`.
-        change: (k,) metres.
-
-    Returns:
-        (n,) metres.
+    Given is the change (k,) of some, by their indices (k,) in `dimension_names`.
 
     Raises:
         InputError: the differences are those of nobody.
@@ -98,7 +92,7 @@ def likely_change(person: Person, which: list[int], change: Array) -> Array:
     names, covariance = dimension_names(), residual_covariance(person.column)
     spread = np.sqrt(np.diag(covariance))[which]
     people = f"{'men' if person.column == 'M' else 'women'} of {person.stature:g} m and {person.mass:.3g} kg"
-    usual = _usual(replace(person, age=None, deviations=()))
+    usual = _measured(replace(person, age=None, deviations=()))
     for k, deviation in enumerate(change / spread):
         if abs(deviation) > FARTHEST:
             name = names[which[k]]
@@ -125,11 +119,7 @@ def likely_change(person: Person, which: list[int], change: Array) -> Array:
 
 @cache
 def residual_covariance(column: str) -> Array:
-    """Return the covariance (n, n) of the dimensions of people of one stature and mass, m^2.
-
-    Args:
-        column: "M" or "F".
-    """
+    """Return the covariance (n, n) of the dimensions of people of one stature and mass and a sex, "M" or "F", m^2."""
     rows = table("correlations")
     names = [row["name"] for row in rows]
     correlation = np.array([[float(row[name]) for name in names] for row in rows])
@@ -160,11 +150,7 @@ def _spread(name: str, dimension: str, column: str) -> float:
 
 
 @lru_cache(maxsize=64)
-def _usual(person: Person) -> Mapping[str, float]:
-    return _measured(person)
-
-
-def _measured(person: Person) -> dict[str, float]:
+def _measured(person: Person) -> Mapping[str, float]:
     return measured(person, person.deviations) | {name: person.fitted(size) for name, size in SIZES.items()}
 
 

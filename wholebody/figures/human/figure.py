@@ -11,7 +11,7 @@ import numpy as np
 from wholebody.base.records import with_values
 from wholebody.figures.anthropometry import Person, make_person, named_angles, table
 from wholebody.figures.body_spec import BodySpec, geometry_of, model_of
-from wholebody.figures.description import Chain, Description, ExcludedPair, JointCone
+from wholebody.figures.description import Chain, Description, JointCone
 from wholebody.figures.figure import Figure
 from wholebody.figures.hand import FINGERS, finger_degrees
 from wholebody.figures.human.fingers import EFFORT, finger_angles
@@ -59,11 +59,8 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
         postures={name: partial(stand, degrees={**held, **own}) for name, own in named_angles("human").items()},
         cones=human_cones(),
         collision_groups={segment: collision_group(segment) for segment in segments},
-        effort={
-            **{row["name"]: float(row["effort_weight"]) for row in table("joints")},
-            **dict.fromkeys(fingers, EFFORT),
-        },
-        excluded=(*(ExcludedPair(*entry) for entry in excluded), *rigid),
+        effort={row["name"]: float(row["effort_weight"]) for row in table("joints")} | dict.fromkeys(fingers, EFFORT),
+        excluded=(*excluded, *rigid),
         person=spec.person,
         outer=partial(human_solids, spec.person, "hulls") if detail == "spheres" and spec.person else None,
         ranges={} if sex is None else human_ranges(sex, joints),
@@ -75,20 +72,17 @@ def figure_of(spec: BodySpec, detail: str, sex: str | None = None) -> Figure:
 def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
     """Return the joint groups; the upper body is spine and arms (requirement of self-avoidance), not the neck."""
     names = [row["name"] for row in table("joints") if row["name"] in joints]
-    groups = {"spine": tuple(name for name in names if name.startswith("spine"))}
-    groups["neck"] = tuple(name for name in names if name.startswith("neck"))
+    groups = {part: tuple(name for name in names if name.startswith(part)) for part in ("spine", "neck")}
     for side in ("left", "right"):
-        for limb, parts in {
-            "arm": ("clavicle", "shoulder", "elbow", "wrist"),
-            "leg": ("hip", "knee", "ankle", "toe"),
-        }.items():
+        for limb, parts in (
+            ("arm", ("clavicle", "shoulder", "elbow", "wrist")),
+            ("leg", ("hip", "knee", "ankle", "toe")),
+        ):
             starts = tuple(f"{side}_{part}_" for part in parts)
             groups[f"{side}_{limb}"] = tuple(name for name in names if name.startswith(starts))
+        own = [name for name in finger_angles("relaxed", side) if name in joints]
         for finger in FINGERS:
-            shaped = finger_angles("relaxed", side)
-            groups[f"{side}_{finger}"] = tuple(
-                name for name in shaped if name.startswith(f"{side}_{finger}_") and name in joints
-            )
+            groups[f"{side}_{finger}"] = tuple(name for name in own if name.startswith(f"{side}_{finger}_"))
         groups[f"{side}_fingers"] = tuple(name for finger in FINGERS for name in groups[f"{side}_{finger}"])
     groups["arms"] = groups["left_arm"] + groups["right_arm"]
     groups["legs"] = groups["left_leg"] + groups["right_leg"]
@@ -100,14 +94,9 @@ def human_groups(joints: set[str]) -> dict[str, tuple[str, ...]]:
 def human_chains(joints: set[str]) -> dict[str, Chain]:
     """Return the limbs from the root outwards, with their tips."""
     groups = human_groups(joints)
-    tips = {
-        "spine": "thorax",
-        "neck": "head_top",
-        "left_arm": "left_index_tip",
-        "right_arm": "right_index_tip",
-        "left_leg": "left_toe_tip",
-        "right_leg": "right_toe_tip",
-    }
+    tips = {"spine": "thorax", "neck": "head_top"}
+    for limb, tip in (("arm", "index_tip"), ("leg", "toe_tip")):
+        tips |= {f"{side}_{limb}": f"{side}_{tip}" for side in ("left", "right")}
     tips |= {f"{side}_{finger}": f"{side}_{finger}_tip" for side in ("left", "right") for finger in FINGERS}
     return {name: Chain(groups[name], tip) for name, tip in tips.items() if name in groups}
 

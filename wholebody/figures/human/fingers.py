@@ -88,10 +88,7 @@ def opened_for_a_bar(sides: Sequence[str]) -> Iterator[dict[str, float]]:
 def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
     """Return a person's specification with fingers in the place of hands of one segment.
 
-    Args:
-        spec: of the person.
-        size: of the same person.
-        detail: "capsules" or "hulls": the collision pieces.
+    Its size is of the same person, the pieces are in a detail of "capsules" or "hulls".
     """
     links: list[Link] = [link for link in spec.links if link.name not in ("left_hand", "right_hand")]
     joints, marks, solids = list(spec.joints), list(spec.landmarks), list(spec.solids)
@@ -106,10 +103,8 @@ def with_fingers(spec: BodySpec, size: Dimensions, detail: str) -> BodySpec:
         ]
         joints += added
         segments = {part.segment for part in parts}
-        links += massive_links(
-            size,
-            {f"{side}_hand": part_radii(size, "palm"), **{part.segment: part_radii(size, part.key) for part in parts}},
-        )
+        radii = {part.segment: part_radii(size, part.key) for part in parts}
+        links += massive_links(size, {f"{side}_hand": part_radii(size, "palm"), **radii})
         links += [Link(joint.child) for joint in added if joint.child not in segments]
         tips = {mark.name: mark for mark in _tips(size, side)}
         marks = [tips.pop(mark.name, mark) for mark in marks]

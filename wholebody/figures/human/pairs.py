@@ -2,31 +2,21 @@
 
 from __future__ import annotations
 
-from itertools import combinations
+from itertools import combinations, pairwise
 
 from wholebody.figures.anthropometry import table
 from wholebody.figures.body_spec import Solid
+from wholebody.figures.description import ExcludedPair
 from wholebody.figures.hand import finger_pair, is_finger
 from wholebody.figures.human.details import sphere_names
 
 TRUNK = ("pelvis", "lower_lumbar", "upper_lumbar", "lower_thorax", "thorax", "neck", "head")
 
-Pairs = tuple[tuple[tuple[str, str], ...], tuple[tuple[str, str, str], ...]]
-"""Pairs that are tested, and (a, b, reason) of those that are not."""
+Pairs = tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]
+"""Pairs that are tested, and those that are not."""
 
-
-_NEXT = {
-    frozenset(pair)
-    for pair in (
-        ("clavicle", "upper_arm"),
-        ("upper_arm", "forearm"),
-        ("forearm", "hand"),
-        ("thigh", "shank"),
-        ("shank", "foot"),
-        ("foot", "toes"),
-        ("shank", "toes"),
-    )
-}
+_LIMBS = (("clavicle", "upper_arm", "forearm", "hand"), ("thigh", "shank", "foot", "toes"))
+_NEXT = {frozenset(pair) for limb in _LIMBS for pair in pairwise(limb)} | {frozenset(("shank", "toes"))}
 
 
 def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
@@ -35,7 +25,7 @@ def body_pairs(solids: tuple[Solid, ...]) -> Pairs:
     for a, b in combinations(solids, 2):
         reason = _reason(a, b) or _reason(b, a)
         if reason:
-            excluded.append((a.name, b.name, reason))
+            excluded.append(ExcludedPair(a.name, b.name, reason))
         else:
             tested.append((a.name, b.name))
     return tuple(tested), tuple(excluded)
@@ -49,9 +39,9 @@ def sphere_pairs(solids: tuple[Solid, ...]) -> Pairs:
     tested, excluded = [], []
     for a, b in combinations(solids, 2):
         if group[a.name] == group[b.name]:
-            excluded.append((a.name, b.name, "same group of spheres"))
+            excluded.append(ExcludedPair(a.name, b.name, "same group of spheres"))
         elif frozenset((a.name, b.name)) in named:
-            excluded.append((a.name, b.name, "limbs meet the trunk"))
+            excluded.append(ExcludedPair(a.name, b.name, "limbs meet the trunk"))
         else:
             tested.append((a.name, b.name))
     return tuple(tested), tuple(excluded)

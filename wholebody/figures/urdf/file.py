@@ -62,11 +62,7 @@ class UrdfFile(NamedTuple):
 
 
 def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
-    """Read and check a URDF file.
-
-    Args:
-        path: the file.
-        package_dirs: folders that hold the packages of ``package://<package>/...`` names; see `find_mesh`.
+    """Read and check a URDF file; `find_mesh` looks in the folders.
 
     Raises:
         FileFormatError: one sentence with the place and the correction.
@@ -78,7 +74,9 @@ def read_urdf(path: Path, package_dirs: Sequence[Path] = ()) -> UrdfFile:
         raise FileFormatError(
             f"{path}: this is a xacro macro file; expand it first with `xacro {path.name} > robot.urdf`"
         )
-    links = _links(robot, path)
+    links = unique_names(robot.findall("link"), "link", path)
+    if not links:
+        raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
     joints, root, notes = read_joints(robot, links, path)
     inertials = {}
     for link in robot.findall("link"):
@@ -146,13 +144,6 @@ def _visuals(
                 continue
 
 
-def _links(robot: Element, path: Path) -> tuple[str, ...]:
-    names = unique_names(robot.findall("link"), "link", path)
-    if not names:
-        raise FileFormatError(f"{path}: there are no links in it; give a URDF of a robot")
-    return names
-
-
 def _check_inertial(inertial: Element, place: str) -> None:
     """Check masses, and moments only against absurd values: many robots' moments are not quite physical."""
     mass = inertial.find("mass")
@@ -178,11 +169,7 @@ def _shapes(link: Element, path: Path, package_dirs: tuple[Path, ...]) -> Iterat
 
 
 def _shape(element: Element, link: str, path: Path, package_dirs: tuple[Path, ...]) -> LinkShape:
-    """The shape of a ``<collision>`` or ``<visual>``.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """The shape of a ``<collision>`` or ``<visual>``."""
     place = f"{path}: {element.tag} of link {shown(link)}"
     shapes = list(element.find("geometry") or ())
     if len(shapes) != 1:
@@ -215,12 +202,6 @@ def find_mesh(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -
     A path is looked up beside the file and in `package_dirs`; ``package://<package>/<path>`` in `package_dirs`, the
     file's parents, the folders of ROS_PACKAGE_PATH, and ``share`` below those of AMENT_PREFIX_PATH. A folder may hold
     packages or be one. A name that is not found is tried with slashes for backslashes and with ``%20`` decoded.
-
-    Args:
-        name: the mesh's name in the file.
-        place: of the mesh in the file, for messages.
-        path: of the file.
-        package_dirs: the caller's folders.
 
     Raises:
         FileFormatError: no name, or no such file.

@@ -60,14 +60,7 @@ class UrdfJoint(NamedTuple):
 def read_joints(
     robot: Element, links: tuple[str, ...], path: Path
 ) -> tuple[tuple[UrdfJoint, ...], str, tuple[str, ...]]:
-    """Read and check all joints.
-
-    Returns:
-        The joints, the root link, and one sentence for each missing part that was filled in.
-
-    Raises:
-        FileFormatError: one sentence with the place and the correction.
-    """
+    """Return the checked joints, the root link, and one sentence for each missing part that was filled in."""
     elements = robot.findall("joint")
     unique_names(elements, "joint", path)
     notes: list[str] = []

@@ -31,15 +31,7 @@ class _Law(NamedTuple):
 
 
 def urdf_model(urdf: UrdfFile, root: str) -> tuple[pin.Model, tuple[str, ...]]:
-    """Return Pinocchio's model and one sentence for each joint that was changed.
-
-    Args:
-        urdf: the checked file.
-        root: "fixed" or "free".
-
-    Raises:
-        FileFormatError: a file that passed our checks but fails in Pinocchio.
-    """
+    """Return Pinocchio's model, its root "fixed" or "free", and one sentence for each joint that was changed."""
     joints, notes = _with_constant_followers(urdf.joints)
     model = _build(urdf, joints, root, mimic=False)
     if any(joint.mimic for joint in joints):
@@ -87,9 +79,8 @@ def _within_followers(joints: tuple[UrdfJoint, ...]) -> tuple[tuple[UrdfJoint, .
             notes.append(f"joint {shown(name)}: {told}")
             continue
         ends[law.leader] = kept
-    return tuple(with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints), tuple(
-        notes
-    )
+    made = [with_values(joint, lower=ends[joint.name][0], upper=ends[joint.name][1]) for joint in joints]
+    return tuple(made), tuple(notes)
 
 
 def _laws(joints: tuple[UrdfJoint, ...]) -> dict[str, _Law]:

@@ -44,12 +44,7 @@ class Srdf(NamedTuple):
 
 
 def read_srdf(path: Path, model: pin.Model, links: tuple[str, ...]) -> Srdf:
-    """Read an SRDF.
-
-    Args:
-        path: the file.
-        model: of the URDF that it belongs to.
-        links: of this URDF.
+    """Read the SRDF of a URDF that has a model and links.
 
     Raises:
         FileFormatError: a file that is no SRDF, or a value that is no number.

@@ -16,29 +16,21 @@ from wholebody.base.checks import shown, warn_of_degrees
 from wholebody.base.errors import FileFormatError, one_line
 from wholebody.base.files import read_bytes
 
-A_TURN = 2.0 * math.pi
-"""Radians: roll, pitch and yaw beyond this were probably meant in degrees."""
-
 MOST = 1e9
 """Largest number that is accepted as a mass, a length, a speed or an inertia in SI units."""
 
 
 def read_xml(path: Path, kind: str) -> Element:
-    """Return the outermost element of an XML file.
-
-    Args:
-        path: the file.
-        kind: its kind, for messages: "URDF".
+    """Return the outermost element of an XML file of a kind, such as "URDF".
 
     Raises:
         FileFormatError: no file, too large, not text, an unknown encoding, or broken XML.
     """
-    # largest file that is accepted as a description of a robot.
-    data = read_bytes(path, kind, (64 * 2**20))
+    data = read_bytes(path, kind, 64 * 2**20)  # the largest that is accepted as a description of a robot
     try:
         return ElementTree.fromstring(data)
     except ElementTree.ParseError as error:
-        if not _is_text(data):
+        if b"\0" in data or "\ufffd" in data.decode("utf-8", "replace"):
             raise FileFormatError(f"{path}: this is not a text file; give a {kind}") from None
         raise FileFormatError(f"{path}: the XML is broken ({one_line(str(error))}); correct that place") from None
     except (LookupError, ValueError) as error:
@@ -46,14 +38,6 @@ def read_xml(path: Path, kind: str) -> Element:
             f"{path}: its encoding cannot be read ({one_line(str(error))}); save the file as UTF-8 and say so in its "
             "first line"
         ) from None
-
-
-def _is_text(data: bytes) -> bool:
-    try:
-        data.decode("utf-8")
-    except UnicodeDecodeError:
-        return False
-    return b"\0" not in data
 
 
 def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:
@@ -74,14 +58,7 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
 
 
 def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of an attribute.
-
-    Args:
-        element: the element.
-        name: of the attribute.
-        place: of the element in the file, for messages.
-        count: how many numbers there must be.
-        default: value of a missing attribute; without it the attribute is required.
+    """Return the finite numbers of an attribute of an element, which is at a place in the file.
 
     Raises:
         FileFormatError: another count, not numbers, or not finite.
@@ -124,7 +101,7 @@ def placement(element: Element, place: str, most: float) -> pin.SE3:
         return pin.SE3.Identity()
     roll, pitch, yaw = bounded(origin, "rpy", place, 3, "0 0 0", 1e6)
     for name, angle in (("roll", roll), ("pitch", pitch), ("yaw", yaw)):
-        warn_of_degrees(angle, f"{place}: the {name} of <origin>", A_TURN)
+        warn_of_degrees(angle, f"{place}: the {name} of <origin>", 2.0 * math.pi)
     return pin.SE3(pin.rpy.rpyToMatrix(roll, pitch, yaw), np.array(bounded(origin, "xyz", place, 3, "0 0 0", most)))
 
 
