@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from itertools import combinations
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeAlias
 
@@ -129,6 +130,15 @@ class Description(NamedTuple):
     notes: tuple[str, ...] = ()
     person: Person | None = None
     outer: Callable[[], tuple[Solid, ...]] | None = None
+
+
+def chosen_pairs(
+    solids: Sequence[Solid], reason: Callable[[Solid, Solid], str | None]
+) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
+    """The pairs of pieces that are tested, by name, and those that are not, for which there is a reason."""
+    told = [(a.name, b.name, reason(a, b)) for a, b in combinations(solids, 2)]
+    tested = tuple((a, b) for a, b, why in told if not why)
+    return tested, tuple(ExcludedPair(a, b, why) for a, b, why in told if why)
 
 
 def limits_of(model: pin.Model) -> Limits:

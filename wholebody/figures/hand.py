@@ -9,7 +9,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import partial
-from itertools import combinations
 
 import numpy as np
 import pinocchio as pin
@@ -19,7 +18,7 @@ from wholebody.base.errors import InputError
 from wholebody.figures import hulls
 from wholebody.figures.anthropometry import Person, describe, keyed, make_person, named_angles
 from wholebody.figures.body_spec import BodySpec, Joint, Landmark, Link, Solid, geometry_of, model_of, place
-from wholebody.figures.description import Articulated, Chain, Description, ExcludedPair
+from wholebody.figures.description import Articulated, Chain, Description, chosen_pairs
 from wholebody.figures.dimensions import FINGER_BASES, Dimensions, keyed_hand
 from wholebody.figures.figure import Figure
 from wholebody.figures.postures import lowest
@@ -84,7 +83,7 @@ def hand_figure_of(person: Person, side: str) -> Figure:
     """Return the hand of a person; the side as for `hand_spec`."""
     spec = hand_spec(side, person)
     model = model_of(spec)
-    tested, excluded = _pairs(spec.solids)
+    tested, excluded = chosen_pairs(spec.solids, _reason)
     names = tuple(joint.name for joint in spec.joints)
     groups = {finger: tuple(name for name in names if name.startswith(f"{side}_{finger}_")) for finger in FINGERS}
     description = Description(
@@ -185,15 +184,8 @@ def massive_links(size: Dimensions, radii: Mapping[str, tuple[float, float, floa
         yield Link(segment, mass, (0.0, 0.0, -c), inertia)
 
 
-def _pairs(solids: tuple[Solid, ...]) -> tuple[tuple[tuple[str, str], ...], tuple[ExcludedPair, ...]]:
-    tested, excluded = [], []
-    for a, b in combinations([solid.name for solid in solids], 2):
-        reason = finger_pair(a.partition("_")[2], b.partition("_")[2])
-        if reason:
-            excluded.append(ExcludedPair(a, b, reason))
-        else:
-            tested.append((a, b))
-    return tuple(tested), tuple(excluded)
+def _reason(a: Solid, b: Solid) -> str | None:
+    return finger_pair(a.segment.partition("_")[2], b.segment.partition("_")[2])
 
 
 def is_finger(segment: str) -> bool:

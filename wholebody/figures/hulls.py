@@ -32,24 +32,24 @@ def unit_sphere() -> Array:
     return np.array(points)
 
 
-def convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
-    """Return the hull of points (n, 3) as coal's Convex about the centre of its bounding sphere, and that centre."""
+def _convex(points: Array, what: str) -> tuple[Any, pin.SE3]:
+    """The hull of points (n, 3) as coal's Convex about the centre of its bounding sphere, and that centre."""
     piece = hull_piece(points, what)
     return piece.geometry, piece.placement
 
 
 def ellipsoid(radii: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron with its vertices on an ellipsoid, axes along x, y, z, centre at the origin."""
-    return convex(unit_sphere() * np.array(radii), what)
+    return _convex(unit_sphere() * np.array(radii), what)
 
 
 def tapered(radius_start: float, radius_end: float, length: float, what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a tapered capsule along -z: vertices on a ball at the origin and on one at -length."""
     ball = unit_sphere()
-    return convex(np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]]), what)
+    return _convex(np.vstack([ball * radius_start, ball * radius_end - [0.0, 0.0, length]]), what)
 
 
 def box(size: tuple[float, float, float], what: str) -> tuple[Any, pin.SE3]:
     """Convex polyhedron of a box about the origin: eight vertices, twelve triangles."""
     corners = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (-0.5, 0.5)])
-    return convex(corners * np.array(size), what)
+    return _convex(corners * np.array(size), what)

@@ -76,22 +76,19 @@ class Turning:
         values = rows[:, self._places[column]]
         frame = int(np.argmax(np.maximum(self._low[column] - values, values - self._high[column])))
         where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
-        self._say(where, float(values[frame]), column)
+        warn(self._told(where, float(values[frame]), column))
         return True
 
     def warn_of(self, name: str, value: float, place: int, q: Array) -> None:
         """Warn where a value of a joint, which is at a place of the posture q (nq,), is far out."""
         for column in np.flatnonzero(self._places == place).tolist():
             if not self._low[column] - FAR_OUT <= q[place] <= self._high[column] + FAR_OUT:
-                self._say(f"joint {name!r}", value, column)
+                warn(self._told(f"joint {name!r}", value, column))
 
-    def _say(self, where: str, value: float, column: int) -> None:
-        warn(_as_degrees(where, value, float(self._limits[0][column]), float(self._limits[1][column])))
-
-
-def _as_degrees(what: str, value: float, low: float, high: float) -> str:
-    """What is told of an angle [rad] that is far out of its limits."""
-    if low <= np.radians(value) <= high:
-        out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
-        return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
-    return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"
+    def _told(self, what: str, value: float, column: int) -> str:
+        """What is told of an angle [rad] that is far out of its limits."""
+        low, high = (float(limits[column]) for limits in self._limits)
+        if low <= np.radians(value) <= high:
+            out = "far out of its limits" if np.isfinite(low) or np.isfinite(high) else "more than two turns"
+            return f"{what} is {value:g} rad, {out}; {value:g} degrees are {np.radians(value):.4g}"
+        return f"{what} is {value:g} rad, far out of its limits, which are {low:.4g} and {high:.4g} rad"

@@ -128,16 +128,7 @@ class State:
         return placement
 
     def rows(self, wrenches: Array, joint: NDArray[np.intp], against: NDArray[np.intp]) -> Array:
-        """Jacobian rows of k wrenches, each between its own two joints.
-
-        Args:
-            wrenches: (k, 6).
-            joint: (k,) joints that carry what moves.
-            against: (k,) joints it moves relative to; 0 is the world.
-
-        Returns:
-            (k, nv) rows for the tangent displacement of the posture.
-        """
+        """Jacobian rows (k, nv) of k wrenches (k, 6), each between its own two joints (k,), see `Wrench`."""
         return self.folded((wrenches @ self.jacobian) * (self.support[joint] - self.support[against]))
 
     def wrench_jacobian(self, wrench: Wrench) -> Array:

@@ -65,16 +65,14 @@ def spheres(size: Dimensions) -> tuple[Solid, ...]:
     # Mass per stature of the median man and woman of ANSUR II, kg / m, for which the table's radii hold: 84.6 kg by
     # 1.755 m, and 66.8 kg by 1.626 m (table "percentiles").
     build = math.sqrt(person.mass / person.stature / {"M": 48.2, "F": 41.1}[person.column])
-    count: dict[str, int] = {}
     found = []
-    for row in table("spheres39"):
+    for row, name in zip(table("spheres39"), sphere_names().values(), strict=True):
         segment = row["segment"]
-        k = count[segment] = count.get(segment, -1) + 1
         radius = float(row[f"radius_{person.column}"]) * person.stature * build
         x, y, z = (float(row[f"offset_{axis}"]) * person.stature for axis in "xyz")
         if segment.endswith("_foot"):
             z = size.sole + radius
-        found.append(Solid(f"{segment}:{k}", segment, coal.Sphere(radius), place(x, y, z)))
+        found.append(Solid(name, segment, coal.Sphere(radius), place(x, y, z)))
     return tuple(found)
 
 

@@ -126,18 +126,13 @@ class _Reader:
             self._fail("it has no <posture>; write the figure again")
         efforts: dict[str, float] = {}
         for item in self.element.findall("effort"):
-            joints = self._names(item, "joints", "joint", self.joints)
+            joints = self._joints(item)
             efforts.update(zip(joints, numbers(item, "weights", self._place(item), len(joints)), strict=True))
         segments = self._listed("segments")
         description = Description(
-            groups={
-                self._name(item): self._names(item, "joints", "joint", self.joints)
-                for item in self.element.findall("group")
-            },
+            groups={self._name(item): self._joints(item) for item in self.element.findall("group")},
             chains={
-                self._name(item): Chain(
-                    self._names(item, "joints", "joint", self.joints), self._names(item, "tip", "frame", self.frames)[0]
-                )
+                self._name(item): Chain(self._joints(item), self._names(item, "tip", "frame", self.frames)[0])
                 for item in self.element.findall("chain")
             },
             frames=self._listed("frames"),
@@ -179,7 +174,7 @@ class _Reader:
         return (*excluded.values(), *drop_rigid_pairs(self.geometry))
 
     def _posture(self, item: Element) -> Callable[[Articulated], Array]:
-        joints = self._names(item, "joints", "joint", self.joints)
+        joints = self._joints(item)
         values = numbers(item, "values", self._place(item), len(joints), "") if joints else ()
         root = None
         if item.get("root") is not None:
@@ -206,7 +201,7 @@ class _Reader:
     def _range(self, item: Element) -> MotionRange:
         place = self._place(item)
         if item.tag == "coupled_range":
-            joints = self._names(item, "joints", "joint", self.joints)
+            joints = self._joints(item)
             factors = numbers(item, "factors", place, len(joints))
             return CoupledRange(dict(zip(joints, factors, strict=True)), numbers(item, "bound", place, 1)[0])
         if item.tag == "elliptic_range":
@@ -223,7 +218,7 @@ class _Reader:
         return TwistRange(reference, limb, center, sign, bound, slope)
 
     def _ellipse_axis(self, angle: Element, place: str) -> EllipseAxis:
-        joints = self._names(angle, "joints", "joint", self.joints)
+        joints = self._joints(angle)
         low, high, offset = (numbers(angle, name, place, 1)[0] for name in ("lower", "upper", "offset"))
         if not low < 0.0 < high:
             self._fail(f"<angle> of {place} goes from {low:g} to {high:g}; zero is to be between them")
@@ -242,6 +237,9 @@ class _Reader:
         return tuple(
             name for item in self.element.findall(tag) for name in self._names(item, "names", "frame", self.frames)
         )
+
+    def _joints(self, item: Element) -> tuple[str, ...]:
+        return self._names(item, "joints", "joint", self.joints)
 
     def _name(self, item: Element) -> str:
         name = item.get("name")

@@ -163,7 +163,7 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
     for name in urdf.links:
         link = SubElement(robot, "link", name=name)
         if name in urdf.inertials:
-            _add_inertial(link, urdf.inertials[name])
+            link.append(urdf.inertials[name])
     for joint in joints:
         made = add_joint(
             robot,
@@ -179,18 +179,6 @@ def _text(urdf: UrdfFile, joints: tuple[UrdfJoint, ...]) -> str:
             multiplier, offset = (repr(float(value)) for value in joint.mimic[1:])
             SubElement(made, "mimic", joint=joint.mimic.joint, multiplier=multiplier, offset=offset)
     return ElementTree.tostring(robot, encoding="unicode")
-
-
-def _add_inertial(link: Element, given: Element) -> None:
-    inertial = SubElement(link, "inertial")
-    for tag, names in (
-        ("origin", ("xyz", "rpy")),
-        ("mass", ("value",)),
-        ("inertia", ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")),
-    ):
-        element = given.find(tag)
-        if element is not None:
-            SubElement(inertial, tag, {name: element.get(name, "") for name in names if element.get(name)})
 
 
 def _set_limits(model: pin.Model, joints: tuple[UrdfJoint, ...]) -> None:

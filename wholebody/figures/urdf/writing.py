@@ -65,15 +65,7 @@ def add_joint(
 ) -> Element:
     """Add a joint between two links to the URDF's root element, with exact numbers, and return it.
 
-    Args:
-        robot: the URDF's root element.
-        name: of the joint.
-        kind: its type in URDF.
-        parent: link.
-        child: link.
-        origin: placement of the child in the parent at zero.
-        axis: (3,) direction.
-        limit: numbers by the names of the attributes of `<limit>`.
+    The origin places the child in the parent at zero; the limit has numbers by the attributes of ``<limit>``.
     """
     joint = SubElement(robot, "joint", name=name, type=kind)
     SubElement(joint, "parent", link=parent)
