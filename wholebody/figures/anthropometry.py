@@ -29,20 +29,14 @@ STATURE = Range(1.3, 2.2, "m")
 MASS = Range(25.0, 250.0, "kg")
 PERCENTILE = Range(1.0, 99.0, "percent, such as 95")
 
-BODY_MASS_INDEX_RANGE = (13.0, 50.0)
-"""kg / m^2. Outside, no living person has this stature and mass; most likely a unit is wrong."""
-
 AGE = Range(20.0, 69.0, "years")
 """Of the adults whose ranges of motion were measured (table "age_ranges")."""
 
 _SEXES = {"male": "M", "female": "F"}
 
 _ENDS = {
-    "elbow_flexion": "upper_arm",
-    "wrist_flexion": "forearm",
-    "knee_flexion": "thigh",
-    "ankle_dorsiflexion": "shank",
-}
+    "elbow_flexion": "upper_arm", "wrist_flexion": "forearm", "knee_flexion": "thigh", "ankle_dorsiflexion": "shank",
+}  # fmt: skip
 """Joints at the ends of segments with a fitted length."""
 
 FOLDER = Path(__file__).parent / "data"
@@ -109,15 +103,11 @@ class Person:
 
     def _trunk_scale(self) -> float:
         """How much longer the trunk and head are than their shares of the stature, because the legs are shorter."""
-        leg = self.ankle_height + self.fitted("thigh") + self.fitted("shank")
-        shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
-        return (self.stature - leg) / (self.stature * (1.0 - shares) - self.ankle_height)
-
-    @property
-    def ankle_height(self) -> float:
-        """Height of the ankle joint above the sole, metres."""
         toe = float(_row("joints", "name", "left_toe_extension")[f"oz_{self.column}"])
-        return (self.segment("left_toes", "radius_b") - toe) * self.stature
+        ankle = (self.segment("left_toes", "radius_b") - toe) * self.stature
+        leg = ankle + self.fitted("thigh") + self.fitted("shank")
+        shares = self.segment("left_thigh", "length") + self.segment("left_shank", "length")
+        return (self.stature - leg) / (self.stature * (1.0 - shares) - ankle)
 
     def segment_mass(self, segment: str) -> float:
         """Mass of a segment, kilograms; all of them add up to the mass of the body."""
@@ -187,9 +177,9 @@ def make_person(
         mass = factor * STATURE(stature, "stature") ** exponent
     height = STATURE(float(median["stature_m"]) if stature is None else stature, "stature")
     weight = MASS(float(median["mass_kg_same_percentile"]) if mass is None else mass, "mass")
-    index = weight / height**2
-    if not BODY_MASS_INDEX_RANGE[0] <= index <= BODY_MASS_INDEX_RANGE[1]:
-        low, high = (limit * height**2 for limit in BODY_MASS_INDEX_RANGE)
+    # kg of body mass indices, kg / m^2, outside of which nobody lives; most likely a unit is wrong
+    low, high = 13.0 * height**2, 50.0 * height**2
+    if not low <= weight <= high:
         raise InputError(
             f"mass {weight:g} kg does not go with stature {height:g} m; give a mass between {low:.0f} and {high:.0f} kg"
         )

@@ -99,7 +99,6 @@ VIRTUAL_MASS = 1e-6
 """Kilograms of a link between two joints of a ball joint: simulators refuse moving links without mass. It is taken from
 the next link outwards, so that the total is right."""
 
-
 SKIN = (0.85, 0.68, 0.55, 1.0)
 """Colour of the pieces: red, green, blue, opacity."""
 

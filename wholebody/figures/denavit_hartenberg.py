@@ -103,11 +103,8 @@ def denavit_hartenberg(figure: Figure, branch: str) -> DenavitHartenberg:
 
 def _link_frame(figure: Figure, joint: int) -> tuple[str, int]:
     """Name and index of the first segment frame on a joint; the world if there is none."""
-    for name in figure.segments:
-        index = figure.frame_id(name)
-        if figure.model.frames[index].parentJoint == joint:
-            return name, index
-    return "world", -1
+    frames = ((name, figure.frame_id(name)) for name in figure.segments)
+    return next((each for each in frames if figure.model.frames[each[1]].parentJoint == joint), ("world", -1))
 
 
 def _axis(model: pin.Model, joint: int) -> Array:

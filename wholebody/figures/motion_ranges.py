@@ -97,7 +97,6 @@ AAOS). That they end on an ellipsoid is an ESTIMATE: rotation decreases with fle
 al. 1996).
 """
 
-
 INTERNAL_ROTATION = ((80.0, 70.0), (120.0, 0.0))
 """Elevations in the frontal plane, and the most inward rotation of the upper arm there, degrees: 70 up to 80 (AAOS, of
 the abducted arm), none at 120, for the greater tubercle would meet the acromion: ESTIMATE."""

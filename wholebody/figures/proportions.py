@@ -26,7 +26,6 @@ DIMENSION = Range(0.0, 3.0, "m")
 FARTHEST = 4.0
 """Standard deviations beyond which nobody is made: one in 16,000 people is outside."""
 
-
 SIZES = {"hand_length": "hand", "hand_breadth": "hand_breadth", "foot_length": "foot_length"}
 """Dimensions that are sizes of the body themselves, with the names of the sizes. Others are measured."""
 
@@ -37,11 +36,7 @@ def dimension_names() -> tuple[str, ...]:
 
 
 def proportioned(person: Person, proportions: Mapping[str, float] | None) -> Person:
-    """Return a person with stated dimensions, of the same stature and mass.
-
-    Args:
-        person: sex, stature and mass.
-        proportions: metres by name of a dimension, see `dimension_names`; None or none for the person as it is.
+    """Return a person with stated dimensions, metres by the names of `dimension_names`, of the same stature and mass.
 
     Raises:
         InputError: a dimension that nobody of this stature and mass has, or dimensions that do not go together.

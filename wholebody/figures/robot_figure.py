@@ -150,9 +150,7 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
             file, scale = str(shape.file), np.array(shape.size)
         else:
             size = [max(length, SMALLEST) for length in shape.size]
-            solid = {"box": coal.Box, "sphere": coal.Sphere, "cylinder": coal.Cylinder, "capsule": coal.Capsule}[
-                shape.kind
-            ](*size)
+            solid = getattr(coal, shape.kind.capitalize())(*size)
         paint = np.array(COLOR if color is None else color)
         made.append(
             pin.GeometryObject(
@@ -163,14 +161,6 @@ def visual_of_links(model: pin.Model, visuals: Iterable[LinkVisual]) -> pin.Geom
     return geometry_model(made) if made else None
 
 
-class LinkGeometry(NamedTuple):
-    """The convex pieces of links; one sentence on each change; number of the shape that each piece belongs to."""
-
-    geometry: pin.GeometryModel
-    notes: tuple[str, ...]
-    shapes: tuple[int, ...]
-
-
 def geometry_of_links(
     model: pin.Model,
     shapes: Iterable[LinkShape],
@@ -178,8 +168,8 @@ def geometry_of_links(
     path: Path,
     named: bool = False,
     colors: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({}),
-) -> LinkGeometry:
-    """Return the convex pieces of links, and one sentence on each change.
+) -> tuple[pin.GeometryModel, tuple[str, ...], tuple[int, ...]]:
+    """Return the convex pieces of links, sentences on changes, and the number of the shape of each piece.
 
     Args:
         model: Pinocchio's model.
@@ -215,4 +205,4 @@ def geometry_of_links(
             piece.overrideMaterial = shape.link in colors  # Pinocchio's sign that a viewer shall use this colour
             made.append(piece)
             numbers.append(number)
-    return LinkGeometry(geometry_model(made), tuple(notes), tuple(numbers))
+    return geometry_model(made), tuple(notes), tuple(numbers)

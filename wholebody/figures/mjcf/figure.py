@@ -69,15 +69,15 @@ def mjcf_figure(
             kept.append(geom)
     if not shapes:
         notes.append("no geom of the robot can touch another one, so nothing of it collides")
-    made = geometry_of_links(
+    geometry, told, numbers = geometry_of_links(
         robot.model, shapes, check_concavity(concavity, links), compiled.path, colors=_colors(compiled, robot)
     )
     found = Robot(
-        compiled.name, robot.model, links, made.geometry, (*notes, *made.notes),
+        compiled.name, robot.model, links, geometry, (*notes, *told),
         frames=robot.sites,
         postures=_postures(compiled, robot),
         cones=robot.cones,
-        untested=_untested(compiled, [kept[number] for number in made.shapes]),
+        untested=_untested(compiled, [kept[number] for number in numbers]),
         place=compiled.place(top) if compiled.is_free(top) and root != "fixed" else None,
     )  # fmt: skip
     return robot_figure(found, samples, seed)

@@ -6,8 +6,6 @@ from collections.abc import Iterable
 from os import PathLike
 from pathlib import Path
 
-import pinocchio as pin
-
 from wholebody.base.errors import InputError
 from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
@@ -76,6 +74,6 @@ def _described(robot: Robot, path: Path) -> Robot:
         robot,
         notes=(*robot.notes, *known.notes),
         groups=known.groups,
-        postures=known.postures(robot.model, pin.neutral(robot.model)),
+        postures=known.postures,
         untested=lambda first, second: known.disabled.get(frozenset((owners[first], owners[second]))),
     )

@@ -11,6 +11,7 @@ from xml.etree.ElementTree import Element
 
 from wholebody.base.checks import color, shown
 from wholebody.base.errors import FileFormatError, InputError
+from wholebody.base.files import is_file
 from wholebody.base.records import with_values
 from wholebody.figures.link_pieces import LinkShape
 from wholebody.figures.urdf.joints import UrdfJoint, read_joints
@@ -22,12 +23,7 @@ EXTENSION = "wholebody"
 
 
 class LinkVisual(NamedTuple):
-    """One visual of a link.
-
-    Attributes:
-        shape: the shape; its file is absolute.
-        color: red, green, blue, alpha of its material; None without one.
-    """
+    """One visual of a link, whose file is absolute; red, green, blue, alpha of its material, None without one."""
 
     shape: LinkShape
     color: tuple[float, float, float, float] | None
@@ -229,7 +225,7 @@ def _found(name: str, place: str, path: Path, package_dirs: Sequence[Path]) -> P
     else:
         plain = Path(name.removeprefix("file://"))
         candidates = [plain if plain.is_absolute() else folder / plain, *(base / plain for base in package_dirs)]
-    return next(filter(_is_file, candidates), None)
+    return next(filter(is_file, candidates), None)
 
 
 def _ros_folders() -> list[Path]:
@@ -237,10 +233,3 @@ def _ros_folders() -> list[Path]:
     return folders + [
         Path(entry) / "share" for entry in os.environ.get("AMENT_PREFIX_PATH", "").split(os.pathsep) if entry
     ]
-
-
-def _is_file(path: Path) -> bool:
-    try:
-        return path.is_file()
-    except (OSError, ValueError):  # a name that is too long, or with a zero byte
-        return False

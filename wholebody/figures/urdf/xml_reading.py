@@ -41,11 +41,7 @@ def read_xml(path: Path, kind: str) -> Element:
 
 
 def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[str, ...]:
-    """Return the names of elements.
-
-    Raises:
-        FileFormatError: an element without a name, or two of one name.
-    """
+    """Return the names of elements; one without a name, or two of one name, are refused by a `FileFormatError`."""
     names: dict[str, None] = {}
     for k, element in enumerate(elements):
         name = element.get("name")
@@ -58,11 +54,7 @@ def unique_names(elements: Sequence[Element], kind: str, path: Path) -> tuple[st
 
 
 def numbers(element: Element, name: str, place: str, count: int, default: str | None = None) -> tuple[float, ...]:
-    """Return the finite numbers of an attribute of an element, which is at a place in the file.
-
-    Raises:
-        FileFormatError: another count, not numbers, or not finite.
-    """
+    """Return the finite numbers of an attribute; another count is refused with the element's place in the file."""
     text: Any = element.get(name, default)
     try:
         found = tuple(float(word) for word in text.split())
@@ -77,11 +69,7 @@ def numbers(element: Element, name: str, place: str, count: int, default: str | 
 def bounded(
     element: Element, name: str, place: str, count: int, default: str | None = None, most: float = MOST
 ) -> tuple[float, ...]:
-    """Return the numbers of an attribute, none of them larger than `most`.
-
-    Raises:
-        FileFormatError: as `numbers`, or one that is too large.
-    """
+    """Return the numbers of an attribute as `numbers` does, none of them larger than `most`."""
     found = numbers(element, name, place, count, default)
     if max(abs(number) for number in found) > most:
         raise FileFormatError(
@@ -91,11 +79,7 @@ def bounded(
 
 
 def placement(element: Element, place: str, most: float) -> pin.SE3:
-    """Return the ``<origin>`` of an element; the identity without one.
-
-    Raises:
-        FileFormatError: numbers that are not finite, or a position farther than `most` metres away.
-    """
+    """Return the ``<origin>`` of an element, at most `most` metres away; the identity without one."""
     origin = element.find("origin")
     if origin is None:
         return pin.SE3.Identity()
