@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.view.server import Command, Op
-from wholebody.view.surface import Patch
+
+if TYPE_CHECKING:
+    from wholebody.view.surface import Patch
 
 
 def floats(values: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,7 +13,6 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.tracking.inner_paths import Timed
 from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.camera import camera_on
@@ -23,6 +22,9 @@ from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
 from wholebody.view.server import Command
 from wholebody.view.style import LOOK, Color
 from wholebody.view.viewed_scene import ViewedScene
+
+if TYPE_CHECKING:
+    from wholebody.tracking.inner_paths import Timed
 
 
 class Composition:

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import Any
 
 from wholebody.base.checks import listed, shown, whole
-from wholebody.base.errors import InputError
+from wholebody.base.errors import InputError, MissingPackageError
 from wholebody.view import commands
 from wholebody.view.browser import Browser
 from wholebody.view.page import picture_page
@@ -61,12 +62,17 @@ def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
 
 
 class Screenshots:
-    """A headless browser that takes pictures."""
+    """A headless browser that takes pictures; one can serve several viewers."""
 
     def __init__(self) -> None:
-        """Prepare; the first picture starts the browser."""
+        """Prepare; `start` or the first picture starts the browser."""
         self._browser: Browser | None = None
         self._shown: Store | None = None
+
+    def start(self) -> None:
+        """Start the browser, if there is a Chromium, without waiting for it."""
+        with suppress(MissingPackageError):
+            self._started()
 
     def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
         """PNG of what these commands draw in an empty page, of this width and height; with the panel if wanted.
@@ -82,29 +88,30 @@ class Screenshots:
         browser = self._draw(wanted, size)
         return (browser.capture(f"wholebody.seek({time!r})") for time in times)
 
-    def page(self, page: str, size: Any) -> bytes:
-        """PNG of a page (HTML) that has its scene in it; raises like `picture`."""
-        browser = self._sized(check_size(size))
-        self._shown = None
-        browser.open_html(page)
-        return browser.capture()
-
     def close(self) -> None:
         """End the browser. Calling it again does nothing."""
         if self._browser is not None:
             self._browser.close()
         self._browser = self._shown = None
 
-    def _sized(self, size: tuple[int, int]) -> Browser:
+    def __enter__(self) -> Screenshots:
+        """Return itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close it."""
+        self.close()
+
+    def _started(self) -> Browser:
         if self._browser is None:
-            self._browser = Browser()
-        self._browser.resize(size)
+            self._browser, self._shown = Browser(page=picture_page()), Store()
         return self._browser
 
     def _draw(self, wanted: Sequence[Command], size: Any) -> Browser:
         """Bring the page to what the commands draw."""
         width, height = check_size(size)
-        browser, before = self._sized((width, height)), self._shown
+        browser, before = self._started(), self._shown
+        browser.resize((width, height))
         self._shown = None  # until all is drawn: after an error the next picture is drawn whole
         lacking = None if before is None else changes(before, wanted)
         if lacking is None or before is None:

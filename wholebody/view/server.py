@@ -8,17 +8,16 @@ default, and ends when its input ends or its parent has ended.
 
 from __future__ import annotations
 
-import asyncio
-import contextlib
-import ipaddress
 import json
 import os
 import re
-import socket
 import struct
 import sys
 from os import _exit
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+if TYPE_CHECKING:
+    import asyncio
 
 HEADER = struct.Struct("<cHHI")
 LOCAL = ("127.0.0.1", "localhost", "::1")
@@ -174,6 +173,8 @@ class Hub:
 
     async def listen(self, reader: asyncio.StreamReader) -> None:
         """Read commands until the input ends."""
+        import asyncio
+
         while True:
             try:
                 op, path, key, size = HEADER.unpack(await reader.readexactly(HEADER.size))
@@ -216,6 +217,8 @@ class Guard:
 
     def __init__(self, host: str) -> None:
         """Accept the names of this machine at which a server at `host` can be reached."""
+        import socket
+
         names = {*LOCAL, host.lower()}
         if host not in LOCAL:
             names |= {socket.gethostname().lower(), socket.getfqdn().lower()}
@@ -235,6 +238,8 @@ class Guard:
 
 def is_address(name: str) -> bool:
     """Whether a name is an IP address, for which DNS rebinding is impossible."""
+    import ipaddress
+
     try:
         ipaddress.ip_address(name)
     except ValueError:
@@ -296,6 +301,7 @@ def make_application(hub: Hub, host: str) -> Any:
 
 async def serve(parent: int, host: str, port: int) -> None:
     """Serve until the input ends or the parent has ended; port 0 takes the first free one."""
+    import asyncio
     import logging
 
     from tornado.httpserver import HTTPServer
@@ -325,6 +331,9 @@ async def serve(parent: int, host: str, port: int) -> None:
 
 
 if __name__ == "__main__":
-    with contextlib.suppress(KeyboardInterrupt, BrokenPipeError):
-        asyncio.run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
+    from asyncio import run
+    from contextlib import suppress
+
+    with suppress(KeyboardInterrupt, BrokenPipeError):
+        run(serve(int(sys.argv[1]), sys.argv[2], int(sys.argv[3])))
     _exit(0)

@@ -36,7 +36,6 @@ class Skin:
             figure: the figure; it may lack segments of the body, as a reduced one or an avatar does not move all.
         """
         self._surface = surface
-        self.patches = surface.patches()
         self._places: list[tuple[str, Array]] = []
         for bone in surface.bones:
             segment, extra = bone.segment, np.eye(4)
@@ -73,7 +72,7 @@ class Skin:
             )
         )
         drawn = []
-        for patch in self.patches:
+        for patch in self._surface.patches:
             shown: Color = (*patch.color, 1.0) if color is None else color
             path = f"{root}/{patch.name}"
             # metres: positions are sent as whole multiples of it, in half of the bytes

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pinocchio as pin
@@ -15,12 +15,14 @@ from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.geometry.proximity import Contacts
-from wholebody.methods.newton.assembly import Assembly
 from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
 from wholebody.view.style import LOOK, Color
+
+if TYPE_CHECKING:
+    from wholebody.methods.newton.assembly import Assembly
 
 
 @dataclass(frozen=True)
@@ -72,6 +74,10 @@ def checked_scene(scene: Any) -> Any:
     Raises:
         InputError: it is no scene; for some other types the message says how to show them.
     """
+    if isinstance(scene, Scene):
+        return scene
+    from wholebody.methods.newton.assembly import Assembly
+
     if isinstance(scene, Assembly) and scene.has_shapes:
         return ViewedAssembly(scene)
     if isinstance(getattr(scene, "model", None), pin.Model) and callable(getattr(scene, "contacts", None)):

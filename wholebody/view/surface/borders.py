@@ -38,10 +38,6 @@ class Bound(NamedTuple):
         made[1][len(self.normals) :] /= np.maximum(lengths, 1e-9)
         return Bound(*made)
 
-    def strongest(self) -> tuple[NDArray[np.uint8], Array]:
-        """(n, 4) the bones with the greatest influences, and (n, 4) these, which add up to 1."""
-        return strongest(self.weights)
-
 
 def strongest(weights: Array) -> tuple[NDArray[np.uint8], Array]:
     """The bones (n, 4) with the greatest weights (n, b), the strongest first, and these (n, 4), which add up to 1."""
