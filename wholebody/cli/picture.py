@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder, before anything is computed.
-
-    Raises:
-        InputError: it cannot be made.
-    """
+    """Make a folder, before anything is computed; raises InputError."""
     try:
         files.make_folder(folder)
     except InputError as error:

@@ -43,20 +43,9 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def pose(path: Path, method: str | None, out: Path, *, as_json: bool = False, draw: bool = True) -> int:
-    """Pose the figure of a task file.
+    """Pose the figure of a task file by a method, or that of the file; write into a folder, and return the exit code.
 
-    Args:
-        path: the task file.
-        method: name of the method, None for that of the file.
-        out: folder to write to; made if absent.
-        as_json: print the result as JSON instead of tables.
-        draw: whether to draw scene.png too.
-
-    Returns:
-        The exit code.
-
-    Raises:
-        WholebodyError: the task cannot be read, or the folder cannot be written to.
+    Raises WholebodyError where the task cannot be read, or the folder cannot be written to.
     """
     from wholebody.base.files import is_file
     from wholebody.view.screenshot import Screenshots

@@ -34,11 +34,9 @@ _COLORS = {"solved": "green", "unreachable": "yellow", "stalled": "yellow", "inf
 
 
 def progress_bar(*, counted: bool = True, thread: bool = True) -> Progress:
-    """A bar on the terminal's error output that goes when it is done.
+    """A bar on the terminal's error output that goes when it is done; it counts things, or shows a share in percent.
 
-    Args:
-        counted: whether it counts things; it shows a share in percent otherwise.
-        thread: whether a thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
+    A thread redraws it; what forks needs one without, for a fork may catch a thread with a lock.
     """
     from rich.progress import (
         BarColumn,

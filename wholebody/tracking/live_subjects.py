@@ -90,14 +90,12 @@ def handle_frames(frames: Collection[str]) -> list[str]:
 
 
 class LiveProblem:
-    """The figure of a problem. Its holds can be released; its goals and other constraints stay."""
+    """The figure of a problem. Its holds can be released; its goals and other constraints stay.
+
+    Raises InputError where the problem's scene changed.
+    """
 
     def __init__(self, problem: Problem) -> None:
-        """Copy the scene.
-
-        Raises:
-            InputError: the problem's scene changed.
-        """
         problem.check_fresh()
         self.problem, self.scene = problem, copy.copy(problem.scene)
         self.q: Array = np.array(problem.start)
@@ -151,11 +149,6 @@ class LiveAssembly:
     """The bodies of an assembly, and the hands, feet and so on of its figures. A body that is held is fixed."""
 
     def __init__(self, assembly: Assembly) -> None:
-        """Copy the assembly.
-
-        Raises:
-            InputError: it has no bodies.
-        """
         self._still = copy.copy(assembly)  # without holds
         self._dragged: Assembly | None = None
         self.scene, self.q, self.held = self._still.scene, self._still.q, frozenset[str]()
@@ -203,20 +196,12 @@ class LiveAssembly:
             self._still.move(name, at=at)
 
     def stated(self, q: Array, goals: object, held: Collection[str]) -> Problem:
-        """No problem.
-
-        Raises:
-            InputError: always.
-        """
+        """Raise InputError."""
         raise InputError("an assembly is no problem, so it has no task file; keep assembly.variables() instead")
 
 
 def live_subject(given: Problem | Assembly) -> LiveProblem | LiveAssembly:
-    """What a problem or an assembly is when it is dragged.
-
-    Raises:
-        InputError: it is neither, has no bodies, or its scene changed.
-    """
+    """What a problem or an assembly is when it is dragged; raises InputError for anything else."""
     if isinstance(given, Assembly):
         return LiveAssembly(given)
     if isinstance(given, Problem):

@@ -51,15 +51,10 @@ def circle(center: ArrayLike, radius: float, normal: ArrayLike = (1.0, 0.0, 0.0)
 
 
 def read_path(path: str | os.PathLike[str]) -> Array:
-    """Read points from a text file: x, y and z in metres, one point a line, separated by commas or spaces.
+    """Read points (k, 3) from a text file: x, y and z in metres, one point a line, separated by commas or spaces.
 
-    Empty lines, comments after #, and a first line of names are ignored.
-
-    Returns:
-        (k, 3) points, at least one.
-
-    Raises:
-        FileFormatError: the file cannot be read or a line is no point; the line is named.
+    Empty lines, comments after #, and a first line of names are ignored. Raises FileFormatError for a file without
+    points, or a line that is none and is named.
     """
     path = checked_path(path, "path")
     text = read_text(path, "path")

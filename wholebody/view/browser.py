@@ -151,8 +151,7 @@ class Browser:
     def open(self, url: str, ready: str = _READY) -> None:
         """Open an address, and wait until a JavaScript expression is true: that the page of a `Viewer` has drawn all.
 
-        Raises:
-            BrowserError: the page did not load, or has an error.
+        Raises BrowserError where the page does not load, or has an error.
         """
         self.errors.clear()
         self.requests.clear()
@@ -174,11 +173,7 @@ class Browser:
         return path.as_uri()
 
     def until(self, condition: str) -> None:
-        """Wait until a JavaScript expression is true.
-
-        Raises:
-            BrowserError: it did not become true in time, or the page has an error.
-        """
+        """Wait until a JavaScript expression is true; raises BrowserError for a page that has an error or is slow."""
         end = time.monotonic() + self.timeout
         while not self.evaluate(condition):
             if self.errors:
@@ -188,23 +183,14 @@ class Browser:
             time.sleep(0.02)
 
     def evaluate(self, expression: str) -> Any:
-        """Value of a JavaScript expression in the page; promises are awaited.
-
-        Raises:
-            BrowserError: it throws.
-        """
+        """Value of a JavaScript expression in the page; promises are awaited. Raises BrowserError where it throws."""
         answer = self._call("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
         if "exceptionDetails" in answer:
             raise BrowserError(f"the page failed: {_message(answer['exceptionDetails'])}")
         return answer["result"].get("value")
 
     def capture(self, first: str = "0", *, legend: bool = False) -> bytes:
-        """PNG of the drawing, without the controls on top of it.
-
-        Args:
-            first: JavaScript to run before it in the same call, so that the page draws only once.
-            legend: whether the title, the status and the meaning of the colours stand in a corner.
-        """
+        """PNG of the drawing without controls, after JavaScript that comes first; with the panel in a corner or not."""
         if self.errors:
             raise BrowserError(f"the page failed: {self.errors[0]}")
         data: str = self.evaluate(f"{first}; wholebody.capture({json.dumps(legend)})")
@@ -224,14 +210,16 @@ class Browser:
         if not _ended(pid, 3.0):
             os.killpg(pid, signal.SIGKILL)
             _ended(pid, 3.0)
+        end = time.monotonic() + 3.0
         self._scratch.close()
+        while self._folder.exists() and time.monotonic() < end:  # its last processes may still write there
+            time.sleep(0.01)
+            self._scratch.close()
 
     def __enter__(self) -> Browser:
-        """Return the browser."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     # ---- the protocol: JSON messages, each ended by a zero byte

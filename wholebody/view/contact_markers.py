@@ -34,8 +34,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
 def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
     """Mark witness points and normals; for penetrations the vector that moves the figure's piece out.
 
-    A normal starts at the first piece's witness point and points to the second piece. A penetration vector is as long
-    as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled with their depth.
+    A penetration vector is as long as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled.
     """
     # number of the nearest contacts with markers; a page with thousands of nodes is slow
     witness, touch = Marker("ball", LOOK.witness, LOOK.witness_radius), Marker("arrow", LOOK.normal, 0.8)
@@ -61,11 +60,7 @@ def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) 
 
 
 def checked_overlaps(given: object, what: str) -> list[Overlap]:
-    """Overlaps of an argument of this name.
-
-    Raises:
-        InputError: they are none.
-    """
+    """Overlaps of an argument of this name; raises InputError where they are none."""
     found = checks.listed(given, what, "frame.overlaps")
     return [checks.instance(one, Overlap, what, "give those of a WorldFrame") for one in found]
 
@@ -73,7 +68,7 @@ def checked_overlaps(given: object, what: str) -> list[Overlap]:
 def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
     """Draw PD_g of every two objects: an arrow for each of them that may move, and its length in words.
 
-    The arrows are as long as the moves, but at least `LOOK.shortest_depth`. Where both may move, each has a half.
+    Where both may move, each arrow has half of it, but at least `LOOK.shortest_depth`.
     """
     for number, one in enumerate(overlaps):
         root = f"{LOOK.contact_node}/overlap {number}"
@@ -91,14 +86,9 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
 def mark_blockers(
     keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
 ) -> None:
-    """Mark each of the strongest blockers by a ball and its name.
+    """Mark each of the strongest blockers of an assessment, strongest first, by a ball and its name.
 
-    Args:
-        keyframe: the keyframe to which the markers are added.
-        scene: the scene.
-        state: of the figure at the shown posture.
-        contacts: near pairs at that posture.
-        blockers: `Blocker`s of an assessment, the strongest first.
+    `contacts` are the near pairs at the shown posture, of which `state` is.
     """
     # most blockers that are marked, the strongest; more labels hide each other
     for number, blocker in enumerate(blockers[:4]):

@@ -41,14 +41,8 @@ def check_movie(path: str | os.PathLike[str]) -> Path:
 def frame_times(path: Path, count: int, dt: float, fps: float | None) -> tuple[list[float], float]:
     """Times of the pictures of a movie, seconds from the motion's beginning, and the rate per second.
 
-    Args:
-        path: of the movie; its ending limits the default rate.
-        count: number of postures of the motion.
-        dt: seconds from one to the next.
-        fps: pictures per second, or None for the motion's own if the kind of file allows it.
-
-    Raises:
-        InputError: the rate is out of range.
+    The motion has `count` postures, `dt` seconds apart. If `fps` is None the rate is the motion's own where the kind of
+    file allows it. Raises InputError where it is out of range.
     """
     if fps is None:
         fps = min(1 / dt, FASTEST[path.suffix.lower()])
@@ -65,11 +59,7 @@ def counted(pictures: Iterable[bytes], total: int, progress: Callable[[int, int]
 
 
 def movie(suffix: str, pictures: Iterable[bytes], fps: float) -> bytes:
-    """Pictures (PNG) as a movie, GIF or MP4 by the ending of its file.
-
-    Raises:
-        WholebodyError: ffmpeg failed.
-    """
+    """Pictures (PNG) as a movie, GIF or MP4 by the ending of its file; raises WholebodyError where ffmpeg failed."""
     return _gif(pictures, fps) if suffix.lower() == ".gif" else _mp4(pictures, fps)
 
 

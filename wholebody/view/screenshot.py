@@ -17,11 +17,7 @@ from wholebody.view.style import LOOK
 
 
 def check_size(size: Any) -> tuple[int, int]:
-    """Width and height of a picture, pixels.
-
-    Raises:
-        InputError: not two whole numbers, or out of range.
-    """
+    """Width and height of a picture, pixels; raises InputError for what is not two whole numbers in range."""
     given = listed(size, "size", "(960, 720), pixels")
     if len(given) != 2:
         raise InputError(f"size is {shown(size)}; give width and height, pixels")
@@ -32,11 +28,8 @@ def check_size(size: Any) -> tuple[int, int]:
 def changes(before: Store, wanted: Sequence[Command]) -> list[Command] | None:
     """The commands among the wanted ones that a page lacks; None where it must be built anew.
 
-    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes.
-
-    Args:
-        before: what the page shows.
-        wanted: the commands that build the wanted picture in an empty page, in order.
+    That is so where a node is to go, or where a body changes, because the bones of its surface hold its nodes. The
+    wanted ones build the picture in an empty page, in order; `before` is what the page shows.
     """
     after = Store()
     for command in wanted:
@@ -65,7 +58,6 @@ class Screenshots:
     """A headless browser that takes pictures; one can serve several viewers."""
 
     def __init__(self) -> None:
-        """Prepare; `start` or the first picture starts the browser."""
         self._browser: Browser | None = None
         self._shown: Store | None = None
 
@@ -77,9 +69,7 @@ class Screenshots:
     def picture(self, wanted: Sequence[Command], size: Any, *, legend: bool = False) -> bytes:
         """PNG of what these commands draw in an empty page, of this width and height; with the panel if wanted.
 
-        Raises:
-            InputError: the size is out of range.
-            MissingPackageError: there is no Chromium.
+        Raises InputError for a size out of range, MissingPackageError where there is no Chromium.
         """
         return self._draw(wanted, size).capture(legend=legend)
 
@@ -95,11 +85,9 @@ class Screenshots:
         self._browser = self._shown = None
 
     def __enter__(self) -> Screenshots:
-        """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Close it."""
         self.close()
 
     def _started(self) -> Browser:

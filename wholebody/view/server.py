@@ -61,7 +61,6 @@ class Store:
     """The commands that show the present picture in a new page: the last value of everything, without history."""
 
     def __init__(self) -> None:
-        """Begin with an empty picture."""
         self.nodes: dict[str, _Node] = {}
         self.camera: bytes | None = None
         self.animation: bytes | None = None
@@ -104,11 +103,7 @@ class Store:
         return command.op == Op.OBJECT and node.object == command.payload
 
     def commands(self, *, motion: bool = True) -> list[Command]:
-        """Commands that build the picture in an empty page; the animation last, when all its nodes exist.
-
-        Args:
-            motion: include the animation.
-        """
+        """Commands that build the picture in an empty page; the animation last, when all its nodes exist."""
         commands: list[Command] = []
         for path, node in self.nodes.items():
             if node.object is not None:
@@ -132,7 +127,6 @@ class Queue:
     """The pending commands of one tab. A new transform or property replaces the pending one, so no tab lags."""
 
     def __init__(self) -> None:
-        """Make an empty queue."""
         self.waiting: list[bytes] = []
         self._place: dict[tuple[bytes, str, str], int] = {}
 
@@ -165,7 +159,6 @@ class Hub:
     """The picture, the page and the open tabs."""
 
     def __init__(self) -> None:
-        """Begin without tabs."""
         self.store = Store()
         self.page = ""
         self.tabs: set[Any] = set()
@@ -216,7 +209,6 @@ class Guard:
     """
 
     def __init__(self, host: str) -> None:
-        """Accept the names of this machine at which a server at `host` can be reached."""
         import socket
 
         names = {*LOCAL, host.lower()}

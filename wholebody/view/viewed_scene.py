@@ -33,20 +33,15 @@ class Colored:
 
 
 class ViewedAssembly:
-    """The bodies and things that an assembly has now.
+    """The bodies and things that an assembly has now, and its `figures`, each with the color that it was given.
 
-    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn. People are
-    drawn with their surface, as in a scene.
-
-    Attributes:
-        figures: each figure by name, and the color that it was given.
+    A posture is `assembly.q`, `solution.q` or a row of `solution.path`. Bodies without shapes are not drawn.
     """
 
     figure = None
     revision = 0
 
     def __init__(self, assembly: Assembly) -> None:
-        """Read shapes and colors."""
         self._scene = assembly.scene
         self.model, self.geometry = self._scene.model, self._scene.geometry
         self.piece_owner = self._scene.piece_owner
@@ -69,11 +64,7 @@ def _color(assembly: Assembly, owner: str) -> Color | None:
 
 
 def checked_scene(scene: Any) -> Any:
-    """Check the argument of a viewer.
-
-    Raises:
-        InputError: it is no scene; for some other types the message says how to show them.
-    """
+    """The scene that a viewer is given; raises InputError for what is none, and says how to show it."""
     if isinstance(scene, Scene):
         return scene
     from wholebody.methods.newton.assembly import Assembly
@@ -149,7 +140,7 @@ class ViewedScene(Protocol):
 
 
 class ViewedWorld:
-    """A figure, the things that stay, and things that move.
+    """A figure, the things that stay, and things that move, which have joints here.
 
     A posture is what `configuration` makes of one of the figure's and the placements of the things that move. So
     `Viewer(ViewedWorld(scene, names)).play(configurations, dt)` shows all of them move.
@@ -158,11 +149,6 @@ class ViewedWorld:
     revision = 0
 
     def __init__(self, scene: Scene, names: Iterable[str]) -> None:
-        """Give joints to the things that move.
-
-        Raises:
-            UnknownNameError: there is no such thing.
-        """
         self._moving = MovingScene(scene.built, names)
         self.figure, self.objects = scene.figure, scene.objects
         self.model, self.geometry = self._moving.model, self._moving.geometry

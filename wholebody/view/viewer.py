@@ -271,7 +271,7 @@ class Viewer:
 
         Raises:
             InputError: the port is taken, or the host is no address of this machine.
-            ViewerClosedError: the server could not be started; `open`, `wait`, `wait_until_closed`, `sync` raise it too.
+            ViewerClosedError: the server could not be started; `open`, `sync` and those that wait raise it too.
         """
         return self._live().url
 

@@ -31,16 +31,12 @@ class Bone(NamedTuple):
 
 
 class Patch(NamedTuple):
-    """A part of the surface.
+    """A part of the surface, of which most is moved by the bones of a segment.
 
     Attributes:
-        name: such as "shirt:left_upper_arm"; unique.
-        segment: the segment whose bones move most of it.
-        color: red, green, blue.
-        vertices: (n, 3) metres, in the world of the binding posture.
-        normals: (n, 3) outward unit vectors.
-        bones: (n, 4) indices of bones.
-        weights: (n, 4) their influences, which add up to 1.
+        name, segment, color: such as "shirt:left_upper_arm", which is unique; its segment; red, green, blue.
+        vertices, normals: (n, 3) metres, in the world of the binding posture, and outward unit vectors.
+        bones, weights: (n, 4) indices of bones, and their influences, which add up to 1.
         faces: (m, 3) indices of vertices, wound outwards.
         coarse: (k, 3) the same of fewer and larger triangles, for shadows and small pictures.
     """
@@ -81,11 +77,9 @@ class Garment(NamedTuple):
     """A part of one colour, before it is made.
 
     Attributes:
-        name: such as "shirt".
-        color: red, green, blue.
+        name, color: such as "shirt", and red, green, blue.
         field: its solid in the world of the body's binding posture.
-        low: (3,) least corner of a box around it.
-        high: (3,) greatest corner.
+        low, high: (3,) corners of a box around it.
         cell: size of the grid's cells, metres.
         claims: regions of the bones that move it.
         cuts: half spaces that end it at sharp edges: hem, collar, cuffs.

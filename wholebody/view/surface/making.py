@@ -20,14 +20,7 @@ from wholebody.view.surface.person_shape import COLORS, HALVES, PersonShape
 
 
 class Part(NamedTuple):
-    """A closed surface in the binding posture.
-
-    Attributes:
-        name: such as "shirt".
-        color: red, green, blue.
-        surface: vertices, normals, faces in the world of the binding posture.
-        weights: (n, b) influence of every bone on every vertex, at most four of them not zero; rows add up to 1.
-    """
+    """A closed surface in the binding posture; weights (n, b) of the bones on its vertices, at most four not zero."""
 
     name: str
     color: tuple[float, float, float]
