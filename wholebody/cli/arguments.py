@@ -72,7 +72,7 @@ def add_person(parser: Any) -> None:
 
 
 def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Return the options of `wb.load` that were given; raises InputError for a proportion that is no name and number."""
+    """Return the options of `wb.load` that were given; raises InputError for a proportion without name or number."""
     given = {name: value for name in PERSON if (value := getattr(arguments, name)) is not None}
     if "proportions" in given:
         proportions = {}
@@ -87,7 +87,7 @@ def person_options(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def scene_options(scene: str, overlap: str, out: str) -> tuple[Option, ...]:
-    """Options of a command that runs scenes with a scripted tracker: help of two, and the folder where none is given."""
+    """Options of a command that runs scenes with a scripted tracker: help of two, and the folder if none is given."""
     return (
         option("scene", nargs="?", metavar="SCENE", help=scene),
         flag("--list", "list the scenes"),

@@ -25,7 +25,7 @@ class Commands(Protocol):
 
 @dataclass(frozen=True)
 class Command:
-    """A command: its words as `argparse` shows them (line breaks stay), its options in the help's order, what runs it."""
+    """A command: its words as `argparse` shows them (line breaks stay), its options in order, and what runs it."""
 
     name: str
     help: str
