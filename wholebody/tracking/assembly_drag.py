@@ -47,7 +47,7 @@ class GoalMoves:
         self._most, self._error = np.inf, 0.0
 
     def shares(self, error: float) -> Iterator[float]:
-        """Shares of the way to a goal that is `error` m or rad away, to be tried until a motion is free or time is up."""
+        """Shares of the way to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
         self._error = error
         moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
         for number, move in enumerate(moves):

@@ -18,25 +18,12 @@ from wholebody.base.errors import MissingPackageError, WholebodyError
 from wholebody.base.files import Scratch
 
 _FLAGS = (
-    "--headless",
     "--no-sandbox",  # a container has no sandbox; the only page is our own, and it has no network
-    "--disable-gpu",
-    "--enable-unsafe-swiftshader",
-    "--disable-dev-shm-usage",
-    "--disable-quic",
-    "--no-first-run",
-    "--no-default-browser-check",
-    "--disable-extensions",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-features=Translate,OptimizationHints,MediaRouter",
-    "--hide-scrollbars",
-    "--mute-audio",
-    "--force-device-scale-factor=1",
-    "--force-color-profile=srgb",
-    "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1",
-    "--remote-debugging-pipe",
+    *("--headless", "--disable-gpu", "--enable-unsafe-swiftshader", "--disable-dev-shm-usage", "--disable-quic"),
+    *("--no-first-run", "--no-default-browser-check", "--disable-extensions", "--disable-background-networking"),
+    *("--disable-component-update", "--disable-sync", "--disable-features=Translate,OptimizationHints,MediaRouter"),
+    *("--hide-scrollbars", "--mute-audio", "--force-device-scale-factor=1", "--force-color-profile=srgb"),
+    *("--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE 127.0.0.1", "--remote-debugging-pipe"),
 )
 _READY = "window.wholebody !== undefined && window.wholebody.ready"
 
@@ -50,15 +37,8 @@ def find_chromium() -> str | None:
     named = os.environ.get("WHOLEBODY_CHROMIUM")
     if named:
         return shutil.which(named)
-    names = (
-        "chromium",
-        "chromium-browser",
-        "google-chrome",
-        "google-chrome-stable",
-        "chrome",
-        "chromium-headless-shell",
-    )
-    return next((path for name in names if (path := shutil.which(name))), None)
+    names = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable", "chrome")
+    return next((path for name in (*names, "chromium-headless-shell") if (path := shutil.which(name))), None)
 
 
 class Browser:

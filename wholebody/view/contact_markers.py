@@ -16,12 +16,12 @@ from wholebody.view import drawing
 from wholebody.view.bodies import Bodies
 from wholebody.view.scene_graph import Keyframe, Marker
 from wholebody.view.style import LOOK
-from wholebody.view.viewed_scene import ViewedContacts, ViewedScene
+from wholebody.view.viewed_scene import ViewedScene
 
 _DEPTH = Marker("arrow", LOOK.depth, 1.3)
 
 
-def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
     """Give every piece in contact the colour of its state; penetration takes precedence over contact."""
     for pairs, state in (
         (contacts.pair, LOOK.contact),
@@ -31,7 +31,7 @@ def color_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts)
             bodies.paint(keyframe, int(index), state)
 
 
-def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: ViewedContacts) -> None:
+def mark_contacts(keyframe: Keyframe, bodies: Bodies, contacts: Any) -> None:
     """Mark witness points and normals; for penetrations the vector that moves the figure's piece out.
 
     A penetration vector is as long as the depth, but at least `LOOK.shortest_depth`; the deepest ones are labelled.
@@ -83,9 +83,7 @@ def mark_overlaps(keyframe: Keyframe, overlaps: Sequence[Overlap]) -> None:
         keyframe.markers[f"{root}/text"] = (label, drawing.point_placement(one.point))
 
 
-def mark_blockers(
-    keyframe: Keyframe, scene: ViewedScene, state: State, contacts: ViewedContacts, blockers: Sequence[Any]
-) -> None:
+def mark_blockers(keyframe: Keyframe, scene: ViewedScene, state: State, contacts: Any, blockers: Sequence[Any]) -> None:
     """Mark each of the strongest blockers of an assessment, strongest first, by a ball and its name.
 
     `contacts` are the near pairs at the shown posture, of which `state` is.
@@ -105,7 +103,7 @@ def mark_blockers(
         keyframe.markers[f"{root}/text"] = (label, above)
 
 
-def _place(scene: ViewedScene, state: State, contacts: ViewedContacts, blocker: Any) -> Array | None:
+def _place(scene: ViewedScene, state: State, contacts: Any, blocker: Any) -> Array | None:
     """Position of a blocker (3,), or None for one without a position, such as a balance."""
     if blocker.kind == "contact":
         owners = scene.piece_owner

@@ -91,25 +91,14 @@ def _swatch(frames: Sequence[Any]) -> NDArray[np.uint8]:
 
 
 def _mp4(pictures: Iterable[bytes], fps: float) -> bytes:
-    command = [
-        "ffmpeg",
-        "-y",
-        "-loglevel",
-        "error",
-        "-f",
-        "image2pipe",
-        "-c:v",
-        "png",
-        "-framerate",
-        f"{fps:g}",
-        "-i",
-        "-",
-    ]
-    command += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "20", "-pix_fmt", "yuv420p"]
+    options = (
+        f"-y -loglevel error -f image2pipe -c:v png -framerate {fps:g} -i - "
+        "-vf pad=ceil(iw/2)*2:ceil(ih/2)*2 -c:v libx264 -crf 20 -pix_fmt yuv420p -movflags +faststart"
+    )
     with Scratch() as folder, tempfile.TemporaryFile() as log:
         path = folder / "movie.mp4"  # ffmpeg moves the index to the front at the end, which requires a file
         process = subprocess.Popen(
-            [*command, "-movflags", "+faststart", str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
+            ["ffmpeg", *options.split(), str(path)], stdin=subprocess.PIPE, stdout=log, stderr=log
         )
         try:
             assert process.stdin is not None

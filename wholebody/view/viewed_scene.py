@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
@@ -84,30 +83,6 @@ def checked_scene(scene: Any) -> Any:
     raise InputError(f"Viewer: scene is {a(type(scene))}, not a Scene; {correction}")
 
 
-class ViewedContacts(Protocol):
-    """Near pairs of pieces; k rows each."""
-
-    @property
-    def pair(self) -> NDArray[np.intp]:
-        """(k, 2) indices of the two pieces."""
-
-    @property
-    def distance(self) -> Array:
-        """(k,) signed distance, metres."""
-
-    @property
-    def normal(self) -> Array:
-        """(k, 3) unit vector from the first piece to the second."""
-
-    @property
-    def point_a(self) -> Array:
-        """(k, 3) witness point on the first piece."""
-
-    @property
-    def point_b(self) -> Array:
-        """(k, 3) witness point on the second piece."""
-
-
 class ViewedScene(Protocol):
     """A figure among things, such as a `wholebody.Scene`."""
 
@@ -135,8 +110,8 @@ class ViewedScene(Protocol):
     def revision(self) -> int:
         """A number that changes when things are added or removed."""
 
-    def contacts(self, q: Array, within: float = ...) -> ViewedContacts:
-        """Pairs nearer than `within` metres at the posture q, nearest first."""
+    def contacts(self, q: Array, within: float = ...) -> Any:
+        """Pairs nearer than `within` metres at the posture q, nearest first, as `Contacts` has them."""
 
 
 class ViewedWorld:
