@@ -55,11 +55,7 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
     *folders("out/compare"),
 )
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare methods; 1 where a comparison that is repeated solves other problems.
-
-    Raises:
-        InputError: options that exclude each other.
-    """
+    """Compare methods; 1 where a comparison that is repeated solves other problems."""
     if arguments.task is not None:
         return _compare_on_task(arguments)
     if arguments.again is not None:
