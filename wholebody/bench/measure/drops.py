@@ -22,16 +22,10 @@ GRAVITY = 9.81  # m/s2
 
 @dataclass(frozen=True)
 class Drop:
-    """Boxes and balls above a floor at z = 0.
+    """Boxes and balls above a floor at z = 0, on which wood slides on wood (table 1 of Schmidl and Lin).
 
-    Attributes:
-        name: of the case.
-        sizes: full lengths (3,) of a box, or the radius (1,) of a ball.
-        places: (n, 3) of the centres at the start, metres.
-        velocity: (3,) of all at the start, m/s.
-        frame: seconds.
-        seconds: how long it lasts.
-        friction, restitution: wood on wood, table 1 of Schmidl and Lin.
+    `sizes`: full lengths (3,) of a box, or the radius (1,) of a ball; `places` (n, 3) of the centres [m]; `velocity`
+    (3,) of all at the start; `frame` and `seconds`: of a frame and of the whole.
     """
 
     name: str

@@ -1,7 +1,4 @@
-"""Every robot description of a folder: whether it loads, how fast, and whether its tips reach; and the page about it.
-
-A description is examined in a process of its own: it is loaded, and its tips reach to where a free posture has them.
-"""
+"""Every robot description of a folder, in a process each: whether it loads, how fast, and whether its tips reach."""
 
 from __future__ import annotations
 
@@ -89,11 +86,7 @@ def _free_posture(figure: Body, scene: Scene, count: int, number: int) -> Array:
 
 
 def descriptions(folder: Path) -> list[Path]:
-    """Return the URDF and MJCF files below a folder.
-
-    Raises:
-        InputError: no folder, or no description in it.
-    """
+    """Return the URDF and MJCF files below a folder; InputError where there is none."""
     if not os.path.isdir(folder):
         raise InputError(f"{folder}: there is no such folder; give one that holds robot descriptions")
     found = sorted(folder.rglob("*.urdf")) + sorted(path for path in folder.rglob("*.xml") if _is_mjcf(path))
@@ -111,10 +104,7 @@ def _is_mjcf(path: Path) -> bool:
 
 
 def measure(folder: Path, reaches: int) -> Iterator[Row]:
-    """Load every description of a folder twice, each time in a process of its own, and reach with it the second time.
-
-    The folder and its parents are looked up for packages.
-    """
+    """Load every description of a folder twice, and reach with it the second time."""
     for path in descriptions(folder):
         name = str(path.relative_to(folder))
         with Scratch() as cache:

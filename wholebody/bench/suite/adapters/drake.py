@@ -1,7 +1,4 @@
-"""drake: `InverseKinematics`, one nonlinear program for the whole posture, solved by SNOPT.
-
-Its classes are constraints: goals, holds, the least distance of all pairs and the limits hold together or not at all.
-"""
+"""drake: `InverseKinematics`, one nonlinear program for the whole posture, solved by SNOPT."""
 
 from __future__ import annotations
 
@@ -60,13 +57,7 @@ class Drake(OneCall["_Plant"]):
 
 
 class _Plant:
-    """A MultibodyPlant of a scene, with the pairs of a problem.
-
-    Attributes:
-        plant: the MultibodyPlant.
-        bodies: its bodies by the index of our joint.
-        least: the least distance that every pair of its geometry keeps [m].
-    """
+    """A MultibodyPlant of a scene: bodies by the index of our joint, and the least distance of its pairs [m]."""
 
     def __init__(self, problem: Problem) -> None:
         from pydrake.multibody.plant import AddMultibodyPlantSceneGraph

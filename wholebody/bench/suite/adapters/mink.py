@@ -136,11 +136,7 @@ def _root_limit(mink: Any, model: Any, speed: float, turn: float) -> Any:
 
 
 class _Order:
-    """Postures and degrees of freedom in the order of MuJoCo's model.
-
-    Attributes:
-        dof: (nv,) MuJoCo's place of each of ours.
-    """
+    """Postures in the order of MuJoCo's model, and its place `dof` (nv,) of each of our degrees of freedom."""
 
     def __init__(self, figure: Figure, model: Any) -> None:
         self._size, self._free = (figure.model.nq, model.nq), figure.root == "free"

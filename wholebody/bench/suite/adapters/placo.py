@@ -1,7 +1,6 @@
 """placo: our method of that name, and `KinematicsSolver` with its documented tasks for a reach.
 
-In a reach, feet and the self-collision constraint are hard tasks. placo knows collisions of a robot with itself only.
-The objects are added to its collision model, fixed to the world; it then treats them as parts of the robot.
+placo knows collisions of a robot with itself only, so the objects are added to its collision model.
 """
 
 from __future__ import annotations
@@ -123,12 +122,7 @@ class PrunedPlacoTool(PlacoTool):
 
 @lru_cache(maxsize=4)
 def near_pairs(scene: wb.Scene, start: bytes) -> Sequence[tuple[int, int]]:
-    """Pairs of pieces that come nearer than `Setting.within` in 2000 sampled postures.
-
-    Args:
-        scene: whose pairs.
-        start: (nq,) posture about which the root is sampled, as bytes.
-    """
+    """Pairs of pieces nearer than `Setting.within` in one of 2000 postures about that of the bytes `start`."""
     found = _sampled(scene, np.frombuffer(start), 2000, SETTING.within)
     pairs = [(pair.first, pair.second) for pair in scene.geometry.collisionPairs]
     return [pair for pair, near in zip(pairs, found, strict=True) if near]

@@ -45,14 +45,10 @@ class _Row(NamedTuple):
 def adapters(names: Iterable[str] | None = None, starts: bool = False) -> tuple[Adapter, ...]:
     """The adapters of these names, in the order given; where None, one of each algorithm that is installed.
 
-    The name of a method with several adapters and none of that name, such as "newton", means all that are installed;
-    "all" means every method that is installed, "module:Class" a method of one's own. Methods that differ from another
-    in their starts alone, such as "qp/one_start" and "mink/starts", are among several only if `starts` is true.
-
-    Raises:
-        UnknownNameError: there is no such adapter.
-        MissingPackageError: what it needs is not installed.
-        InputError: a method of one's own cannot be imported.
+    "newton", a method with several adapters, means all that are installed; "all" means every method that is installed,
+    "module:Class" a method of one's own. Methods that differ from another in their starts alone are among several only
+    if `starts` is true. Raises UnknownNameError, MissingPackageError, or InputError where a method of one's own cannot
+    be imported.
     """
     rows = _rows()
     if names is None:
@@ -170,12 +166,7 @@ def installed_tools() -> tuple[str, ...]:
 
 
 def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
-    """Check names of tools; all installed ones where None.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
+    """Names of tools, all installed ones where None; UnknownNameError or MissingPackageError for one that is not."""
     if names is None:
         return installed_tools()
     chosen = tuple(names)
@@ -187,12 +178,7 @@ def chosen_tools(names: Iterable[str] | None) -> tuple[str, ...]:
 
 
 def make_tool(name: str, track: Track) -> Tool:
-    """Set a tool up for a reach.
-
-    Raises:
-        UnknownNameError: there is no such tool.
-        MissingPackageError: its packages are not installed.
-    """
+    """Set a tool up for a reach; errors as in `chosen_tools`."""
     (name,) = chosen_tools([name])
     family, _, variant = name.partition("/")
     module = "own" if family == "wholebody" else family

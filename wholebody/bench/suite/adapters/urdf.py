@@ -52,16 +52,9 @@ def piece_name(number: int) -> str:
 def write_urdf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]], folder: Path) -> Path:
     """Write a scene as URDF, with a file for each hull, and return its path.
 
-    Every piece and every frame is a link of its own, fixed to the link that carries it. Objects are fixed to the root.
-    Links have no mass. A half-space is the top of a box.
-
-    Args:
-        scene: a figure with turning and sliding joints on a fixed root, and things.
-        frames: names of further links -> our joint and the placement in it.
-        folder: for the files.
-
-    Raises:
-        InputError: a joint or a shape that this translation does not know.
+    Every piece and every frame is a link of its own, fixed to the link that carries it, without mass. Objects are fixed
+    to the root. A half-space is the top of a box. `frames` has names of further links, our joint and the placement in
+    it. Raises InputError for a joint or a shape that this translation does not know.
     """
     model = scene.model
     top = ElementTree.Element("robot", name="figure")
@@ -86,11 +79,7 @@ def _link(index: int) -> str:
 
 
 def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: str, child: str) -> None:
-    """Add a turning or sliding joint of a model, with its placement, axis and limits, between two links.
-
-    Raises:
-        InputError: a joint of another kind.
-    """
+    """Add a turning or sliding joint of a model between two links; InputError for a joint of another kind."""
     joint, known = model.joints[index], axis_of(model, index, "URDF is written for turning and sliding joints")
     speed, fast = float(model.velocityLimit[joint.idx_v]), 1e3  # rad/s, m/s: in place of a limit that is none
     limit = {"effort": 1.0, "velocity": speed if 0.0 < speed < fast else fast}
@@ -102,11 +91,7 @@ def add_model_joint(top: ElementTree.Element, model: Any, index: int, parent: st
 
 
 def axis_of(model: Any, index: int, written_for: str) -> UrdfAxis:
-    """Kind and axis of a joint that turns about or slides along one axis by itself.
-
-    Raises:
-        InputError: a joint of another kind; `written_for` ends the sentence.
-    """
+    """Kind and axis of a joint of one axis; InputError for another, whose sentence `written_for` ends."""
     known, kind = urdf_axis(model, index), model.joints[index].shortname()
     if known is None or kind == FOLLOWS:
         raise InputError(f"joint {model.names[index]!r} is a {kind}; {written_for}")
@@ -177,17 +162,10 @@ def _obj(shape: Any) -> str:
 
 
 def mjcf(scene: Scene, frames: Mapping[str, tuple[int, pin.SE3]] = MappingProxyType({})) -> str:
-    """Return a scene as MJCF.
+    """Return a scene as MJCF: bodies are named after the joint that moves them, geoms after their pieces.
 
-    Bodies are named after the joint that moves them, geoms after their pieces. Links
-    without mass get a millionth of a kilogram, because MuJoCo refuses none; kinematics do not see it.
-
-    Args:
-        scene: a figure with turning and sliding joints, on a free root or fixed, and things.
-        frames: names of sites -> our joint and the placement in it.
-
-    Raises:
-        InputError: a joint or a shape that this translation does not know.
+    Links without mass get a millionth of a kilogram, because MuJoCo refuses none. `frames` has names of sites, our
+    joint and the placement in it. Raises InputError for a joint or a shape that this translation does not know.
     """
     model, geometry = scene.model, scene.geometry
     top = ElementTree.Element("mujoco", model=scene.figure.name)

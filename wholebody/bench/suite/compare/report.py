@@ -1,7 +1,4 @@
-"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out.
-
-A chart has at most six methods; a method has the same colour in all of them.
-"""
+"""What a comparison leaves: every solve as CSV, charts, and the report of what to choose when and what was left out."""
 
 from __future__ import annotations
 
@@ -76,10 +73,7 @@ def chart_name(family: str, number: int = 0) -> str:
 
 
 def groups(adapters: Sequence[str]) -> list[tuple[str, ...]]:
-    """Methods as they stand together in charts: at most `MOST`, first one of each algorithm, then the others.
-
-    Our default stands in every group, to compare with.
-    """
+    """Methods that stand together in charts: at most `MOST`, one of each algorithm first, our default in every group."""
     kinds: dict[str, str] = {}
     for name in adapters:
         kinds.setdefault(re.split(r"[/,+ ]", name)[0], name)
@@ -118,12 +112,10 @@ def publish(
     docs: Path | None = None,
     say: Callable[[str], None] = lambda text: None,
 ) -> Material:
-    """Write everything that is made from the records of a run into a folder, and its part of the docs where given.
+    """Write everything that is made from a run into a folder, and its section of the docs where given.
 
-    `missing` are methods that are not installed, and what installs them; `say` is told what is being made.
-
-    Raises:
-        FileFormatError: the documentation has no place for it.
+    `missing` are methods that are not installed, and what installs them. Raises FileFormatError where the docs have no
+    place for it.
     """
     given = material(settings, store.chunks, facts, missing)
     write_rows(folder / "solves.csv", facts, store.records)

@@ -53,11 +53,7 @@ CASES = 200
 
 
 def problem_set(name: str) -> ProblemSet:
-    """Return a set.
-
-    Raises:
-        UnknownNameError: with the nearest names.
-    """
+    """Return a set; UnknownNameError with the nearest names."""
     known = {**SETS, **NAMED}
     if name not in known:
         raise UnknownNameError("problem set", name, known)
