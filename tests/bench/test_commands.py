@@ -87,7 +87,7 @@ def test_solve(tmp_path: Path, docs: Path, root: Path, monkeypatch: pytest.Monke
     monkeypatch.setattr("wholebody.cli.demo.packaged_tasks", lambda: {"shelf": task})
     monkeypatch.setenv("WHOLEBODY_CHROMIUM", str(tmp_path / "none"))
     words = ("--count", "1", "--methods", "qp/daqp", "--out", str(tmp_path / "out"), "--update-docs", str(docs))
-    assert bench("solve", "--parts", "task", *words) == 0
+    assert bench("solve", *words) == 0
     rows = csv_rows(tmp_path / "out" / "solve.csv")
     assert [row["problem and method"] for row in rows] == ["new", "used before"]
     assert all(float(row["median ms"]) > 0.0 and int(row["pairs"]) > 0 for row in rows)

@@ -1,4 +1,4 @@
-"""`wholebody bench step`, `solve`, `scaling`, `motion`, `world`, `robots`, `ablation`: what things cost and achieve."""
+"""`wholebody bench step`, `solve`, `scaling`, `motion` and `world`: what things cost and achieve."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from wholebody.base import checks
 from wholebody.base.files import make_folder
 from wholebody.bench.rows import Panel, Row, chart, only, report
 from wholebody.bench.tables import machine, write_rows
-from wholebody.cli.bench.command import Chart, listed, measuring, publish, publish_page
+from wholebody.cli.bench.command import Chart, listed, measuring, publish
 from wholebody.cli.command import count, option
 
 
@@ -69,37 +69,23 @@ def step(arguments: argparse.Namespace) -> None:
     publish(name, text, arguments, facts=facts, tables=rows, charts=charts)
 
 
-PARTS = "task", "detail"
-"""Of `wholebody bench solve`, each into a table of its own."""
-
-
 @measuring(
     "solve",
-    "whole solves: a task and its memory, levels of modelling",
-    """\
-Measure whole solves. `task`: the shelf, or a task of your own, with new and with used workspaces, and the memory of
-`wholebody pose`. `detail`: problems with the person as spheres, capsules and hulls, with all joints and pairs and with
-those that a task needs, judged in the finest model.""",
-    listed("--parts", "what to measure (default: task)", None, choices=PARTS, default=PARTS[:1]),
-    option("--task", type=Path, metavar="TASK.toml", help="of the part task (default: the shelf)"),
-    count("--count", None, "solves of the task (default: 30), cases of each level (8)"),
-    option("--first", type=int, default=0, metavar="SEED", help="seed of the first case (default: 0)"),
-    listed("--methods", "of the part task, such as qp, newton (default: qp qp/osqp)"),
+    "whole solves of a task, and their memory",
+    "Solve the shelf, or a task of your own, with new and with used workspaces, and measure the memory of "
+    "`wholebody pose`. `wholebody bench compare` solves the problem sets.",
+    option("--task", type=Path, metavar="TASK.toml", help="(default: the shelf)"),
+    count("--count", 30, "solves"),
+    listed("--methods", "such as qp, newton (default: qp qp/osqp)"),
 )
 def solve(arguments: argparse.Namespace) -> None:
-    """Measure whole solves."""
-    for part in dict.fromkeys(arguments.parts):
-        {"task": _task, "detail": _detail}[part](arguments)
-
-
-def _task(arguments: argparse.Namespace) -> None:
     """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
     from wholebody.bench.measure import solve
     from wholebody.bench.suite.adapters.registry import adapters
     from wholebody.cli.demo import packaged_tasks
 
     task, facts, rows = arguments.task or packaged_tasks()["shelf"], machine(), []
-    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count or 30
+    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count
     for row in solve.task_rows(task, methods, many):
         rows.append(row)
         print(f"{row.case}, {row.tool}, {row['problem and method']}: {row['median ms']:.1f} ms, {row['status']}")
@@ -107,23 +93,6 @@ def _task(arguments: argparse.Namespace) -> None:
     about = "A task, solved with a new problem and a new method each time, and with the same ones again."
     text = report(about, {"Solves": rows, "Memory": [peak]}, facts)
     publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
-
-
-def _detail(arguments: argparse.Namespace) -> None:
-    """The same tasks with every detail of geometry, judged in the finest model."""
-    from wholebody.bench.measure import solve
-
-    facts, refused = machine(), dict[str, None]()
-    rows = list(solve.detail_rows(2 if arguments.quick else arguments.count or 8, arguments.first, refused.setdefault))
-    about = (
-        "Answers of `qp` that their own model calls solved, judged in the finest model with everything in it: how "
-        "many are inside something by more than 0.1 mm, and by how much the worst misses what it is asked; the effort "
-        "is held against the finest model's own answer. Medians over the cases, of the processor's time. Simplified "
-        "is `wb.simplify`."
-    )
-    shown = [row for row in solve.detail_summary(rows) if row.tool.endswith(("all", "simplified"))]
-    text = report(about, {"": only(shown, *solve.SHOWN)}, facts, list(refused))
-    publish("detail", text, arguments, facts=facts, tables={"detail": rows})
 
 
 @measuring(
@@ -267,42 +236,3 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
         "long": (throws.long_run(each) for each in (minutes,)),
     }
-
-
-@measuring(
-    "robots",
-    "load every robot description of a folder, and reach with its tips",
-    "Load every URDF and MJCF file below a folder, with an empty cache and again, and bring the tips "
-    "of each robot to where random postures free of contact have them. With --update-docs the table becomes "
-    "docs/robots.md.",
-    option("folder", type=Path, metavar="FOLDER", help="folder that holds robot descriptions"),
-)
-def robots(arguments: argparse.Namespace) -> None:
-    """Measure all descriptions; --quick makes three reaches instead of twelve."""
-    from wholebody.bench.measure.robots import measure, page
-
-    facts, reaches, found = machine(), 3 if arguments.quick else 12, []
-    for row in measure(arguments.folder, reaches):
-        found.append(row)
-        told = f"{row.figures.get('solved', 'no reach')} of {reaches} solved" if row.tool != "refused" else "refused"
-        print(f"{row.case}: {told}", flush=True)
-    publish_page("robots.md", page(found, facts, reaches), arguments)
-
-
-@measuring(
-    "ablation",
-    "what each constant and mechanism of a method is worth, in counts",
-    "Change one constant or switch one mechanism off at a time, and count answers that differ.",
-    option("--method", default="qp", choices=("qp", "newton", "ccd"), help="(default: qp)"),
-    count("--count", None, "problems of every set (default: 6, 1 with --quick)"),
-)
-def ablation(arguments: argparse.Namespace) -> None:
-    """Measure and report."""
-    from wholebody.bench.suite import ablation
-
-    method, facts = arguments.method, machine()
-    given = ablation.problems(arguments.count or (1 if arguments.quick else 6), method)
-    whole, rows = ablation.ablation(method, given, ablation.mechanisms(method), print)
-    text = ablation.report(method, len(given), whole, rows, ablation.constants(method)[1], facts)
-    name = f"ablation-{method}"
-    publish(name, text, arguments, facts=facts, tables={name: rows})

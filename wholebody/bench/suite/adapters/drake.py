@@ -14,6 +14,7 @@ from wholebody.base.errors import InputError
 from wholebody.bench.suite.adapters.base import Adapter, OneCall, few
 from wholebody.bench.suite.adapters.loop import kept_apart, placements, posture_costs
 from wholebody.bench.suite.adapters.urdf import axis_of
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.methods.differential import TOOL
 from wholebody.problem import Problem
 from wholebody.tasks.inputs import Place
@@ -265,25 +266,16 @@ def _pose(place: pin.SE3) -> Any:
 
 def _shape(piece: Any, lower: float) -> tuple[Any, pin.SE3]:
     """A piece as a shape of drake's, and its placement; a half-space is lowered."""
-    from pydrake.geometry import Box, Capsule, Convex, Cylinder, Ellipsoid, Sphere
+    import pydrake.geometry as shapes
 
-    shape, place = piece.geometry, piece.placement
-    if isinstance(shape, coal.Sphere):
-        return Sphere(shape.radius), place
-    if isinstance(shape, coal.Capsule):
-        return Capsule(shape.radius, 2.0 * shape.halfLength), place
-    if isinstance(shape, coal.Cylinder):
-        return Cylinder(shape.radius, 2.0 * shape.halfLength), place
-    if isinstance(shape, coal.Box):
-        return Box(*(2.0 * np.array(shape.halfSide))), place
-    if isinstance(shape, coal.Ellipsoid):
-        return Ellipsoid(*np.array(shape.radii)), place
-    if isinstance(shape, coal.ConvexBase):
-        points = np.array([shape.point(k) for k in range(shape.num_points)])
-        return Convex(points.T.copy(), piece.name.replace("\n", " ")), place
-    if isinstance(shape, coal.Halfspace):
-        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), np.array(shape.n)).matrix()
-        edge = 50.0  # m: of the box that stands for a half-space
-        middle = (shape.d - lower - 0.5 * edge) * np.array(shape.n)
-        return Box(edge, edge, edge), place * pin.SE3(turn, middle)
-    raise InputError(f"{piece.name!r} is a {type(shape).__name__}; drake's plant is made for convex shapes")
+    place, (kind, lengths) = piece.placement, shape_of(piece.geometry)
+    if kind in ("sphere", "capsule", "cylinder", "box", "ellipsoid"):
+        return getattr(shapes, kind.capitalize())(*lengths), place
+    if kind == "hull":
+        points = np.array([piece.geometry.point(k) for k in range(piece.geometry.num_points)])
+        return shapes.Convex(points.T.copy(), piece.name.replace("\n", " ")), place
+    if kind == "half-space":
+        normal, edge = np.array(lengths[:3]), 50.0  # m: of the box that stands for a half-space
+        turn = pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), normal).matrix()
+        return shapes.Box(edge, edge, edge), place * pin.SE3(turn, (lengths[3] - lower - 0.5 * edge) * normal)
+    raise InputError(f"{piece.name!r} is a {kind}; drake's plant is made for convex shapes")

@@ -24,6 +24,25 @@ def coal_distance(first: Any, at: pin.SE3, second: Any, there: pin.SE3) -> float
     return float(coal.distance(first, put, second, other, coal.DistanceRequest(), coal.DistanceResult()))
 
 
+def shape_of(geometry: Any) -> tuple[str, list[float]]:
+    """Kind of a shape of coal and its lengths in metres, full ones and radii; the name of its class where not known.
+
+    Half-spaces n . x <= d have n and d, hulls nothing.
+    """
+    known: dict[Any, tuple[str, Callable[[Any], Any]]] = {
+        coal.Box: ("box", lambda shape: 2.0 * np.array(shape.halfSide)),
+        coal.Sphere: ("sphere", lambda shape: (shape.radius,)),
+        coal.Capsule: ("capsule", lambda shape: (shape.radius, 2.0 * shape.halfLength)),
+        coal.Cylinder: ("cylinder", lambda shape: (shape.radius, 2.0 * shape.halfLength)),
+        coal.Ellipsoid: ("ellipsoid", lambda shape: shape.radii),
+        coal.Halfspace: ("half-space", lambda shape: (*shape.n, shape.d)),
+    }
+    if isinstance(geometry, coal.ConvexBase):
+        return "hull", []
+    kind, lengths = known.get(type(geometry), (type(geometry).__name__, lambda shape: ()))
+    return kind, [float(length) for length in lengths(geometry)]
+
+
 class Occupied:
     """The space that a figure takes up in some postures.
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
-import coal
 import numpy as np
 import pinocchio as pin
 
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.errors import InputError
+from wholebody.bench.suite.problem_sets.things import shape_of
 from wholebody.bench.suite.published.rebuilt import VERSION
 from wholebody.figures.figure import Figure
 from wholebody.figures.urdf.writing import urdf_axis
@@ -29,21 +29,25 @@ def described(geometry: Any, meshes: Meshes, name: str) -> dict[str, Any]:
     """What a shape of coal is called in the files, its corners put among the meshes; InputError for others."""
     if geometry.getSweptSphereRadius() != 0.0:
         raise InputError(f"{name}: it has a rounding of {geometry.getSweptSphereRadius():g} m; publish it without")
-    if isinstance(geometry, coal.Box):
-        return {"type": "box", "size": [2.0 * float(half) for half in geometry.halfSide]}
-    if isinstance(geometry, coal.Sphere):
-        return {"type": "sphere", "radius": float(geometry.radius)}
-    if isinstance(geometry, coal.Capsule):
-        return {"type": "capsule", "radius": float(geometry.radius), "length": 2.0 * float(geometry.halfLength)}
-    if isinstance(geometry, coal.Ellipsoid):
-        return {"type": "ellipsoid", "semi_axes": [float(length) for length in geometry.radii]}
-    if isinstance(geometry, coal.Halfspace):
-        return {"type": "half-space", "normal": [float(x) for x in geometry.n], "offset": float(geometry.d)}
-    if isinstance(geometry, coal.ConvexBase):
+    kind, lengths = shape_of(geometry)
+    if kind == "hull":
         path = f"meshes/{name.replace(' ', '-').replace(':', '-')}.obj"
         meshes[path] = _obj(geometry)
         return {"type": "convex", "mesh": path}
-    raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+    match kind:
+        case "box":
+            said: dict[str, Any] = {"size": lengths}
+        case "sphere":
+            said = {"radius": lengths[0]}
+        case "capsule":
+            said = {"radius": lengths[0], "length": lengths[1]}
+        case "ellipsoid":
+            said = {"semi_axes": lengths}
+        case "half-space":
+            said = {"normal": lengths[:3], "offset": lengths[3]}
+        case _:
+            raise InputError(f"{name}: it is a {type(geometry).__name__}, which the files have no word for")
+    return {"type": kind, **said}
 
 
 def pose_of(place: pin.SE3) -> list[float]:

@@ -136,7 +136,7 @@ def page(rows: Sequence[Row], facts: Mapping[str, str], reaches: int) -> str:
     whole = sum(row.figures.get("solved") == reaches for row in loaded)
     about = (
         "# Robots\n\nWhich robot descriptions load, how long that takes, and whether the robots reach. The files come "
-        "from other people and are loaded without changes; `wholebody bench robots FOLDER --update-docs` writes "
+        "from other people and are loaded without changes; `python -m tests.audits robots FOLDER --update-docs` writes "
         f"this page.\n\n{len(loaded)} of {len(rows)} descriptions load; {whole} robots solve all of their {reaches} "
         "reaches. A reach moves the tip of a chain to where a random posture free of contact has it; it begins at the "
         "default posture, and the robot may not touch itself. The chains take turns, the longest first. First is the "

@@ -1,4 +1,4 @@
-"""`wholebody bench solve`: levels of modelling are judged in the finest model."""
+"""Levels of modelling are judged in the finest model."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import wholebody as wb
+from tests.audits import __main__ as audits
+from tests.audits import detail
+from tests.audits.detail import LEVELS, detail_summary, levels, of_figure
 from tests.csv_rows import csv_rows
-from wholebody.bench.measure import solve
 from wholebody.bench.measure.scaling import TIP, chain, task
-from wholebody.bench.measure.solve import LEVELS, detail_summary, levels, of_figure
 from wholebody.bench.rows import Row
 from wholebody.bench.suite.problem_sets.registry import SETS
-from wholebody.cli import main
 from wholebody.figures.state import State
 
 ERRORS = {"clearance missed mm": 0.0, "goal missed mm": 0.0}
@@ -66,9 +66,9 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         figures = {"status": "solved", "deepest mm": 0.0, "effort above %": 0.0, "a solve ms": 5.0}
         return [Row("clutter", f"hulls, {level}", {**figures, **SIZES, **ERRORS}) for level in LEVELS]
 
-    monkeypatch.setattr(solve, "detail_rows", rows)
+    monkeypatch.setattr(detail, "detail_rows", rows)
     (tmp_path / "results.md").write_text("<!-- bench:detail -->\n<!-- /bench:detail -->")
-    words = ["--parts", "detail", "--count", "1", "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
-    assert main(["bench", "solve", *words]) == 0
+    words = ["--count", "1", "--out", str(tmp_path / "out"), "--update-docs", str(tmp_path)]
+    assert audits.main(["detail", *words]) == 0
     assert len(csv_rows(tmp_path / "out" / "detail.csv")) == len(LEVELS)
     assert "whole body, spheres: not asked" in (tmp_path / "results.md").read_text()
