@@ -102,6 +102,7 @@ class Outside(SolvesAnew, ABC, Generic[Built]):
 
     name: ClassVar[str]
     kinds: ClassVar[tuple[type, ...]]
+    loose: ClassVar[tuple[Budget, ...]] = (*few(5, 10, 20), *LADDER)
 
     def __init__(self, tolerance: float, iterations: int | None = None) -> None:
         """Take a budget."""

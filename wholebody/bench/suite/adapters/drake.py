@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.bench.suite.adapters.base import Adapter, OneCall, few
+from wholebody.bench.suite.adapters.base import OneCall, few
 from wholebody.bench.suite.adapters.loop import kept_apart, placements, posture_costs
 from wholebody.bench.suite.adapters.urdf import axis_of
 from wholebody.bench.suite.problem_sets.things import shape_of
@@ -21,20 +21,11 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
 
-def drake_adapter() -> Adapter:
-    """The method: InverseKinematics of drake."""
-    return Adapter(
-        name="drake",
-        make=Drake,
-        prepare=Drake.prepare,
-        loose=(*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5))),
-    )
-
-
 class Drake(OneCall["_Plant"]):
     """drake's InverseKinematics as a method; its iterations are SNOPT's major ones."""
 
     name = "drake"
+    loose = (*few(10, 20, 50), *((tolerance, None) for tolerance in (1e-2, 1e-3, 1e-4, 1e-5)))
     kinds = (
         wb.Displacement, wb.Effort, wb.Frame, wb.Freeze, wb.Hold, wb.Orientation, wb.Point, wb.Relative, wb.StepLimit,
     )  # fmt: skip

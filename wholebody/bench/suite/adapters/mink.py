@@ -9,7 +9,6 @@ import numpy as np
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.base import LADDER, Adapter, few
 from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, placements, size
 from wholebody.bench.suite.adapters.tasks import TaskStepper, TaskTool
 from wholebody.bench.suite.adapters.urdf import Frames, mjcf, own_frame
@@ -19,13 +18,8 @@ from wholebody.tasks.inputs import Place
 from wholebody.tasks.residuals import PlacementResidual
 
 
-def mink_adapter() -> Adapter:
-    """The kinematics of mink in our loop, with holds as heavy soft tasks."""
-    return Adapter("mink", MinkLoop, (*few(5, 10, 20), *LADDER), MinkLoop.prepare)
-
-
-class MinkLoop(Loop):
-    """Steps of mink."""
+class Mink(Loop):
+    """Steps of mink, with holds as heavy soft tasks."""
 
     name = "mink"
     kinds = (*Loop.kinds, wb.Axis)
@@ -38,7 +32,7 @@ class MinkLoop(Loop):
 
 
 class _MinkStepper(TaskStepper):
-    def __init__(self, problem: Problem, loop: type[MinkLoop]) -> None:
+    def __init__(self, problem: Problem, loop: type[Mink]) -> None:
         import mink
 
         super().__init__(problem, mink)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar
+from typing import Any
 
 import coal
 import numpy as np
@@ -11,7 +11,7 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY, LADDER, Adapter, few
+from wholebody.bench.suite.adapters.base import FEASIBILITY_ONLY
 from wholebody.bench.suite.adapters.loop import Loop, Stepper, kept_apart, longest_moves, size
 from wholebody.bench.suite.adapters.tasks import TaskStepper, TaskTool
 from wholebody.problem import Problem
@@ -21,41 +21,27 @@ from wholebody.tasks.residuals import PlacementResidual
 NEAREST = 20  # pairs that its barrier looks at; it gets slower with more
 
 
-def pink_adapter() -> Adapter:
-    """The kinematics of pink in our loop."""
-    return Adapter(
-        name="pink",
-        make=_pink,
-        prepare=PinkLoop.prepare,
-        loose=(*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *few(5, 10, 20), *LADDER),
-    )
-
-
-def _pink(tolerance: float, iterations: int | None) -> Loop:
-    return SafePinkLoop(tolerance) if iterations == FEASIBILITY_ONLY else PinkLoop(tolerance, iterations)
-
-
-class PinkLoop(Loop):
+class Pink(Loop):
     """Steps of pink."""
 
     name = "pink"
-    safe: ClassVar[float] = 0.0  # gain of the barrier's cost of leaving a safe displacement, which here is no motion
     longest = 0.0125  # twice that leaves pink no solution more often
     margin = 3.5e-4
+    loose = (*((tolerance, FEASIBILITY_ONLY) for tolerance in (1e-2, 1e-3, 1e-4)), *Loop.loose)
+
+    def __init__(self, tolerance: float, iterations: int | None = None) -> None:
+        """Take a budget; feasibility only has pink's default gain of leaving a safe displacement, here no motion."""
+        safe = iterations == FEASIBILITY_ONLY
+        super().__init__(tolerance, None if safe else iterations)
+        self.safe = float(safe)  # faster, and of more effort
 
     def build(self, problem: Problem) -> Stepper:
         """Copy our models."""
-        return _PinkStepper(problem, type(self))
-
-
-class SafePinkLoop(PinkLoop):
-    """The same with pink's default of that gain: faster, and of more effort."""
-
-    safe = 1.0
+        return _PinkStepper(problem, self)
 
 
 class _PinkStepper(TaskStepper):
-    def __init__(self, problem: Problem, loop: type[PinkLoop]) -> None:
+    def __init__(self, problem: Problem, loop: Pink) -> None:
         import pink
 
         super().__init__(problem, pink)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 
 import numpy as np
 import pinocchio as pin
@@ -15,25 +15,16 @@ import pinocchio as pin
 import wholebody as wb
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.bench.measure.track import SETTING, Track
-from wholebody.bench.suite.adapters.base import LADDER, Adapter, Tool, few, made
+from wholebody.bench.suite.adapters.base import Tool
 from wholebody.bench.suite.adapters.urdf import own_frame
+from wholebody.methods.placo.method import Placo
 from wholebody.methods.placo.robot import Robot
 from wholebody.problem import Problem
 from wholebody.scene.geometry_model import SceneGeometry
 
 
-def placo_adapter(variant: str = "") -> Adapter:
-    """The adapter to placo's kinematics solver; with the pairs of a figure "pruned"."""
-    return Adapter(
-        name=f"placo/{variant}".removesuffix("/"),
-        make=partial(made, PrunedPlaco if variant else wb.methods.Placo, {}),
-        prepare=wb.methods.Placo.prepare,
-        loose=(*few(5, 10, 20), *LADDER),
-    )
-
-
 @dataclass(frozen=True)
-class PrunedPlaco(wb.methods.Placo):
+class PrunedPlaco(Placo):
     """placo without the pairs of a figure with itself that do not come near: what its users prune in a robot's file."""
 
     def pairs(self, problem: Problem) -> Indices:
