@@ -32,13 +32,7 @@ Source = Clip | str | os.PathLike[str]
 
 
 class BatchProgress(NamedTuple):
-    """Told when a case is done.
-
-    Attributes:
-        done: cases, those of an earlier run included.
-        total: how many there are in all.
-        case: the one that was done last; None before the first.
-    """
+    """Told when a case is done: how many are, those of an earlier run included, of how many, and which was the last."""
 
     done: int
     total: int

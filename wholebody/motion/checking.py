@@ -226,11 +226,7 @@ def joint_jerk(clip: Clip) -> Array:
 
 
 def same_joints(clip: Clip, figure: Figure, what: str) -> None:
-    """Check that a scene's figure takes the postures of a clip.
-
-    Raises:
-        InputError: it has other joints.
-    """
+    """Raise `InputError` if a figure does not take the postures of a clip."""
     if figure.joints != clip.names or figure.model.nq != clip.q.shape[1]:
         raise InputError(
             f"{what}: the scene is of {figure.name}, which has other joints than {clip.figure.name} of {clip.name}; "

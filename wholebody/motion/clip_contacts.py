@@ -61,12 +61,7 @@ class ContactTable:
     """Depths of all pairs of owners, filled frame by frame."""
 
     def __init__(self, scene: Scene, frames: int) -> None:
-        """Number the pairs of owners of a scene.
-
-        Args:
-            scene: the scene.
-            frames: number of frames of the clip.
-        """
+        """Number the pairs of owners of a scene."""
         owners, numbers = scene.piece_owner, dict[tuple[str, str], int]()
         pairs = scene.pair_table.pairs
         named = [(owners[a], owners[b]) for a, b in pairs.tolist()]
@@ -107,16 +102,7 @@ class ContactTable:
 
 
 def contact(first: str, second: str, kind: Kind, depth: Array, between: Array, tolerance: float) -> Contact:
-    """The contact of two owners from their depths, of which one is beyond the tolerance.
-
-    Args:
-        first: a segment or thing.
-        second: the other one.
-        kind: see `Contact`.
-        depth: (n,) in each frame, metres.
-        between: (n - 1,) in each gap, metres.
-        tolerance: metres.
-    """
+    """The contact of two owners, of depths in frames (n,) and gaps (n - 1,), one of them beyond the tolerance."""
     # frames and gaps in the order of time: 2 k is frame k, 2 k + 1 the gap after it
     times = np.zeros(2 * len(depth) - 1)
     times[::2], times[1::2] = depth, between

@@ -93,11 +93,7 @@ class Torques:
         return found
 
     def joint_of(self, column: int) -> str:
-        """Name of the joint of a column of `torque`.
-
-        Raises:
-            InputError: there is no such column.
-        """
+        """Name of the joint of a column of `torque`."""
         column = checks.whole(column, "column", 0, self.figure.model.nv - 1)
         for name in self.figure.joints:
             joint = self.figure.model.joints[self.figure.joint_id(name)]
@@ -177,15 +173,7 @@ def torques(
 def clip_torques(
     clip: Clip, stands: Mapping[str, Mask], strength: Strength, friction: float, cutoff: float | None
 ) -> Torques:
-    """Torques of a clip that stands on given feet in given frames; see `torques`.
-
-    Args:
-        clip: the motion.
-        stands: foot -> (n,) frames in which it stands.
-        strength: of the person.
-        friction: coefficient.
-        cutoff: Hz, or None.
-    """
+    """Torques of a clip that stands on given feet in given frames (foot -> (n,)); see `torques`."""
     figure, steady = clip.figure, smoothed(clip, cutoff)
     v, a = steady.velocities(), steady.accelerations()
     dynamics = InverseDynamics(figure, tuple(stands), friction)
@@ -269,7 +257,7 @@ PLACE = 2e-3
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """Loads before and after.
+    """Loads before and after a change.
 
     Attributes:
         before: torques of the clip as it was.
@@ -343,14 +331,6 @@ class LoadChange:
 def load_change(
     before: Torques, after: Clip, places: Array | None, strength: Strength, feet: Sequence[str]
 ) -> LoadChange:
-    """Compare the loads of a clip before and after a change, both as `wb.motion.torques` measures them.
-
-    Args:
-        before: torques of the clip as it was.
-        after: what was made of it.
-        places: (m,) place of each frame of it in the frames before; None for the same ones.
-        strength: of the person.
-        feet: segments that may stand.
-    """
+    """Compare the loads of a clip before and after a change, whose frames are at places (m,) of those before."""
     places = np.arange(len(after), dtype=np.float64) if places is None else places
     return LoadChange(before, torques(after, feet=feet, strength=strength), places)

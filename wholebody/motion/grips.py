@@ -33,10 +33,7 @@ SHARES = (0.25, 0.5, 0.75)  # of the way to the next frame: these places
 
 
 class _Row(NamedTuple):
-    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,).
-
-    A shift along the normal parts it.
-    """
+    """A near pair at a place (1.25: a quarter of the way from frame 1 to 2), its distance (m), and the normal (3,)."""
 
     place: float
     distance: float
@@ -44,11 +41,7 @@ class _Row(NamedTuple):
 
 
 class _Grip:
-    """Pieces that are rigid with a frame, and those with the frame that it is held at.
-
-    Attributes:
-        model: Pinocchio's model of the figure.
-    """
+    """Pieces that are rigid with a frame, and those with the frame that it is held at."""
 
     def __init__(self, scene: Scene, term: Hold) -> None:
         model, table = scene.model, scene.pair_table
@@ -72,10 +65,7 @@ class _Grip:
         return way / length if length > 0.0 else way
 
     def rows(self, place: float, q: Array, shift: Array, clearance: float) -> list[_Row]:
-        """Near pairs at a posture (nq,) with a shift (3,) in the axes of the other frame.
-
-        Their distances are less the clearance, metres.
-        """
+        """Near pairs at a posture (nq,) with a shift (3,) in the other frame's axes, less the clearance, metres."""
         if not self._pairs:
             return []
         pin.forwardKinematics(self.model, self._data, q)
@@ -97,15 +87,7 @@ class _Grip:
 
 
 def grip_shifts(scene: Scene, q: Array, dt: float, term: Hold, clearance: float = 0.0) -> Array:
-    """(n, 3) shifts of a grip in the axes of the frame that it is relative to, metres; zero where nothing is too near.
-
-    Args:
-        scene: figure and things.
-        q: (n, nq) original postures.
-        dt: seconds from frame to frame.
-        term: holds a frame where it is at another one of the figure in each posture.
-        clearance: least distance of every pair, metres.
-    """
+    """(n, 3) shifts of a grip in the axes of the frame it is relative to, metres; zero where nothing is too near."""
     grip, shifts = _Grip(scene, term), np.zeros((len(q), 3))
     depths = np.array([_deepest(grip.rows(frame, one, shifts[frame], clearance)) for frame, one in enumerate(q)])
     overlap = 5e-5  # m: a grip that is nearer than asked by no more stays as it is
@@ -147,10 +129,7 @@ def _over_frames(row: _Row, count: int) -> Array:
 
 
 def _window(grip: _Grip, window: Window, passing: Sequence[int], q: Array, dt: float, clearance: float) -> Array | None:
-    """(frames, 3) shifts of a window; None where none is found that parts everything.
-
-    `passing` are the frames of it whose grips pass each other on the way to the next frame.
-    """
+    """(frames, 3) shifts of a window; None where none part all. Grips pass each other after frames in `passing`."""
     import scipy.sparse as sp
 
     from wholebody.motion.trajectory.interior_point import BandedQP, minimise

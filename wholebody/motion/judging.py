@@ -95,12 +95,7 @@ class AvoidanceReport:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Avoided:
-    """The answer of `avoid`.
-
-    Attributes:
-        clip: the clip that the method made.
-        report: what is known of it.
-    """
+    """The answer of `avoid`: the clip that the method made, and the report on it."""
 
     clip: Clip
     report: AvoidanceReport
@@ -118,17 +113,7 @@ def judged(
     was: ClipCheck, terms: FrameTerms, asked: MotionBounds, result: MethodResult, work: Work, method: str,
     loads: LoadChange | None = None,
 ) -> AvoidanceReport:  # fmt: skip
-    """The report on what a method made of a clip; its wall time is not known here.
-
-    Args:
-        was: check of the clip before.
-        terms: what holds in its frames.
-        asked: bounds on jerk, speed and deviation, resolved for it.
-        result: what the method made of it.
-        work: what that took.
-        method: name of the method.
-        loads: before and after, where they are asked for.
-    """
+    """The report on what a method made of a clip, of its check before, what holds in it, and what is asked of it."""
     before, after = was.clip, was.clip.with_q(result.q)
     now = check(after, terms.scene, depth=COLLISION)
     times = before.times if result.times is None else result.times

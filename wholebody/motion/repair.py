@@ -56,12 +56,7 @@ SETTINGS = RepairSettings()
 
 
 def repaired(run: Run, q: Array) -> Array:
-    """Postures (n, nq) with less that is wrong; others are the given ones but for those beside something passed.
-
-    Args:
-        run: of the clip; is told of every window.
-        q: (n, nq) postures; they stay as they are.
-    """
+    """Postures (n, nq) with less that is wrong than in q, which stay but near faults and beside what is passed."""
     q = one_sided(run, np.array(q))
     for number in range(SETTINGS.rounds):
         found = run.faults(q)
@@ -123,25 +118,14 @@ def _repair(run: Run, window: Window, q: Array) -> bool:
 
 
 class Smoothed(NamedTuple):
-    """Smoother postures.
-
-    Attributes:
-        q: (n, nq) postures; the given ones where none are found that are as free.
-        windows: how many windows were made smooth.
-    """
+    """Postures (n, nq), the given ones where none are found that are as free, and how many windows were made smooth."""
 
     q: Array
     windows: int
 
 
 def smoothed(run: Run, q: Array, asked: MotionBounds) -> Smoothed:
-    """Make postures smooth where they are beyond bounds on jerk, speed and deviation.
-
-    Args:
-        run: of the clip; is told of every window.
-        q: (n, nq) postures made of it; they stay as they are.
-        asked: bounds, resolved for the clip.
-    """
+    """Make postures q (n, nq) smooth, in a copy, where they are beyond resolved bounds on jerk, speed and deviation."""
     q, count, clip, terms = np.array(q), 0, run.clip, run.terms
     beyond = excess(clip, clip.with_q(q), asked).beyond
     if not beyond.any():

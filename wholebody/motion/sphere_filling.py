@@ -30,22 +30,13 @@ UNCOVERED = 3.0  # weight of a volume that is uncovered against one that protrud
 
 @dataclass(frozen=True, eq=False)
 class Spheres(Shape):
-    """A union of balls.
-
-    Attributes:
-        centers: (n, 3) metres.
-        radii: (n,) metres.
-    """
+    """A union of balls: centers (n, 3) and radii (n,), metres; `InputError` for none, other shapes, or no lengths."""
 
     centers: Array
     radii: Array
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: no sphere, other shapes, or a radius that is no length.
-        """
+        """Check the values."""
         centers = array(self.centers, "Spheres centers", "an array of shape (n, 3)").copy()
         radii = array(self.radii, "Spheres radii", "an array of shape (n,)").copy()
         if radii.ndim != 1 or not len(radii) or centers.shape != (len(radii), 3) or not np.isfinite(centers).all():
@@ -142,11 +133,7 @@ def fill_with_spheres(shape: Shape, count: int, *, envelope: bool = False) -> Sp
 
 
 def triangles_of(shape: Shape) -> tuple[Array, Faces]:
-    """Vertices (n, 3) and triangles (m, 3) of the surface of a solid, metres.
-
-    Raises:
-        InputError: a shape without a surface of triangles.
-    """
+    """Vertices (n, 3) and triangles (m, 3) of the surface of a solid, metres; `InputError` for a shape without any."""
     import trimesh
 
     if isinstance(shape, Mesh):
@@ -186,8 +173,7 @@ class _Grid:
 def _winding(corners: Array, xs: Array, ys: Array, zs: Array) -> Array:
     """How often the surface of triangles (m, 3, 3) winds about the points of a grid, (x, y, z).
 
-    A ray goes up from every point: a face that it leaves through counts 1, one that it enters through -1. Parts that
-    touch or overlap are right too, and nothing but signs of areas decides.
+    A ray goes up from every point: a face that it leaves through counts 1, one that it enters through -1.
     """
     crossed = np.zeros((len(xs), len(ys), len(zs) + 1))
     for a, b, c in corners:

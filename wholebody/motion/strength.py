@@ -71,11 +71,7 @@ class Strength:
 
 
 def torque_limits(figure: Figure, strength: Strength) -> tuple[Array, Array]:
-    """Least and largest torques (nv,) of a figure's joints, N m; infinite where none is known.
-
-    Those of a person are published strength; those of a figure whose joints have none are the effort limits of its
-    description.
-    """
+    """Least and largest torques (nv,), N m: published strength, else the effort limits; infinite for none."""
     lower, upper = strength.limits(figure)
     if np.isfinite(lower).any() or np.isfinite(upper).any():
         return lower, upper

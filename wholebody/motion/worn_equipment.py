@@ -58,11 +58,7 @@ class Equipment:
     filling: SphereFilling | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
-        """Check the values.
-
-        Raises:
-            InputError: a value of the wrong kind or range.
-        """
+        """Check the values."""
         where = f"Equipment {text(self.name, 'Equipment: name')!r}"
         instance(self.shape, Shape, f"{where}: shape", "give wb.Mesh('pack.obj'), wb.Box or another")
         text(self.to, f"{where}: to")
@@ -163,11 +159,7 @@ def group_of(figure: Figure, segment: str) -> tuple[str, ...]:
 
 
 def bounds(shape: Shape) -> tuple[Array, Array]:
-    """Least and greatest corner (3,) of a shape's bounding box, metres.
-
-    Raises:
-        InputError: it has none, as a half-space.
-    """
+    """Least and greatest corner (3,) of a shape's bounding box, metres; `InputError` for a half-space."""
     extents = [
         _along(piece.geometry, piece.placement, axis)
         for axis in np.vstack([np.eye(3), -np.eye(3)])
@@ -310,11 +302,7 @@ def put_on(scene: Scene, worn: Worn) -> Scene:
 
 
 def label(worn: Worn) -> str:
-    """Name of what is worn, for tables and files.
-
-    Raises:
-        InputError: it is nothing of these.
-    """
+    """Name of what is worn, for tables and files."""
     if isinstance(worn, tuple) and worn:
         return "+".join(label(one) for one in worn)
     if isinstance(worn, Equipment):
@@ -328,12 +316,7 @@ def _names(worn: object) -> list[str]:
 
 
 def torus_mesh(radius: float, tube: float) -> tuple[Array, NDArray[np.int64]]:
-    """A torus about z of convex closed sections, as vertices and triangles.
-
-    Args:
-        radius: of the circle of centres, metres.
-        tube: radius of its cross-section, metres.
-    """
+    """A torus about z of convex closed sections: vertices and triangles; radii of its circle and its tube, metres."""
     sections, corners = 16, 12  # convex sections, and corners of each
     turn = 2.0 * np.pi * np.arange(corners) / corners
     ring = np.stack([radius + tube * np.cos(turn), np.zeros(corners), tube * np.sin(turn)], axis=1)

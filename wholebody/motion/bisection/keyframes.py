@@ -12,13 +12,7 @@ from wholebody.motion.windows import runs
 
 
 class Group(NamedTuple):
-    """Consecutive frames, the last one included.
-
-    Attributes:
-        first: the first frame.
-        last: the last frame.
-        middle: the frame that bisects what collides.
-    """
+    """Consecutive frames, the last one included, and the one of them that bisects what collides."""
 
     first: int
     last: int
@@ -26,14 +20,9 @@ class Group(NamedTuple):
 
 
 def collision_groups(bad: Mask, low: int, high: int, share: float = 0.0, least: int = 1) -> list[Group]:
-    """Groups of the frames that collide between two frames that stay; those that overlap or touch are one.
+    """Groups of the frames (n,) that collide strictly between two that stay; those that overlap or touch are one.
 
-    Args:
-        bad: (n,) which frames collide.
-        low: the frame before the first one that may change.
-        high: the frame after the last one that may change.
-        share: of the number of frames in a run, by which it is widened to each side.
-        least: number of frames that a group has at least, where there is room.
+    A run is widened to each side by a share of its number of frames, and to `least` frames where there is room.
     """
     first, last = low + 1, high - 1
     found: list[tuple[int, int, list[tuple[int, int]]]] = []
@@ -96,16 +85,10 @@ def fill(model: pin.Model, q: Array, a: int, m: int, b: int, kind: Kind) -> None
 
 
 def key_frames(model: pin.Model, q: Array, moving: Mask, deviation: float) -> tuple[int, ...]:
-    """Frames between which linear interpolation misses no frame by more than a deviation.
+    """Frames of q (n, nq) between which linear interpolation misses no frame by more than a deviation, rad and m.
 
     An interval is split at the frame that is missed most (Ramer 1972; Douglas and Peucker 1973), from the whole motion
-    on. The first and the last frame are among them.
-
-    Args:
-        model: Pinocchio's model.
-        q: (n, nq) postures.
-        moving: (nv,) the degrees of freedom that count.
-        deviation: radians and metres.
+    on; `moving` (nv,) marks the degrees of freedom that count. The first and the last frame are among them.
     """
     found, waiting = {0, len(q) - 1}, [(0, len(q) - 1)]
     while waiting:

@@ -70,12 +70,7 @@ class Bisection:
     short: int = 25
 
     def __post_init__(self) -> None:
-        """Check the settings.
-
-        Raises:
-            InputError: a setting out of range.
-            UnknownNameError: no such method.
-        """
+        """Check the settings."""
         if self.evaluation is not None:
             frames = listed(self.evaluation, "Bisection: evaluation", "[0, 12, 40]")
             checked = tuple(whole(frame, "Bisection: evaluation", 0, MOST_FRAMES) for frame in frames)
@@ -94,12 +89,7 @@ class Bisection:
         method_for_motions(self.method)
 
     def avoid(self, run: Run) -> MethodResult:
-        """Free a clip; see `wholebody.motion.avoider.Avoider`.
-
-        Raises:
-            InputError: an evaluation point beyond the clip's frames.
-            UnknownNameError: a plane or a frozen joint names what the figure does not have.
-        """
+        """Free a clip; see `wholebody.motion.avoider.Avoider`."""
         figure = run.scene.figure
         for frame in self.evaluation or ():
             whole(frame, f"Bisection: evaluation, {run.clip.name}", 0, len(run.clip) - 1)
@@ -137,13 +127,12 @@ class Bisection:
 class Recursion:
     """The recursion of figure 3.2 of the thesis: predict a middle frame, interpolate beside it, go into both halves.
 
-    Every frame that was predicted is a key: it does not change again, and groups end at keys. So the recursion ends
-    after at most one prediction a frame.
+    Groups end at frames that were predicted, so it ends after at most one prediction a frame.
 
     Attributes:
         q: (n, nq) the present postures.
         bad: (n,) which of them overlap.
-        keys: frames that were predicted and are free, and evaluation points.
+        keys: frames that were predicted and are free, and evaluation points; they do not change again.
         stuck: frames whose prediction failed.
     """
 
@@ -165,12 +154,7 @@ class Recursion:
         self.stuck: set[int] = set()
 
     def free(self, evaluation: Iterable[int], *, whole: bool = True) -> None:
-        """Free the evaluation points and both ends, then everything between them.
-
-        Args:
-            evaluation: frames.
-            whole: go on where a frame cannot be freed; else that ends it.
-        """
+        """Free the evaluation points and both ends, then all between; `whole`: also after a frame that is stuck."""
         self._whole = whole
         last = len(self.q) - 1
         points = sorted({0, last, *evaluation})
@@ -293,10 +277,7 @@ class Recursion:
 
 
 def hold_between(recursion: Recursion, predictor: Predictor) -> None:
-    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found.
-
-    Steps of the tracker find most; what they do not find is predicted.
-    """
+    """Move interpolated frames to the nearest posture in which everything holds, in place, where one is found."""
     run = predictor.run
     changed = np.flatnonzero((run.terms.q != recursion.q).any(axis=1)).tolist()
     for done, frame in enumerate(changed):

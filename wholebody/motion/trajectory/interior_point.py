@@ -57,13 +57,7 @@ class BandedQP(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """Of a program.
-
-    Attributes:
-        z: (n,) the minimiser, within `least` and `most`; finite.
-        solved: whether the conditions of optimality hold.
-        iterations: of the method.
-    """
+    """The minimiser (n,) of a program, finite and within `least` and `most`; whether it is optimal; iterations."""
 
     z: Array
     solved: bool
@@ -143,11 +137,7 @@ def _without(fixed: Mask, program: BandedQP, accuracy: float, gap: float) -> Ans
 
 
 class _Bounds:
-    """All bounds as A z >= a: rows from below and above, and unknowns from below and above.
-
-    Attributes:
-        a: (k,).
-    """
+    """All bounds as A z >= a (k,): rows from below and above, and unknowns from below and above."""
 
     def __init__(self, program: BandedQP) -> None:
         lower, upper, least, most = program.lower, program.upper, program.least, program.most
@@ -192,12 +182,9 @@ class _Matrices:
     """The matrices of a program, split into banded unknowns and slacks.
 
     Attributes:
-        P: (n, n).
-        G: (m, n).
-        transposed: (n, m) of G.
+        P, G, transposed: (n, n), (m, n) and (n, m) of G.
         slack: indices of the slacks.
-        share: (m, slacks) columns of G of the slacks.
-        rows: (m, n - slacks) the other columns.
+        share, rows: (m, slacks) columns of G of the slacks, and the other columns.
         sums, columns: these two transposed.
     """
 
@@ -223,10 +210,7 @@ class _Matrices:
         self._K = np.empty_like(self._base)  # one for all iterations: fresh memory of this size costs time
 
     def factor(self, rows: Array, unknowns: Array) -> _Factor | None:
-        """Of K, with weights (m,) of the rows and (n,) of the unknowns; None where it is singular.
-
-        It takes the memory of the factor before.
-        """
+        """Of K, with weights (m,) of rows and (n,) of unknowns, in the last one's memory; None where singular."""
         own = self._own + unknowns[self.slack]
         shared = self._squares @ rows
         weights = rows.copy()
@@ -300,17 +284,7 @@ class _Factor(NamedTuple):
 
 
 class _Newton(NamedTuple):
-    """Newton's equations at one point.
-
-    Attributes:
-        matrices: of the program.
-        bounds: of the program.
-        factor: of K.
-        derivative: (n,) of the Lagrangian.
-        missed: (k,) A z - a - s.
-        s: (k,) slacks.
-        y: (k,) multipliers.
-    """
+    """Newton's equations at slacks s and multipliers y (k,): the Lagrangian's derivative (n,), and A z - a - s (k,)."""
 
     matrices: _Matrices
     bounds: _Bounds
@@ -331,10 +305,7 @@ class _Newton(NamedTuple):
 
 
 def _slacks(P: Any, G: Any, unbounded: Mask) -> Mask:
-    """(n,) unknowns that P does not couple with others, of each row the last of them: no row has two slacks.
-
-    Only those that are unbounded above (n,): a slack begins where its rows are met.
-    """
+    """(n,) unknowns, unbounded above, that P does not couple with others, of each row the last."""
     alone: Mask = (np.diff(P.indptr) == 1) & (P.diagonal() != 0.0) & (np.diff(G.indptr) > 0) & unbounded
     found = np.flatnonzero(alone)
     shares = sp.coo_array(G[:, found])

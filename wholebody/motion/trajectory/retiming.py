@@ -27,14 +27,7 @@ SPREAD = 0.2
 
 
 class TimedRows(NamedTuple):
-    """Loads that are linear in b and in its derivative: ``gap + speed b + change b' >= 0``.
-
-    Attributes:
-        frame: (r,) frame of each row.
-        gap: (r,) what does not depend on the timing.
-        speed: (r,) derivative with respect to b.
-        change: (r,) derivative with respect to b', seconds.
-    """
+    """Loads that are linear in b and its derivative, of frames (r,): ``gap + speed b + change b' >= 0``, all (r,)."""
 
     frame: Indices
     gap: Array
@@ -45,11 +38,8 @@ class TimedRows(NamedTuple):
 def slowed(most: Array, dt: float, stretch: float, loads: TimedRows | None = None) -> Array:
     """(n,) squares of the rate at which each frame is passed: 1 where the timing stays, else less.
 
-    Args:
-        most: (n,) bounds on it that speed limits give.
-        dt: seconds from frame to frame.
-        stretch: by which factor the clip may be slowed at most, anywhere; more than 1.
-        loads: further rows; what cannot be met is missed by as little as can be.
+    Speed limits bound it by `most` (n,), and `stretch` is by how much the clip may be slowed, more than 1. What cannot
+    be met of further rows is missed by as little as can be.
     """
     count = len(most)
     least = 1.0 / stretch**2
@@ -91,13 +81,7 @@ def _rate(count: int, dt: float) -> sp.csr_matrix:
 
 
 def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
-    """(n,) largest squares of the rate with which every motion between frames keeps to its bounds.
-
-    Args:
-        steps: (n - 1, nv) motion from each frame to the next.
-        slowest: (n - 1, nv) or (nv,) its negative bounds, for the time of a frame.
-        fastest: the same, positive.
-    """
+    """(n,) largest squares of the rate with which every motion (n - 1, nv) keeps to negative and positive bounds."""
     bound = np.where(steps < 0.0, slowest, fastest)
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(steps != 0.0, bound / steps, np.inf)
@@ -108,25 +92,16 @@ def speed_bounds(steps: Array, slowest: Array, fastest: Array) -> Array:
 
 
 class Timing(NamedTuple):
-    """A new timing.
-
-    Attributes:
-        times: (m,) seconds of the clip as it is, for each frame of the slowed clip, `dt` apart.
-        largest: factor by which the clip is slowed most, anywhere.
-    """
+    """Seconds of the clip as it is for each frame (m,) of the slowed one, and by what factor it is slowed most."""
 
     times: Array
     largest: float
 
 
 def timing(b: Array, dt: float) -> Timing | None:
-    """When each frame of the slowed clip is, in the time of the clip as it is; None where its timing stays.
+    """When each frame of the slowed clip is, by squares of the rate b (n,), linear in between; None where timing stays.
 
     The duration becomes a multiple of the time step; for that everything is slowed by less than one step in all.
-
-    Args:
-        b: (n,) squares of the rate at each frame; linear in between.
-        dt: seconds from frame to frame, of both.
     """
     if len(b) < 2 or (b >= 1.0 - 1e-3).all():  # it is slowed by next to nothing
         return None

@@ -164,14 +164,7 @@ class WindowProgram:
     """
 
     def __init__(self, evaluator: NodeEvaluator, objective: Objective, limits: Limits, iterations: int) -> None:
-        """Take what is needed.
-
-        Args:
-            evaluator: of the rows at nodes.
-            objective: of the window.
-            limits: of its deviations.
-            iterations: most steps of one run; a step takes one to three programs.
-        """
+        """Take what is needed; a run has at most so many steps, of one to three programs each."""
         self._evaluator, self._objective, self._limits = evaluator, objective, limits
         self._iterations = iterations
         self.nodes = evaluator.nodes()
@@ -299,10 +292,7 @@ class WindowProgram:
 
 
 def _stalled(missed: Sequence[float]) -> bool:
-    """Whether the last three steps left more than 80 % of the worst shortfall, and brought less than they asked for.
-
-    What was within a centimetre is on the right side, and has contacts that bend.
-    """
+    """Whether the last three steps left more than 80 % of the worst shortfall, and brought less than they asked for."""
     if len(missed) <= 3 or min(missed) <= 0.01:
         return False
     before = min(missed[:-3])

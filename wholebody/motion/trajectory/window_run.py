@@ -58,12 +58,7 @@ SETTINGS = WindowSettings()
 
 
 class WindowResult(NamedTuple):
-    """Postures of a window.
-
-    Attributes:
-        q: (n, nq) postures.
-        missed: what did not succeed; empty where all did.
-    """
+    """Postures (n, nq) of a window, and what did not succeed; empty where all did."""
 
     q: Array
     missed: str
@@ -148,16 +143,7 @@ class ClipRun:
         cancel: Callable[[float], bool],
         margin: float,
     ) -> tuple[Window, WindowResult]:
-        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes.
-
-        Args:
-            window: that was not freed.
-            freed: what was found for it.
-            q: (n, nq) postures of the clip, with these.
-            found: what is wrong with the reference.
-            cancel: as for `window`.
-            margin: seconds before and after.
-        """
+        """A window that was not freed once more, on one side of what it passes, for as many frames as that takes."""
         for begun in (self._reference, q):
             gaps = dipping(self._run.workspace, begun, range(window.first, window.end - 1))
             kept = kept_beside(self._run, Window(0, len(q)), begun, gaps)
@@ -320,10 +306,9 @@ class ClipRun:
         return _Attempt(x, found.worst, dipping, found.objective, between=program.between)
 
     def _dips(self, own: _Window, x: Array, dipped: set[int], met: bool) -> list[Node]:
-        """Places between frames with deviations x (n, nv) where motions dip, and beside them.
+        """Places between frames with deviations x (n, nv) where motions dip, and beside; everywhere in gaps `dipped`.
 
-        Gaps in `dipped`, which those that dip now join, have places everywhere. Where nothing is missed in frames
-        (`met`) what nearly dips is told too.
+        Those that dip now join these. Where nothing is missed in frames (`met`) what nearly dips is told too.
         """
         q, gaps = own.chart.postures(x), own.moved(x)
         swept = dips(self._run.workspace, q, gaps)
