@@ -222,7 +222,7 @@ def _jerk_ratios(before: Clip, after: Clip) -> Array:
     old, new = (third_differences(model, clip.q, dt) for clip in (before, after))
     found = np.zeros(len(old))
     for part in _parts(before):
-        squares = [_mean_near(root_mean_square(each[:, part]) ** 2, dt) for each in (old, new)]
+        squares = [np.nanmean(_near(root_mean_square(each[:, part]) ** 2, dt, np.nan), axis=1) for each in (old, new)]
         plain = PLAIN_JERK**2 / max(1, old[:, part].shape[1])
         usual = max(plain, float((old[:, part] ** 2).mean()) if old[:, part].size else 0.0)
         found = np.maximum(found, np.sqrt(squares[1] / np.maximum(squares[0], usual)))
@@ -235,7 +235,7 @@ def _speed_ratios(before: Clip, after: Clip) -> Array:
     old, new = (np.abs(velocities(model, clip.q, dt)) for clip in (before, after))
     found = np.zeros(len(old))
     for part in _parts(before):
-        most = _largest_near(old[:, part].max(axis=1, initial=0.0), dt)
+        most = _near(old[:, part].max(axis=1, initial=0.0), dt, 0.0).max(axis=1)
         found = np.maximum(found, new[:, part].max(axis=1, initial=0.0) / np.maximum(most, PLAIN_SPEED))
     return found
 
@@ -245,24 +245,9 @@ def _parts(clip: Clip) -> tuple[slice, ...]:
     return (slice(0, 6), slice(6, None)) if clip.figure.root == "free" else (slice(None),)
 
 
-def _mean_near(values: Array, dt: float) -> Array:
-    """(k,) the mean of values (k,) within 0.25 s on both sides."""
-    reach = _reach(dt)
-    sums = np.concatenate([[0.0], np.cumsum(values)])
-    places = np.arange(len(values))
-    first, end = np.maximum(places - reach, 0), np.minimum(places + reach + 1, len(values))
-    found: Array = (sums[end] - sums[first]) / (end - first)
-    return found
-
-
-def _largest_near(values: Array, dt: float) -> Array:
-    """(k,) the largest of values (k,) within 0.25 s on both sides."""
-    reach = _reach(dt)
-    near = sliding_window_view(np.pad(values, reach), 2 * reach + 1)
-    found: Array = near.max(axis=1)[: len(values)]
-    return found
-
-
-def _reach(dt: float) -> int:
-    """0.25 s in frames: single frames say little, and the whole clip would hide a jump among many calm frames."""
-    return max(1, round(0.25 / dt))
+def _near(values: Array, dt: float, fill: float) -> Array:
+    """(k, r) the values (k,) within 0.25 s on both sides of each: a single one says little, the whole clip hides it."""
+    if not len(values):
+        return np.zeros((0, 1))
+    reach = max(1, round(0.25 / dt))
+    return sliding_window_view(np.pad(values, reach, constant_values=fill), 2 * reach + 1)

@@ -92,7 +92,7 @@ class ClipLoads:
     def original(
         cls, clip: Clip, feet: Mapping[str, Mask], strength: Strength, terms: FrameTerms, stretch: float = 1.0
     ) -> ClipLoads:
-        """Those of an original clip on its feet (foot -> (n,)) that may be slowed; its own loads are among the bounds."""
+        """Those of an original clip on its feet (foot -> (n,)) that may be slowed; its own loads are bounds too."""
         dynamics = InverseDynamics(clip.figure, tuple(feet), 0.8)  # the friction of `wb.motion.torques`
         base = smoothed(clip, CUTOFF).q
         lower, upper = torque_limits(clip.figure, strength)
