@@ -1,8 +1,7 @@
 """What holds in every frame of a clip: constraints resolved at each original posture, and bounds on the deviations.
 
-A term that refers to the start ("as at the start") refers to the original posture of its own frame. So
-`Hold("left_hand", relative_to="right_hand")` keeps the grip that each frame has, `Hold("left_foot")` keeps the foot
-where it was in that frame, and `Freeze("root")` keeps the root's motion. A grip that overlaps itself is kept beside.
+A term that refers to the start refers to the original posture of its own frame: `Hold("left_hand",
+relative_to="right_hand")` keeps the grip that each frame has. A grip that overlaps itself is kept beside.
 """
 
 from __future__ import annotations

@@ -1,16 +1,13 @@
 """Where a hand is held whose place at the other one overlaps it: beside that place, as near and as smooth as can be.
 
-`Hold("left_palm", relative_to="right_palm")` keeps the grip of each frame. No joint lies between two things that are
-held at each other, so where the recording has them in each other, contact and grip contradict. Recordings that were
-brought onto larger hands do. There the grip is shifted, by the shift s_t (3,) of each frame t for which
+`Hold("left_palm", relative_to="right_palm")` keeps the grip of each frame. Where the recording has both hands in each
+other, contact and grip contradict. There the grip is shifted, by the shift s_t (3,) of each frame t for which
 
     1/2 sum_t (|s_t|^2 + tau^4 |(s_(t+1) - 2 s_t + s_(t-1)) / dt^2|^2 + c |s_t - (u_t . s_t) u_t|^2)    is least, and
     n . s_t >= depth + room
 
-for every near pair of pieces with its normal n, in each frame and, where hands turn past each other, at places between
-two frames, where the room includes the clearance. u_t is the direction from one
-held frame to the other: two hands on one shaft may slide along it, and leave it only where that parts nothing. Normals
-turn with the shift, so the program is solved a few times.
+for every near pair of pieces with its normal n, in each frame and, where hands turn past each other, between two
+frames; u_t is the direction from one held frame to the other. Normals turn with the shift, so it is solved a few times.
 """
 
 from __future__ import annotations

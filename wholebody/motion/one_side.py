@@ -1,7 +1,7 @@
-"""Postures on one side of what the original motion passes through.
+"""Postures on one side of what the original motion passes through, which no rows of contact bring a limb out of.
 
-No rows of contact bring a limb from one side of a thin thing to the other. So from a posture on one side the original
-motion is followed frame by frame in contact, outwards or until the motion to the next frame as it is passes nothing.
+From a posture on one side the original motion is followed frame by frame in contact, outwards or until the motion to
+the next frame as it is passes nothing.
 """
 
 from __future__ import annotations

@@ -225,8 +225,8 @@ READY: dict[str, tuple[Callable[[], Shape], str, tuple[Side, ...], float, float]
     "pack": (lambda: Box((0.20, 0.32, 0.50)), "thorax", ("back",), -0.08, 0.0),
     "torus": (lambda: Mesh(torus_mesh(0.13, 0.03)), "lower_thorax", ("left",), -0.11, 0.0),
 }
-"""Shape, segment, sides, height and sideways, metres: a ball half inside of the torso; double magazine pouches; a medium
-plate of body armour; a day pack of 30 litres; a ring whose hole is wide enough for a forearm."""
+"""Shape, segment, sides, height and sideways, metres: a ball half inside of the torso; double magazine pouches; a plate
+of body armour; a day pack of 30 litres; a ring whose hole is wide enough for a forearm."""
 
 
 def equipment(name: str, figure: Figure) -> tuple[Equipment, ...]:

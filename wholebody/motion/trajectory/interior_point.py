@@ -1,20 +1,15 @@
-"""A primal-dual interior-point method for programs with one block a frame and bands between.
+"""A primal-dual interior-point method (Mehrotra 1992) for programs with one block a frame and bands between.
 
     minimise    1/2 z' P z + c' z
     subject to  lower <= G z <= upper,   least <= z <= most
 
-With A z >= a for all bounds, slacks s = A z - a and multipliers y, each iteration solves Newton's equations of the
-conditions of optimality with s_i y_i = mu, first for mu = 0 and then for the mu that this predicts (Mehrotra 1992, "On
-the implementation of a primal-dual interior point method"). They come down to one matrix,
+With A z >= a for all bounds, slacks s = A z - a and multipliers y, Newton's equations come down to one matrix,
 
     K = P + A' diag(y / s) A .
 
 An unknown that nothing couples with others but rows, such as the slack of a missed contact, is eliminated: of its rows
-the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left are the
-deviations. In the order of the frames K is a band as wide as the degrees of freedom of two frames, of three with loads.
-Its Cholesky factor takes n b^2 operations for n unknowns and a half width of b.
-
-It begins at a known point, with shortfalls in the slacks and half of a slack's price as the multiplier of its rows.
+the sum of w a a' becomes sum w a a' - v v' / (p + sum w), with v = sum w a and its own diagonal p. What is left is a
+band, in the order of the frames. docs/theory/trajectory.md has the reasons.
 """
 
 from __future__ import annotations
@@ -33,17 +28,9 @@ LEAST = 1e-3  # room at the beginning to a bound that is missed then, and to one
 
 
 class BandedQP(NamedTuple):
-    """A program; matrices are scipy.sparse.csc_array or csc_matrix.
+    """A program; P (n, n) is symmetric and positive definite, with both triangles; G (m, n); both are sparse columns.
 
-    Attributes:
-        P: (n, n) symmetric and positive definite, both triangles.
-        c: (n,).
-        G: (m, n).
-        lower: (m,).
-        upper: (m,).
-        least: (n,).
-        most: (n,).
-        start: (n,) where the iteration begins; None for the middle between bounds.
+    `start` (n,) is where the iteration begins; None for the middle between bounds.
     """
 
     P: Any

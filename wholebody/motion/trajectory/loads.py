@@ -1,12 +1,9 @@
 """Loads of a trajectory: rows that keep torques within strength, and the zero moment point within the support.
 
-A clip may need more than the strength of a joint already, and may lean farther than its feet reach. So the bounds are:
-no joint more than its strength or than the largest torque that the original clip needs of it in this direction; and the
-zero moment point in no frame farther outside of an edge of its support than it is there in the original. A clip that
-may be slowed keeps to the strength of a joint if the original slowed as far as may be does.
-
-Differences of postures amplify noise, so recordings are filtered first (`wholebody.motion.clip_torques.smoothed`).
-Rows are those of the filtered original with the deviation on it, which is smooth itself.
+No joint needs more than its strength or than the largest torque that the original clip needs of it in this direction;
+the zero moment point is in no frame farther outside of an edge of its support than it is there in the original. A clip
+that may be slowed keeps to the strength of a joint if the original slowed as far as may be does. Rows are those of the
+filtered original (`wholebody.motion.clip_torques.smoothed`) with the deviation on it, which is smooth itself.
 """
 
 from __future__ import annotations

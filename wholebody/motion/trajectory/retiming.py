@@ -1,12 +1,9 @@
 """Timing of a clip: the same postures one after the other, passed more slowly where something does not hold.
 
-Along a path q(s), with s the time of the clip as it is, the rate ds/dt and its square b(s) say how fast it is passed; b
-is 1 for the clip as it is. Then ``dq/dt = q'(s) sqrt(b)`` and ``d2q/dt2 = q''(s) b + q'(s) b'(s) / 2``. So bounds on
-speeds are bounds on b, and torques are linear in b and its derivative (Verscheure, Demeulenaere, Swevers, De Schutter
-and Diehl 2009, "Time-optimal path tracking for robots: a convex optimization approach"). They minimise the duration.
-Here the timing is to stay what it is where nothing is wrong, so the program minimises
+Along a path q(s) the square of the rate b(s) = (ds/dt)^2 is 1 for the clip as it is. Speeds bound b, and torques are
+linear in b and its derivative (Verscheure and others 2009). The timing is to stay where nothing is wrong:
 
-    1/2 sum_k ((1 - b_k)^2 + tau^4 ((b_(k+1) - 2 b_k + b_(k-1)) / h^2)^2) + weight * sum of what loads miss
+    minimise 1/2 sum_k ((1 - b_k)^2 + tau^4 ((b_(k+1) - 2 b_k + b_(k-1)) / h^2)^2) + weight * sum of what loads miss
 
 subject to ``1/stretch^2 <= b_k <= 1``, and b_k at most the square of the rate that speed limits leave.
 """

@@ -1,13 +1,10 @@
 """Sequential quadratic programming over one window: a filter, a trust region, and only the joints that count.
 
-The objective is quadratic in the deviations, so all that a program gets wrong is the bending of contacts. A step is
-accepted if the pair of objective and shortfall is not worse in both than one that was there before (Fletcher and
-Leyffer 2002, "Nonlinear programming without a penalty function"). Steps along a bent surface are accepted so, which a
-merit function refuses.
+A step is accepted if the pair of objective and shortfall is not worse in both than one that was there before (Fletcher
+and Leyffer 2002, "Nonlinear programming without a penalty function"): so are steps along bent contacts.
 
 A degree of freedom joins the programs when it moves a row that is missed or active. The others cannot help: where no
-active row has an entry, the deviation that minimises the objective is zero. So this leaves out nothing, and most
-programs of a person have ten degrees of freedom a frame instead of 55.
+active row has an entry, the deviation that minimises the objective is zero.
 """
 
 from __future__ import annotations

@@ -119,7 +119,7 @@ class ClipRun:
     """Frees windows of one clip."""
 
     def __init__(
-        self, run: Run, reference: Array, time: float | None, rate: float = 1.0,
+        self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
         loads: ClipLoads | None = None,
     ) -> None:  # fmt: skip
         """Take what is needed.
@@ -128,7 +128,7 @@ class ClipRun:
             run: of the clip.
             reference: (n, nq) postures that the deviations are from.
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
-            rate: factor of the speed limits, for a clip that will be slowed by as much.
+            rate: factor of the speed limits, for a clip that will be slowed by as much; None for no limits.
             loads: of the reference postures, if they are to keep to their bounds.
         """
         self._run, self._reference = run, reference
