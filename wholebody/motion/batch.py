@@ -216,24 +216,13 @@ def _case(clip: Clip, worn: Worn, method: Avoider, held: AvoidOptions) -> tuple[
 
 
 def _measured(before: Clip, avoided: Avoided) -> dict[str, Any]:
+    """The fields of a row that are known of a clip that was freed."""
     report, after = avoided.report, avoided.clip
-    found: dict[str, Any] = {
-        "outcome": "free" if report.solved else "left",
-        "message": report.message,
-        "frames": len(after),
-        "duration": before.duration,
-        "seconds": report.seconds,
-        "colliding_before": report.before.colliding,
-        "colliding": report.after.colliding,
-        "dips": report.after.dips,
-        "deepest_before": report.before.deepest,
-        "deepest": report.after.deepest,
-        "deepest_between": report.after.deepest_between,
-        "missed": report.missed,
-        "frames_changed": report.frames_changed,
-        "posture_solves": report.posture_solves,
-        "programs": report.programs,
-    }
+    counts = ("message", "seconds", "missed", "frames_changed", "posture_solves", "programs")
+    found: dict[str, Any] = {name: getattr(report, name) for name in counts}
+    found |= {name: getattr(report.after, name) for name in ("colliding", "dips", "deepest", "deepest_between")}
+    found |= {f"{name}_before": getattr(report.before, name) for name in ("colliding", "deepest")}
+    found |= {"outcome": "free" if report.solved else "left", "frames": len(after), "duration": before.duration}
     if len(before) == len(after):  # and not retimed
         after = Clip(after.figure, after.q, before.dt, after.name)
         apart, jerk = deviation(before, after), jerk_ratio(before, after)

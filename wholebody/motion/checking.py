@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -151,8 +151,8 @@ class ClipCheck:
             "deepest_between": self.deepest_between,
             "jerk": self.mean_jerk,
             "contacts": [contact_as_dict(contact, dt) for contact in self.contacts],
-            "limits": [_beyond_as_dict(beyond, dt) for beyond in self.limits],
-            "speeds": [_beyond_as_dict(beyond, dt) for beyond in self.speeds],
+            "limits": [asdict(each) | {"time": each.frame * dt} for each in self.limits],
+            "speeds": [asdict(each) | {"time": each.frame * dt} for each in self.speeds],
             "sliding": [
                 {
                     "frame_name": each.frame, "distance": each.distance, "frame": each.at, "time": each.at * dt,
@@ -266,10 +266,3 @@ def _worst_first(columns: Iterable[tuple[str, Array, float, float, float]]) -> t
             told = Beyond(name, count, worst, float(values[worst]), float(broken))
             found.append((float(excess[worst]) - rounding, told))
     return tuple(each for _, each in sorted(found, key=lambda item: -item[0]))
-
-
-def _beyond_as_dict(beyond: Beyond, dt: float) -> dict[str, Any]:
-    return {
-        "joint": beyond.joint, "frames": beyond.frames, "frame": beyond.frame, "time": beyond.frame * dt,
-        "value": beyond.value, "limit": beyond.limit,
-    }  # fmt: skip

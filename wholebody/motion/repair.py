@@ -30,12 +30,14 @@ class RepairSettings:
     Attributes:
         margin: seconds before and after a fault in which postures may change; doubled in each round.
         rounds: of looking at the clip and repairing what is wrong.
+        radius: trust region, radians and metres; postures are nearly free.
         through: metres, as thick as a forearm; no rows free a deeper dip, of a limb that goes right through.
         spread: seconds that a push at one frame spreads over.
     """
 
     margin: float = 0.1
     rounds: int = 4
+    radius: float = 0.05
     through: float = 0.06
     spread: float = 0.06
 
@@ -74,7 +76,8 @@ def _kept_back(run: Run, q: Array, gap: int, deep: float) -> bool:
 def _repair(run: Run, window: Window, found: Faults, q: Array) -> bool:
     """Repair one window of q (n, nq) in place; whether it is better than before."""
     frames = slice(window.first, window.end)
-    freed = ClipRun(run, q, SETTINGS.spread, None).window(window, found, lambda _: run.ended, q).q
+    windows = ClipRun(run, q, SETTINGS.spread, None, near=SETTINGS.radius)
+    freed = windows.window(window, found, lambda _: run.ended, q).q
     better = run.faults(freed, window.first).number < run.faults(q[frames], window.first).number
     if better:
         q[frames] = freed

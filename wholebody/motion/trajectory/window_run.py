@@ -120,7 +120,7 @@ class ClipRun:
 
     def __init__(
         self, run: Run, reference: Array, time: float | None, rate: float | None = 1.0,
-        loads: ClipLoads | None = None,
+        loads: ClipLoads | None = None, near: float = NEARLY,
     ) -> None:  # fmt: skip
         """Take what is needed.
 
@@ -130,9 +130,10 @@ class ClipRun:
             time: seconds that a push spreads over; None for what the jerk of the answer asks for.
             rate: factor of the speed limits, for a clip that will be slowed by as much; None for no limits.
             loads: of the reference postures, if they are to keep to their bounds.
+            near: trust region of windows that are begun with given postures, radians and metres.
         """
         self._run, self._reference = run, reference
-        self._time, self._rate, self._loads = time, rate, loads
+        self._time, self._rate, self._loads, self._near = time, rate, loads, near
 
     def kept_back(
         self,
@@ -174,7 +175,8 @@ class ClipRun:
         if begun is None:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
-            starts = ((_Attempt(x), _Way(NEARLY, NEARLY)) for x in [own.deviations(begun[window.first : window.end])])
+            x = own.deviations(begun[window.first : window.end])
+            starts = iter([(_Attempt(x), _Way(self._near, self._near))])
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
@@ -202,9 +204,8 @@ class ClipRun:
     def _of(self, window: Window, found: Faults, cancel: Callable[[float], bool], begun: Array | None) -> _Window:
         terms, around = self._run.terms, self._reference if begun is None else begun
         chart = Chart(self._run.workspace.model, np.array(self._reference[window.first : window.end]))
-        kept = (
-            None if begun is None else np.array([self._away(around, window.first), self._away(around, window.end - 1)])
-        )
+        ends = (window.first, window.end - 1)
+        kept = None if begun is None else np.array([self._away(begun, frame) for frame in ends])
         limits = Limits.of(terms, chart, window.first, self._seams(window), self._rate, kept)
         held = [terms.held(frame) for frame in range(window.first, window.end)]
         loads = None if self._loads is None else WindowLoads(self._loads, window.first, len(window))
