@@ -172,11 +172,12 @@ class ClipRun:
         """
         own = self._of(window, found, cancel, begun)
         objective = self._objective(own, SETTINGS.first if self._time is None else self._time)
+        starts: Iterable[tuple[_Attempt, _Way]]
         if begun is None:
             starts = ((_Attempt(x), _Way(early=True)) for x in self._starts(own, found.depths))
         else:
             x = own.deviations(begun[window.first : window.end])
-            starts = iter([(_Attempt(x), _Way(self._near, self._near))])
+            starts = [(_Attempt(x), _Way(self._near, self._near))]
         best: _Attempt | None = None
         ended_early: list[_Attempt] = []
         for start, way in chain(starts, ((start, _Way()) for start in ended_early)):
