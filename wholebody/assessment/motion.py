@@ -55,14 +55,7 @@ class MotionAssessment:
 def assess_motion(
     scene: Scene, q: Array, dt: float, moves: Mapping[str, Sequence[pin.SE3]] | None = None
 ) -> MotionAssessment:
-    """Assess postures (n, nq), `dt` seconds apart.
-
-    Args:
-        scene: figure and things.
-        q: (n, nq) postures.
-        dt: seconds from one to the next.
-        moves: thing to its n placements, at the postures; all others stay.
-    """
+    """Assess postures (n, nq), `dt` seconds apart; `moves` has n placements of each thing that moves, others stay."""
     depth, overlapping = np.zeros(len(q)), np.zeros(len(q), dtype=np.intp)
     for frame, pairs in enumerate(pairs_along(scene, q, moves)):
         depth[frame] = max(0.0, -pairs.least)

@@ -87,21 +87,13 @@ class Assessment:
         return {**numbers, "optimality": self.optimality, "blockers": [asdict(blocker) for blocker in self.blockers]}
 
     def holds(self, tolerance: float) -> bool:
-        """Whether limits, constraints and clearances hold to a tolerance, metres and radians.
-
-        Raises:
-            InputError: the tolerance is negative or no number.
-        """
+        """Whether limits, constraints and clearances hold to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
         all_of_it = (self.limit_violation, self.constraint_violation, self.clearance_violation, self.penetration)
         return all(violation <= tolerance for violation in all_of_it)  # NaN holds nothing
 
     def met(self, tolerance: float) -> bool:
-        """Whether the goals are met to a tolerance, metres and radians.
-
-        Raises:
-            InputError: the tolerance is negative or no number.
-        """
+        """Whether the goals are met to a tolerance, metres and radians."""
         tolerance = number(tolerance, "tolerance", 0.0, inf)
         return all(error <= tolerance for error in (self.goal_error, self.goal_angle, *self.goal_errors))
 
@@ -117,11 +109,7 @@ class Assessment:
 
 
 def assess(problem: Problem, q: Array) -> Assessment:
-    """Judge a posture.
-
-    Args:
-        problem: to be solved.
-        q: (nq,) the posture.
+    """Judge a posture q (nq,) for a problem.
 
     Raises:
         InputError: q has the wrong shape or a value that is not finite.

@@ -83,12 +83,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class Names:
-    """A list of names, kept as a tuple.
-
-    Attributes:
-        example: such a list as it is written, for messages.
-        least: how many at least.
-    """
+    """A list of at least `least` names, kept as a tuple; `example` is such a list as it is written, for messages."""
 
     example: str
     least: int = 1
@@ -102,14 +97,7 @@ class Names:
 
 
 class _Checked(NamedTuple):
-    """A field with its check.
-
-    Attributes:
-        name: of the field.
-        check: of its values.
-        optional: whether None stands for no value.
-        kept: name of the field that keeps what the check returns.
-    """
+    """A field with its check; None stands for no value where it is optional, and what the check returns is `kept`."""
 
     name: str
     check: Check
@@ -126,11 +114,7 @@ class Checked:
     """
 
     def __post_init__(self) -> None:
-        """Check the fields.
-
-        Raises:
-            InputError: a value that its field does not accept.
-        """
+        """Check the fields."""
         kind: Any = type(self)
         where = called(self)
         for field in _checked(kind):

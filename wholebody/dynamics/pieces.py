@@ -14,7 +14,7 @@ from wholebody.dynamics import motion_kernel, witness_kernel
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.large_models import geometry_model
 from wholebody.geometry.proximity import Contacts, Kinematics, PairTable, Proximity
-from wholebody.scene.matter.inertia import MassProperties, mass_properties
+from wholebody.scene.matter.body import MassProperties, mass_properties
 from wholebody.scene.matter.materials import MATERIALS, Material, surface
 from wholebody.scene.scene import Scene
 

@@ -24,16 +24,13 @@ ROUNDING = 1e-3
 
 
 def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
-    """Read a placement, metres; the quaternion is x, y, z, w.
+    """Read a placement, metres, as a fresh SE3 whose rotation is orthonormal to machine precision.
 
     coal treats a NaN placement as touching and accepts any matrix as a rotation, so both are refused here.
 
     Args:
-        at: (3,) position, (7,) position and unit quaternion, (4, 4) homogeneous matrix, or ``pin.SE3``.
+        at: (3,) position, (7,) position and unit quaternion x, y, z, w, (4, 4) homogeneous matrix, or ``pin.SE3``.
         what: name of the placed object, for messages.
-
-    Returns:
-        A fresh ``pin.SE3`` whose rotation is orthonormal to machine precision.
 
     Raises:
         InputError: another shape, a value that is not finite, a quaternion that is not of unit length, a matrix that is
@@ -71,11 +68,7 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
 
 
 def unit_vector(value: object, what: str) -> tuple[float, float, float]:
-    """The unit vector along another.
-
-    Raises:
-        InputError: not three finite numbers, or too short or too long to have a direction.
-    """
+    """The unit vector along another; an InputError if that has no direction."""
     x, y, z = numbers(value, (3,), what).tolist()
     length = math.hypot(x, y, z)
     if not 1e-9 <= length <= 1e9:

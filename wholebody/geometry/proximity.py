@@ -18,8 +18,7 @@ from wholebody.base.checks import number
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.memory_views import RESULT_DOUBLES, fields
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, ENDLESS, normal_across, swept_points
 
 PENETRATION = 1e-5  # m: deeper than this a pair is called inside of each other; what touches is solved to it
 
@@ -54,11 +53,7 @@ class Contacts(NamedTuple):
         return self._rows(np.argsort(self.distance, kind="stable"))
 
     def nearer(self, distance: float) -> Contacts:
-        """Those that are nearer than a distance, metres.
-
-        Raises:
-            InputError: the distance is no number.
-        """
+        """Those that are nearer than a distance, metres."""
         distance = number(distance, "nearer: distance", -np.inf, np.inf, "m")
         return self._rows(np.flatnonzero(self.distance < distance))
 
@@ -79,19 +74,9 @@ class Contacts(NamedTuple):
 
 
 class _ContactBuffer:
-    """Room for contacts.
-
-    Attributes:
-        size: how many contacts it has room for.
-        distance: (size,) see `Contacts`, like the following.
-        vectors: (3, size, 3) normals, points on the first and on the second piece.
-        number: (size,).
-        pair: (size, 2).
-        arrays: these four.
-    """
+    """Room for so many contacts; `vectors` has normals, points on the first and on the second piece."""
 
     def __init__(self, size: int) -> None:
-        """Allocate."""
         self.size = size
         self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
         self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
@@ -131,12 +116,7 @@ class PairTable:
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
-        """Read the pieces and pairs.
-
-        Args:
-            model: Pinocchio's model.
-            geometry: the geometry model.
-            pairs: its pairs (pairs, 2), where they are known: to read a hundred thousand of them takes half a second.
+        """Read the pieces and pairs; to read a hundred thousand pairs takes half a second, where they are not given.
 
         Raises:
             InputError: a geometry that is not a convex piece.
@@ -192,7 +172,6 @@ class Proximity:
     """
 
     def __init__(self, table: PairTable) -> None:
-        """Lay views over results of Pinocchio that nothing else uses."""
         self.table = table
         self.geometry = table.geometry.copy()  # shapes are shared
         self.seconds = 0.0
@@ -307,11 +286,7 @@ class Proximity:
             first, second = contacts.pair[row]
             axis_a = self.table.swept[first].axis @ placements[first, :3]
             axis_b = self.table.swept[second].axis @ placements[second, :3]
-            normal = np.cross(axis_a, axis_b)
-            if np.linalg.norm(normal) < 1e-9:
-                along = axis_a if axis_a.any() else axis_b if axis_b.any() else np.array([1.0, 0.0, 0.0])
-                normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-            normal /= np.linalg.norm(normal)
+            normal = normal_across(axis_a, axis_b)
             center = 0.5 * (contacts.point_a[row] + contacts.point_b[row])
             depth = -0.5 * contacts.distance[row] * normal
             contacts.normal[row], contacts.point_a[row], contacts.point_b[row] = normal, center + depth, center - depth

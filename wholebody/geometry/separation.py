@@ -58,14 +58,8 @@ def least_separation(
 ) -> Separation:
     """Least translation of A after which no piece of it overlaps a piece of B.
 
-    Args:
-        pieces_a: the pieces of A, each a coal geometry and its placement in the world.
-        pieces_b: those of B.
-        allowed: (n, m) the pairs of pieces that count; all by default.
-
-    Returns:
-        The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
-        objects (a piece between two half-spaces).
+    The zero translation if nothing overlaps, and also, with ``separated=False``, if no translation separates the
+    objects (a piece between two half-spaces). See `object_penetration` for the arguments.
     """
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()

@@ -14,7 +14,7 @@ from wholebody.base.checks import a
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
-from wholebody.geometry.continuous.approach import largest_approach
+from wholebody.geometry.continuous.motion_bounds import largest_approach
 from wholebody.geometry.continuous.passing_through import INSIDE
 from wholebody.geometry.proximity import Contacts, PairTable, Proximity
 from wholebody.scene.geometry_model import SceneGeometry
@@ -26,14 +26,9 @@ if TYPE_CHECKING:
 
 
 class NotCopyable:
-    """What belongs to the run that made it, and is neither pickled nor copied."""
+    """What belongs to the run that made it: to pickle or to copy it is an InputError."""
 
     def __reduce__(self) -> NoReturn:
-        """Refuse.
-
-        Raises:
-            InputError: always.
-        """
         raise InputError(
             f"{a(type(self))} belongs to the run that made it and cannot be pickled or copied; make another one from "
             "its problem or scene"
@@ -98,10 +93,8 @@ class Workspace(NotCopyable):
     def next_frame(self, q: Array) -> FrameMotion | None:
         """The frame in which the things go that moved since the last one; None if none did, and none is in the figure.
 
-        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told.
-
-        Args:
-            q: (nq,) posture of the figure at the beginning.
+        Things are where it ends. Those that were put into the figure are among them: it leaves them, or is told. The
+        figure begins at the posture q (nq,).
         """
         still = [name for name, (before, after) in self.moved.items() if before == after]
         if still:

@@ -12,7 +12,7 @@ import pytest
 from wholebody import InputError
 from wholebody.base.arrays import Array
 from wholebody.geometry.continuous import sweep as module
-from wholebody.geometry.continuous.sweep import Sweep, first_contact
+from wholebody.geometry.continuous.sweep import Sweep
 
 
 class Arena:
@@ -97,7 +97,7 @@ def test_a_plate_of_a_millimetre_is_never_passed(length: float, turn: float) -> 
         if share * length < 0.002 or (1.0 - share) * length < 0.002:
             continue
         q1[3:] = pin.Quaternion(pin.exp3(np.array([0.0, turn, 0.2 * turn]))).coeffs()
-        found = first_contact(model, geometry, None, q0, q1)
+        found = Sweep(model, geometry).first_contact(q0, q1)
         assert found is not None
         assert found.certain
         assert found.q[0] == pytest.approx(-0.0015, abs=2e-4)

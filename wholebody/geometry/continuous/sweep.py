@@ -22,7 +22,7 @@ from wholebody.base.errors import InputError
 from wholebody.geometry.continuous.motion_bounds import MotionBounds
 from wholebody.geometry.large_models import pairs_of
 from wholebody.geometry.pair_distances import PairDistances
-from wholebody.geometry.swept_points import swept_points
+from wholebody.geometry.pieces import swept_points
 
 TOLERANCE = 1e-4
 """Depth up to which an overlap is no contact, metres."""
@@ -79,7 +79,7 @@ class Sweep:
     def first_contact(
         self, q0: Array, q1: Array, pairs: Indices | None = None, tolerance: float = TOLERANCE
     ) -> FirstContact | None:
-        """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``.
+        """First contact on the geodesic ``pinocchio.interpolate(model, q0, q1, t)``; None if the whole motion is free.
 
         A contact is a pair deeper by `tolerance` than touching, or, if it overlaps at the start already, deeper by
         `tolerance` than there: soles may stay on the floor and hands on a handle, and an overlap may be left, but not
@@ -91,9 +91,6 @@ class Sweep:
             q1: (nq,) its end.
             pairs: (k, 2) the pairs of pieces to test, collision pairs of the geometry model; all of them by default.
             tolerance: metres.
-
-        Returns:
-            None if the whole motion is free.
 
         Raises:
             InputError: postures of the wrong shape, not finite or with a quaternion that is not of unit length; a
@@ -233,15 +230,3 @@ class Sweep:
         if not pin.isNormalized(self.model, q, 1e-6):
             raise InputError(f"sweep: a quaternion of the {which} is not of unit length; use pinocchio.normalize")
         return q
-
-
-def first_contact(
-    model: pin.Model,
-    geometry: pin.GeometryModel,
-    pairs: Indices | None,
-    q0: Array,
-    q1: Array,
-    tolerance: float = TOLERANCE,
-) -> FirstContact | None:
-    """One sweep; see `Sweep.first_contact`. For many sweeps make a `Sweep`."""
-    return Sweep(model, geometry).first_contact(q0, q1, pairs, tolerance)
