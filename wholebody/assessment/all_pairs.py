@@ -99,7 +99,7 @@ class AllPairs:
     def nearer(self, within: Array) -> NearPairs:
         """What there is to know of pairs nearer than `within` (pairs,), metres; it outlives the next `move`."""
         self.ask(within)
-        number = np.flatnonzero(self.distance < within)  # each of them was asked
+        number = (self.distance < within).nonzero()[0]  # each of them was asked
         rows = number if self._bounds is None else self._row[number]
         pair = self._built.table.pairs[number]
         return NearPairs(self._built, number, pair, self._found[rows], self._distances.placed[pair])

@@ -68,11 +68,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _numbers(text: str, what: str, count: int = 3) -> list[float]:
-    """Numbers separated by commas.
-
-    Raises:
-        InputError: they are something else.
-    """
+    """Numbers separated by commas; raises InputError where they are something else."""
     from wholebody.base.checks import shown
     from wholebody.base.errors import InputError
 

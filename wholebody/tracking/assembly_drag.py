@@ -23,7 +23,7 @@ class DragFrame(NamedTuple):
         error: largest remaining goal error, metres or radians.
         iterations: iterations of the method.
         seconds: wall time.
-        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of; empty if nothing.
+        collisions: what things that move (`Scene.move` with `over`) passed through, or are inside of.
         path: shares of the frame, from 0 to 1, and the postures (nq,) there, if things moved; otherwise empty. Straight
             from one to the next nothing was passed but the collisions.
     """
@@ -44,14 +44,10 @@ class GoalMoves:
     """How far the goal moves in a frame: all the way, or as far as its budget was enough for lately."""
 
     def __init__(self) -> None:
-        """Begin with the whole way."""
         self._most, self._error = np.inf, 0.0
 
     def shares(self, error: float) -> Iterator[float]:
-        """Shares of the way to a goal, which is `error` metres or radians away; to be tried until a motion is free.
-
-        None is tried after the budget is spent.
-        """
+        """Shares of the way to a goal that is `error` m or rad away, tried until a motion is free or time is up."""
         self._error = error
         moves = (self._most, *(move for move in (0.01, 0.002) if move < self._most))  # m, rad
         for number, move in enumerate(moves):
@@ -72,14 +68,11 @@ class AssemblyDrag:
 
     If joints or contacts do not hold after a frame's few Newton steps, or its motion passes through something, the
     bodies go back to where they were and the goal moves by a shorter distance, or not in that frame.
+
+    Raises InputError where there is no such goal.
     """
 
     def __init__(self, assembly: Assembly, goal: int, seconds: float) -> None:
-        """Begin a drag at the assembly's present placements.
-
-        Raises:
-            InputError: there is no such goal.
-        """
         self._goal, self._seconds, self._moves = assembly.goal_index(goal), seconds, GoalMoves()
         self.assembly = assembly.prepare()
 
@@ -89,11 +82,7 @@ class AssemblyDrag:
         return self.assembly.q
 
     def to(self, target: Any) -> DragFrame:
-        """Move the goal to a position, or a placement, and make one frame towards it.
-
-        Raises:
-            InputError: the target is not one.
-        """
+        """Make one frame towards a position, or a placement; raises InputError where the target is neither."""
         began, spent, collisions = time.perf_counter(), 0, tuple[Collision, ...]()
         path: tuple[tuple[float, Array], ...] = ()
         made, goal = self.assembly, self._goal

@@ -35,7 +35,7 @@ Answer = TypeVar("Answer", Solution, AssemblySolution)
 
 
 class ProblemDrag:
-    """Follows a goal of a problem; see `Drag`.
+    """Follows a goal of a problem; see `Drag`, which raises the same.
 
     Attributes:
         problem: to be solved; its goals are replaced as they move.
@@ -44,12 +44,6 @@ class ProblemDrag:
     """
 
     def __init__(self, problem: Problem, method: str | Method, *, goal: int, dt: float, budget: float) -> None:
-        """Begin a drag at the problem's start.
-
-        Raises:
-            InputError: there is no such goal, or it is of another kind.
-            UnknownNameError: there is no such method.
-        """
         self.problem, self.dt = copied(problem), time_step(dt, "dt")
         self.method = method_for_motions(method)
         self.tracker = self.method.tracker(self.problem, self.dt)
@@ -61,11 +55,7 @@ class ProblemDrag:
         self.q: Array = problem.scene.figure.clamp(problem.start)
 
     def to(self, target: Any) -> DragFrame:
-        """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
-
-        Raises:
-            InputError: the target is not one.
-        """
+        """See `Drag.to`."""
         began = time.perf_counter()
         with self._alone, within_budget(self._seconds):
             retarget(self.problem, self._number, target)
@@ -87,16 +77,16 @@ class ProblemDrag:
             return DragFrame(self.q, error, iterations, time.perf_counter() - began, collisions, path)
 
     def finish(self) -> Solution:
-        """Meet the present goal with the method's full accuracy, and assess the posture."""
+        """See `Drag.finish`."""
         with self._alone:
             solution = warm_started(self.problem, self.tracker, self.q)
             self.q = solution.q
             return solution
 
     def _followed(self) -> int:
-        """Move by the longest of `GoalMoves` towards the goal for which the motion is free; returns the iterations.
+        """Move by the longest of `GoalMoves` for which the motion is free, or out of a thing moved into the figure.
 
-        If a thing was moved into the figure, move out of it.
+        Returns the iterations.
         """
         spent, tried, deep = 0, list[Array](), self._came_in()
         for step in self._frames():
@@ -140,8 +130,7 @@ class ProblemDrag:
     def _leave(self, tried: list[Array], deep: float) -> None:
         """Move out of an overlap of `deep` metres, after no motion that was tried was free and led out.
 
-        The candidates are the tracker's ways out and the postures (nq,) that were tried. A free motion is better than
-        one that gets deeper first; among these the shallower end is better.
+        A free motion is better than one that gets deeper first; among these the shallower end is better.
         """
         ends = [*self.tracker.overlap_resolutions(self.q), *tried]
         depths = [_depth(self._workspace, q) for q in ends]
@@ -167,9 +156,7 @@ class Drag(NotCopyable, Generic[Answer]):
     postures. If the motion to a posture penetrates something, the goal moves by a shorter distance, or not in that
     frame. If a thing was moved into the figure, the figure first leaves it. Of things that move (`Scene.move` with
     `over`) "qp" gets out of the way as they come; the others meet them where they end. What they could not avoid is
-    named in the answer.
-
-    A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
+    named in the answer. A drag of an assembly moves the assembly itself, by a few Newton steps a frame.
 
     With a budget a frame ends with what it has found by then, and the next goes on from there. Where it was not enough
     to get half as far as the goal went, the goal goes half as far next, down to 2 mm; otherwise it goes twice as far.
@@ -224,11 +211,7 @@ class Drag(NotCopyable, Generic[Answer]):
 
     @property
     def q(self) -> Array:
-        """(nq,) the present posture; of an assembly that of its `scene`.
-
-        Raises:
-            InputError: it is set to another shape, to a value that is not finite, or for an assembly.
-        """
+        """(nq,) the present posture, of an assembly that of its `scene`, where it cannot be set."""
         return self._run.q
 
     @q.setter
@@ -250,8 +233,7 @@ class Drag(NotCopyable, Generic[Answer]):
     def to(self, target: Any) -> DragFrame:
         """Move the goal to a position (or a placement, for a `Frame`), and make one frame towards it.
 
-        Raises:
-            InputError: the target is not one.
+        Raises InputError where the target is neither.
         """
         return self._run.to(target)
 

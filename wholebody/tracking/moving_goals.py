@@ -20,8 +20,7 @@ from wholebody.tasks.base import Goal
 def copied(problem: Problem) -> Problem:
     """A copy whose goals can be moved without changing the caller's problem.
 
-    Raises:
-        InputError: it is no problem, or objects were added to or removed from its scene.
+    Raises InputError where it is no problem, or objects were added to or removed from its scene.
     """
     check_problem(problem, "problem")
     problem.check_fresh()
@@ -29,11 +28,7 @@ def copied(problem: Problem) -> Problem:
 
 
 def moving_goal(problem: Problem, number: int) -> Point | Frame:
-    """The goal of this index, which must be a `Point` or a `Frame`.
-
-    Raises:
-        InputError: there is no such goal, or it is of another kind.
-    """
+    """The goal of this index; raises InputError where there is none, or it is no `Point` and no `Frame`."""
     if not problem.goals:
         raise InputError("the problem has no goals; give it a Point or a Frame")
     number = whole(number, "the number of the goal", 0, len(problem.goals) - 1)
@@ -44,11 +39,7 @@ def moving_goal(problem: Problem, number: int) -> Point | Frame:
 
 
 def retarget(problem: Problem, number: int, target: Any) -> None:
-    """Move a problem's goal, a `Point` or `Frame`, to another target.
-
-    Raises:
-        InputError: there is no such goal, it is of another kind, or the target is not one.
-    """
+    """Move a problem's goal, a `Point` or `Frame`, to another target; raises InputError where one of them is none."""
     goals: list[Goal] = list(problem.goals)
     goals[number] = replace(moving_goal(problem, number), target=target)
     problem.retarget(goals)

@@ -27,13 +27,10 @@ class InteractionScene:
     """A scene with a tracker.
 
     Attributes:
-        name: its name on the command line.
-        about: one sentence.
-        scene: figure and things.
-        track: the tracked postures.
+        name, about: its name on the command line, and one sentence.
+        scene, track: figure and things, and the tracked postures.
         rigid: whether the figure is displaced as a whole, such as a hand.
-        eye: position of the camera, metres.
-        target: the point in the middle of the picture, metres.
+        eye, target: position of the camera, and the point in the middle of the picture, metres.
         see_through: things to draw transparent.
     """
 
@@ -57,8 +54,7 @@ def build_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: floa
         dt: seconds from frame to frame.
 
     Raises:
-        UnknownNameError: there is no such scene.
-        InputError: fewer than one frame.
+        UnknownNameError, InputError: there is no such scene; fewer than one frame.
     """
     known(name, _PLANS, "scene")
     plan = _PLANS[name]

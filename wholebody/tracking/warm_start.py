@@ -19,12 +19,7 @@ def warm_started(problem: Problem, tracker: Tracker, q: Array) -> Solution:
     """Solve from the posture q (nq,); the posture is kept if the motion to the solution passes through something.
 
     If the motion to the best answer penetrates something, the nearest answer is preferred; if neither meets the goal,
-    the posture is kept too.
-
-    Args:
-        problem: to be solved.
-        tracker: of a method for this problem.
-        q: the present posture.
+    the posture is kept too. The tracker is that of a method for this problem.
     """
     solution = tracker.solve(q)
     if problem.scene.sweep(q, solution.q, PASSING) is None:

@@ -24,15 +24,9 @@ def look(
     points: Array | None = None,
     margin: float = 1.0,
 ) -> Command:
-    """Turn the camera to a target, from `eye`, or from `direction` so that all `points` (n, 3) are in the picture.
+    """Turn the camera to a target (3,), from `eye` (3,), or from `direction` with all `points` (n, 3) in the picture.
 
-    Args:
-        target: (3,) the point in the middle of the picture.
-        fov: vertical angle of view, degrees.
-        eye: (3,) position of the camera.
-        direction: (3,) from the target towards the camera.
-        points: (n, 3) points that must be visible.
-        margin: width of the picture relative to the points; 1 is exact.
+    `fov` is the vertical angle of view, degrees; `margin` the width of the picture relative to the points, 1 is exact.
     """
     command: dict[str, Any] = {"type": "look", "target": np.asarray(target, dtype=float).tolist(), "fov": float(fov)}
     if eye is not None:
@@ -45,13 +39,7 @@ def look(
 
 
 def camera_on(figure: Array, things: Array, direction: Array | None = None) -> Command:
-    """Look at the figure from its front right, at a distance from which it and the things near it are visible.
-
-    Args:
-        figure: (n, 3) points of the figure that must be visible.
-        things: (m, 3) points of other things; distant ones are clamped to `NEAR`.
-        direction: (3,) from the figure to the camera; None for the default.
-    """
+    """Look at points (n, 3) of the figure from its front right; things (m, 3) near it are in the picture too."""
     if not len(figure):
         figure = things if len(things) else np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]])
     low, high = figure.min(axis=0), figure.max(axis=0)

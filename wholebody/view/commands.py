@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.view.server import Command, Op
-from wholebody.view.surface import Patch
+
+if TYPE_CHECKING:
+    from wholebody.view.surface import Patch
 
 
 def floats(values: Any) -> Any:
@@ -29,14 +31,7 @@ def set_object(path: str, three: Mapping[str, Any]) -> Command:
 
 
 def label(path: str, text: str, color: str, size: float) -> Command:
-    """Put a text at a node, upright and of the same size at every distance.
-
-    Args:
-        path: the node.
-        text: one line.
-        color: of the letters, as in CSS.
-        size: height, as a fraction of the distance from the camera.
-    """
+    """Put a line of text at a node, upright; `size` is its height as a fraction of the distance from the camera."""
     return Command(
         Op.OBJECT, path, "", pack({"type": "label", "path": path, "text": text, "color": color, "size": size})
     )
@@ -67,14 +62,9 @@ def set_skeleton(
 
 
 def set_skin(path: str, skeleton: str, patch: Patch, color: tuple[float, ...], unit: float) -> Command:
-    """Put a patch of a body's surface at a node.
+    """Put a patch of a body's surface at a node, behind that of its skeleton; positions are rounded to `unit` metres.
 
-    Args:
-        path: the node.
-        skeleton: node of its skeleton, which is put before it.
-        patch: the patch; at most 65,536 vertices and 256 bones.
-        color: red, green, blue, alpha.
-        unit: metres; positions are rounded to it.
+    A patch has at most 65,536 vertices and 256 bones.
     """
     weights = np.round(255.0 * patch.weights).astype(int)
     weights[:, 0] += 255 - weights.sum(axis=1)  # the strongest takes the rounding: the page adds them up unscaled
@@ -145,13 +135,7 @@ class Track(NamedTuple):
 
 
 def set_animation(tracks: Sequence[Track], times: Array, repetitions: float) -> Command:
-    """Let the page play a motion by its own clock.
-
-    Args:
-        tracks: the changing properties.
-        times: (n,) of the frames, seconds, ascending.
-        repetitions: number of times it is played; infinity for ever.
-    """
+    """Let the page play a motion by its own clock: tracks at times (n,), seconds, ascending; as often as is said."""
     clips: dict[str, list[dict[str, Any]]] = {}
     for track in tracks:
         clips.setdefault(track.path, []).append(track.lower(times))

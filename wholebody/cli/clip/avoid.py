@@ -102,8 +102,7 @@ def _ignored(_: object) -> None:
 def _method(name: str, arguments: argparse.Namespace) -> Avoider:
     """The method, which may slow the motion, and keep to the strength of a person of the sex that was asked for.
 
-    Raises:
-        WholebodyError: there is no such method, or it does not slow motions or take dynamics.
+    Raises WholebodyError where there is no such method, or it does not slow motions or take dynamics.
     """
     from wholebody.base.errors import InputError
     from wholebody.motion.avoidance import as_avoider
