@@ -52,8 +52,8 @@ def convex_pieces(
     Another one is split into connected parts. A convex part is kept as it is, with all its vertices. CoACD decomposes
     another closed part (Wei et al. 2022, "Approximate convex decomposition for 3D meshes with collision-aware concavity
     and tree search"), and its pieces are simplified outwards, so that they cover the whole surface. A part that lacks
-    faces is closed first; of a shell, which encloses nothing, every triangle is thickened (see `geometry.components`). A
-    flat part is thickened to twice `SMALLEST`. `notes` reports this.
+    faces is closed first; of a shell, which encloses nothing, every triangle is thickened (see `components`). A flat
+    part is thickened to twice `SMALLEST`. `notes` reports this.
 
     Args:
         vertices: (n, 3), metres.

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
+from wholebody.base.checks import is_number
 from wholebody.base.errors import FileFormatError, InputError, MissingPackageError, WholebodyError, one_line
 from wholebody.base.files import check_file
 from wholebody.geometry.convex import check_mesh
@@ -102,7 +103,9 @@ def _read_scene(path: Path) -> tuple[Any, float]:
     quiet.setLevel(logging.CRITICAL)
     try:
         scene = trimesh.load_scene(path, process=False)
-        return scene, _metres(scene.units) if path.suffix.lower() == ".dae" else 1.0
+        # trimesh writes the unit of a COLLADA file as "meters", or "0.0254 * meters"
+        unit = (scene.units or "").partition("*")[0] if path.suffix.lower() == ".dae" else ""
+        return scene, float(unit) if is_number(unit) else 1.0
     except Exception as error:  # trimesh's readers raise many kinds of errors
         raise _unreadable(path, error) from error
     finally:
@@ -140,12 +143,3 @@ def _checked(vertices: Array, faces: NDArray[np.int64], path: Path) -> tuple[Arr
         return check_mesh(vertices, faces, f"mesh {path}")
     except InputError as error:
         raise FileFormatError(str(error)) from error
-
-
-def _metres(unit: str | None) -> float:
-    """Metres of a unit as trimesh writes it for COLLADA files: "meters", or "0.0254 * meters"."""
-    number = (unit or "").partition("*")[0]
-    try:
-        return float(number)
-    except ValueError:
-        return 1.0

@@ -116,7 +116,11 @@ def object_penetrations(
         touching[owners[i], owners[j]].append((i, j))
     found = []
     for (a, b), pairs_of_both in touching.items():
-        allowed = np.array(pairs_of_both or _all_pairs(owners, a, b))
+        if not pairs_of_both:  # all of two owners where the geometry has none
+            pairs_of_both = [
+                (i, j) for i, one in enumerate(owners) if one == a for j, two in enumerate(owners) if two == b
+            ]
+        allowed = np.array(pairs_of_both)
         (of_a, row), (of_b, column) = (np.unique(allowed[:, side], return_inverse=True) for side in range(2))
         mask = np.zeros((len(of_a), len(of_b)), dtype=bool)
         mask[row, column] = True
@@ -126,8 +130,3 @@ def object_penetrations(
         )
         found.append(object_penetration(a, b, pieces_a, pieces_b, mask))
     return sorted(filter(None, found), key=lambda one: -float(np.linalg.norm(one.separation)))
-
-
-def _all_pairs(owners: Sequence[str], a: str, b: str) -> list[tuple[int, int]]:
-    """All pairs of a piece of one owner and a piece of another."""
-    return [(i, j) for i, one in enumerate(owners) if one == a for j, other in enumerate(owners) if other == b]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import time
 from functools import lru_cache
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -59,18 +59,12 @@ class Contacts(NamedTuple):
 
     def joined(self, others: Contacts) -> Contacts:
         """These and others at the same placements."""
-        return Contacts(
-            np.concatenate([self.pair, others.pair]), np.concatenate([self.distance, others.distance]),
-            np.concatenate([self.normal, others.normal]), np.concatenate([self.point_a, others.point_a]),
-            np.concatenate([self.point_b, others.point_b]), np.concatenate([self.number, others.number]),
-            self.placements,
-        )  # fmt: skip
+        joined: Any = [*map(np.concatenate, zip(self[:6], others[:6], strict=True)), self.placements]
+        return Contacts(*joined)
 
     def _rows(self, rows: Indices) -> Contacts:
-        return Contacts(
-            self.pair[rows], self.distance[rows], self.normal[rows], self.point_a[rows], self.point_b[rows],
-            self.number[rows], self.placements,
-        )  # fmt: skip
+        chosen: Any = [*(part[rows] for part in self[:6]), self.placements]
+        return Contacts(*chosen)
 
 
 class _ContactBuffer:
@@ -144,20 +138,6 @@ def _joined(parts: list[Array]) -> tuple[Array, Indices]:
     return np.concatenate(parts), np.cumsum([len(part) for part in parts], dtype=np.intp)
 
 
-class Kinematics(Protocol):
-    """What knows where the joints of a model are, such as `figures.state.State`."""
-
-    @property
-    def data(self) -> Any:
-        """Pinocchio's data, with the joints' placements."""
-
-
-class Joints(NamedTuple):
-    """Where the joints of a model are: Pinocchio's data after its forward kinematics."""
-
-    data: Any
-
-
 class Proximity:
     """Distances of every collision pair of a geometry model, re-used from posture to posture by one run at a time.
 
@@ -204,29 +184,29 @@ class Proximity:
         """Place a piece anew in its joint's frame."""
         self.geometry.geometryObjects[index].placement = placement
 
-    def placements(self, state: Kinematics) -> Array:
-        """Placements (n, 4, 3) of the pieces with the joints as in `state`; see `Contacts.placements`."""
-        self.distances.place(self.table.model, state.data)
+    def placements(self, data: Any) -> Array:
+        """Placements (n, 4, 3) of the pieces with the joints as in Pinocchio's `data`; see `Contacts.placements`."""
+        self.distances.place(self.table.model, data)
         return np.array(self.distances.placed)
 
-    def query(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
-        """Every pair nearer than `within` metres with the joints as in `state`, in the order of the pairs.
+    def query(self, data: Any, within: float, most: Array | None = None) -> Contacts:
+        """Every pair nearer than `within` metres with the joints as in Pinocchio's `data`, in the order of the pairs.
 
         With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
         out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
         began = time.perf_counter()
-        placements = self.placements(state)
+        placements = self.placements(data)
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
         contacts = self._gather(_ContactBuffer(len(index)), placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
-    def query_views(self, state: Kinematics, within: float, most: Array | None = None) -> Contacts:
+    def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
         began = time.perf_counter()
-        self.distances.place(self.table.model, state.data)
+        self.distances.place(self.table.model, data)
         placements = self._placed
         placements[:] = self.distances.placed
         most = self._endless if most is None else most

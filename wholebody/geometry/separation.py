@@ -63,8 +63,8 @@ def least_separation(
     """
     pairs = ObjectPair(pieces_a, pieces_b, allowed)
     escapes = pairs.escapes()
-    best = escapes[np.argmin((escapes**2).sum(axis=1))] if len(escapes) else None
-    best = _shorter(best, _depth_first(pairs, _ROOT))
+    ways = [*escapes, *([] if (found := _depth_first(pairs, _ROOT)) is None else [found])]
+    best = min(ways, key=lambda way: float(way @ way), default=None)
     least = False
     if not pairs.sampled:
         best, least = _search(pairs, best)
@@ -79,12 +79,6 @@ def least_separation(
 
 
 _ROOT = _Node(np.zeros(3), np.zeros((0, 3)), np.zeros(0))
-
-
-def _shorter(first: Array | None, second: Array | None) -> Array | None:
-    if first is None or second is None:
-        return first if second is None else second
-    return second if second @ second < first @ first else first
 
 
 def _search(pairs: ObjectPair, best: Array | None) -> tuple[Array | None, bool]:

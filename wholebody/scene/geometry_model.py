@@ -16,7 +16,7 @@ from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
 from wholebody.geometry.large_models import geometry_model, pairs_of
-from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.scene.matter.materials import DEFAULT, Material
 
 if TYPE_CHECKING:
@@ -291,4 +291,4 @@ def _touching_at_rest(
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
     # m: a carried thing nearer than this to a segment in the first posture rests on it
-    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), 1e-3).pair}
+    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(data, 1e-3).pair}

@@ -17,7 +17,6 @@ from wholebody.geometry.continuous.passing_through import OVERLAP, Entered, ente
 from wholebody.geometry.continuous.sweep import FirstContact, Sweep
 from wholebody.geometry.continuous.swept_depth import SweptDepth
 from wholebody.geometry.proximity import Contacts, PairTable
-from wholebody.scene.geometry_model import SceneGeometry
 from wholebody.scene.moving_scene import MovingScene
 
 LEAST_APPROACH, LARGEST_APPROACH = 5e-4, 0.02  # m: the same at least, and at most: rows are of first order only
@@ -45,24 +44,6 @@ class Collision(NamedTuple):
         return f"{self.second} passed through {self.first}, or {1e3 * self.depth:.1f} mm into it and out"
 
 
-class MovingThings:
-    """The things that move in one run; sweeps of both sides are made for each set of them, and kept."""
-
-    def __init__(self, built: SceneGeometry, geometry: pin.GeometryModel) -> None:
-        """Begin without any, on the scene's geometry and the same with the placements that the run sees."""
-        self._built, self._geometry = built, geometry
-        self._made: dict[tuple[str, ...], _BothSides] = {}
-
-    def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
-        """A frame in which things move between two placements in the frame of the joint that carries them."""
-        names = tuple(moved)
-        both = self._made.get(names)
-        if both is None:
-            both = self._made[names] = _BothSides(MovingScene(self._built, names, between_things=False))
-        both.scene.refresh(self._geometry)
-        return FrameMotion(both, moved)
-
-
 class FrameMotion:
     """How things move during one frame.
 
@@ -72,7 +53,7 @@ class FrameMotion:
         still: whether nothing moves: things were put into the figure, or are still in it.
     """
 
-    def __init__(self, both: _BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
+    def __init__(self, both: BothSides, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> None:
         self._both, self._scene, self.names = both, both.scene, both.scene.names
         nothing = np.zeros(self._scene.figure_nq)
         self._start, self._end = (
@@ -151,8 +132,8 @@ class FrameMotion:
         return way
 
 
-class _BothSides:
-    """A moving scene with its sweeps."""
+class BothSides:
+    """A moving scene with its sweeps: sweeps of both sides are made for each set of things that move, and kept."""
 
     def __init__(self, scene: MovingScene) -> None:
         self.scene = scene

@@ -21,9 +21,6 @@ from wholebody.scene.geometry_model import SceneGeometry
 PER_THING = 7
 """Numbers of a thing in a configuration: where its centre is, and how it is turned, x, y, z, w."""
 
-PER_MOTION = 6
-"""Numbers of its velocity: of the centre, and of the rotation, both in the thing's own axes for the rotation."""
-
 
 class MovingScene:
     """Model and geometry of a scene some of whose things move.

@@ -22,7 +22,7 @@ from wholebody.scene.geometry_model import SceneGeometry
 if TYPE_CHECKING:
     from wholebody.geometry.continuous.sweep import Sweep
     from wholebody.geometry.continuous.swept_depth import SweptDepth
-    from wholebody.scene.moving_obstacles import Collision, FrameMotion, MovingThings
+    from wholebody.scene.moving_obstacles import BothSides, Collision, FrameMotion
 
 
 class NotCopyable:
@@ -65,7 +65,7 @@ class Workspace(NotCopyable):
         self.proximity = Proximity(built.table)
         self._sweep: Sweep | None = None
         self._depths: dict[float, SweptDepth] = {}
-        self._moving: MovingThings | None = None
+        self._moving: dict[tuple[str, ...], BothSides] = {}
         self._seen = built.update_placements(self.proximity, -1)
 
     def begin(self) -> None:
@@ -115,11 +115,15 @@ class Workspace(NotCopyable):
 
     def frame(self, moved: Mapping[str, tuple[pin.SE3, pin.SE3]]) -> FrameMotion:
         """A frame in which these things move, from one placement to another in the frame of their joint."""
-        if self._moving is None:
-            from wholebody.scene.moving_obstacles import MovingThings
+        from wholebody.scene.moving_obstacles import BothSides, FrameMotion
+        from wholebody.scene.moving_scene import MovingScene
 
-            self._moving = MovingThings(self._built, self.geometry)
-        return self._moving.frame(moved)
+        both = self._moving.get(tuple(moved))
+        if both is None:
+            scene = MovingScene(self._built, moved, between_things=False)
+            both = self._moving[tuple(moved)] = BothSides(scene)
+        both.scene.refresh(self.geometry)
+        return FrameMotion(both, moved)
 
     @property
     def geometry(self) -> pin.GeometryModel:
@@ -145,11 +149,11 @@ class Workspace(NotCopyable):
 
     def near(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """Every pair nearer than `within` metres at the posture q, shape (nq,); see `Proximity.query`."""
-        return self.proximity.query(self.state.update(q), within, most)
+        return self.proximity.query(self.state.update(q).data, within, most)
 
     def near_views(self, q: Array, within: float, most: Array | None = None) -> Contacts:
         """What `near` returns, in arrays that the next call of this overwrites."""
-        return self.proximity.query_views(self.state.update(q), within, most)
+        return self.proximity.query_views(self.state.update(q).data, within, most)
 
     def largest_approach(self, most: Array) -> Array:
         """Most by which the distance of every pair (pairs,) can fall while no freedom moves more than `most` (nv,).
@@ -163,7 +167,7 @@ class Workspace(NotCopyable):
 
     def placements(self, q: Array) -> Array:
         """Where all pieces are at the posture q, shape (nq,); see `Contacts.placements`."""
-        return self.proximity.placements(self.state.update(q))
+        return self.proximity.placements(self.state.update(q).data)
 
 
 def borrowed(built: SceneGeometry, begin: Callable[[Workspace], Any] = Workspace.begin) -> Loan[Workspace]:

@@ -347,14 +347,11 @@ class Lineariser:
             checked_rows(term, part, derivative, rows)
             value[row : row + rows] = part
             if isinstance(derivative, Wrench):
-                self._write_rows(derivative, jacobian[row : row + rows])
+                wrenches = np.ascontiguousarray(derivative.rows, dtype=float)
+                joint, against, mine = derivative.joint, derivative.against, jacobian[row : row + rows]
+                self._kernel.wrench_rows(wrenches, joint, against, state.columns, self._plan[:4], mine)
             else:
                 jacobian[row : row + rows] = derivative
-
-    def _write_rows(self, wrench: Wrench, rows: Array) -> None:
-        """Write the rows (m, nv) of a wrench."""
-        wrenches, joint, against = np.ascontiguousarray(wrench.rows, dtype=float), wrench.joint, wrench.against
-        self._kernel.wrench_rows(wrenches, joint, against, self.state.columns, self._plan[:4], rows)
 
     def _bound(self, bounds: Sequence[Bound], box: Array) -> None:
         for bound in bounds:

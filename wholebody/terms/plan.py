@@ -154,7 +154,8 @@ def make_plan(limits: Limits, terms: Terms, dt: float | None, state: State) -> T
     parts[kinds.BOX], other_bounds = _boxes(bounds, state, dt)
     other_measures, curvature = _measures(measures, model, parts)
     parts[kinds.CURVATURE] = [((0,), curvature)]
-    braking = _braking(bounds, model.nv, dt)
+    # largest share of the way to its limit that each freedom goes in a step
+    braking = np.min([np.ones(model.nv), *(one.braking(dt) for one in bounds if type(one) is tasks.StepLimit)], axis=0)
     parts[kinds.LIMIT] = [
         ((int(q), int(v)), np.array([low, high, braking[v]]))
         for q, v, low, high in zip(limits.idx_q, limits.idx_v, limits.lower, limits.upper, strict=True)
@@ -210,13 +211,6 @@ def _boxes(bounds: Sequence[Bound], state: State, dt: float | None) -> tuple[lis
     static = [bound for bound in bounds if type(bound) in (tasks.Freeze, tasks.StepLimit)]
     rows: list[Row] = [((0,), np.array(side, dtype=float)) for bound in static for side in bound.bounds(state, dt)]
     return rows, tuple(bound for bound in bounds if bound not in static)
-
-
-def _braking(bounds: Sequence[Bound], nv: int, dt: float | None) -> Array:
-    """Largest share (nv,) of the way to its limit that each freedom goes in a step."""
-    shares = [bound.braking(dt) for bound in bounds if type(bound) is tasks.StepLimit]
-    least: Array = np.min([np.ones(nv), *shares], axis=0)
-    return least
 
 
 def _measures(

@@ -163,7 +163,7 @@ def _halved(
 def _swept_through(queries: Queries, q0: Array, q1: Array, doubtful: Indices, end: Array) -> bool:
     """The same by a sweep of these pairs; `end` are the distances (pairs,) after the motion."""
     while len(doubtful):
-        hit = queries.sweep.first_contact(q0, q1, queries.table.pairs[doubtful], OVERLAP)
+        hit = queries.sweep.first_contact(q0, q1, doubtful, OVERLAP)
         if hit is None:
             return False
         if end[hit.index] > -OVERLAP:
@@ -182,7 +182,7 @@ def first_passed(
     table = queries.table
     moved = far_moved(table, before, after)
     doubtful = moved[distances(after, len(table.pairs))[moved] > -overlap]
-    return queries.sweep.first_contact(q0, q1, table.pairs[doubtful], overlap) if len(doubtful) else None
+    return queries.sweep.first_contact(q0, q1, doubtful, overlap) if len(doubtful) else None
 
 
 def doubtful_pairs(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
