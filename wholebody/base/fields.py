@@ -78,7 +78,9 @@ class Vector:
 
     def __call__(self, value: object, what: str) -> tuple[float, ...]:
         """The numbers; an InputError if the value is of another shape, or one of them is out of range."""
-        return tuple(self.each(one, what) for one in checks.numbers(value, (self.count,), what).tolist())
+        found = tuple(checks.numbers(value, (self.count,), what).tolist())
+        within = not self.each.whole and self.each.low <= min(found) and max(found) <= self.each.high
+        return found if within else tuple(self.each(one, what) for one in found)
 
 
 @dataclass(frozen=True)

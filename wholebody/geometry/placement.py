@@ -23,6 +23,9 @@ ROUNDING = 1e-3
 """Largest error of a rotation: numbers with four digits are repaired, larger errors are refused."""
 
 
+_UPRIGHT = np.eye(3)
+
+
 def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
     """Read a placement, metres, as a fresh SE3 whose rotation is orthonormal to machine precision.
 
@@ -40,8 +43,9 @@ def placement(at: PlacementLike, what: str = "placement") -> pin.SE3:
         return _rigid(np.asarray(at.rotation), np.asarray(at.translation), what)
     values = array(at, what, "(x, y, z), (x, y, z, qx, qy, qz, qw), a 4x4 matrix or a pin.SE3")
     if values.shape == (3,):
-        _check_values(values, what)
-        return pin.SE3(np.eye(3), values.copy())
+        if not max(map(abs, values.tolist())) <= FARTHEST or np.isnan(values).any():
+            _check_values(values, what)
+        return pin.SE3(_UPRIGHT, values)
     if values.shape == (7,):
         norm = float(np.linalg.norm(values[3:]))
         if np.isfinite(norm) and abs(norm - 1.0) > ROUNDING:

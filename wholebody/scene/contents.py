@@ -238,14 +238,13 @@ class SceneContents(checks.FixedAttributes):
         body: Body | None = None,
         material: Material = DEFAULT,
     ) -> Self:
-        checks.text(name, "the name of an object")
         checks.instance(shape, Shape, repr(name), SHAPES)
         place = to_placement(at, f"{name!r}: at")
         _warn_of_units(name, place, shape)
         painted = None if color is None else checks.color(color, f"{name!r}: color")
         with self._lock:
             thing = SceneObject(name, shape, place, to, painted, rests_on, body=body, material=material)
-            self._objects[self._new_name(name)] = thing
+            self._objects[self._free_name(name)] = thing
             self._changed()
         return self
 
@@ -257,7 +256,9 @@ class SceneContents(checks.FixedAttributes):
         return self._objects[checks.known(name, self._objects, "object")]
 
     def _new_name(self, name: str) -> str:
-        checks.text(name, "the name of an object")
+        return self._free_name(checks.text(name, "the name of an object"))
+
+    def _free_name(self, name: str) -> str:
         if name in self._objects or name in self.figure.segments:
             raise InputError(
                 f"the scene already has a {name!r}; give the new object another name, or move() the old one"
@@ -295,7 +296,7 @@ class SceneContents(checks.FixedAttributes):
 def _warn_of_units(name: str, place: pin.SE3, shape: Shape | None = None) -> None:
     """Warn of a place and a size that are hardly metres."""
     # m: a thing farther than this from the origin is probably placed in millimetres
-    if (far := float(max(abs(place.translation)))) > 100.0:
+    if (far := max(map(abs, place.translation.tolist()))) > 100.0:
         told = f"{name!r} is {far:.4g} m away; lengths are in metres, so divide millimetres by 1000"
         checks.warn(told)
     extent = _extent(shape)
