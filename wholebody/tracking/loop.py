@@ -263,7 +263,7 @@ def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
     deepest = deepest_overlap(scene, q)
     if not deepest:
         return q, ""
-    attraction = Attraction(scene.model, q, weights(scene, rigid))
+    attraction = Attraction(q, weights(scene, rigid))
     cones = [ReachCones()] if scene.figure.cones else []
     solution = QP().solve(Problem(scene, q, constraints=cones, measures=[attraction], clearance=CLEARANCE))
     if deepest_overlap(scene, solution.q):

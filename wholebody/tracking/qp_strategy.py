@@ -33,9 +33,9 @@ class Attraction(DistanceMeasure):
     cost in the other joints, and its force does not grow with the distance.
     """
 
-    def __init__(self, model: pin.Model, q: Array, weights: Array) -> None:
+    def __init__(self, q: Array, weights: Array) -> None:
         """Attract to q (nq,) with weights (nv,), 1/rad^2 and 1/m^2."""
-        self.distance = SquaredDistance.build(model, q, weights)
+        self.distance = SquaredDistance.build(q, weights)
         self._weights = self.distance.weights.copy()
 
     def toward(self, q: Array) -> None:
@@ -83,7 +83,7 @@ class QPStrategy:
         self.scene, self.dt = scene, dt
         most = largest_motions(scene, dt)
         self._motion_limit = FrameMotionLimit(scene.model, most)
-        self._attraction = Attraction(scene.model, start, weights(scene, rigid))
+        self._attraction = Attraction(start, weights(scene, rigid))
         cones = [ReachCones()] if scene.figure.cones else []
         mine = [*scene.figure.segments, *(name for name, thing in scene.objects.items() if thing.segment is not None)]
         self.problem = Problem(

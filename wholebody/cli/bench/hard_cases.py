@@ -131,7 +131,6 @@ def attack(arguments: argparse.Namespace) -> int:
         raise InputError("no case ended; give more --seconds")
     rows.sort(key=lambda one: (one["seed"], one["number"]))
     facts = machine()
-    report.index(rows, arguments.out)
     publish(
         "attack", report.report(rows, facts), arguments, facts=facts, tables={"attack": rows}, page="reliability.md"
     )
