@@ -116,9 +116,8 @@ class FrameLoop(NotCopyable):
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
             self._said = self._said or self.scene.figure.warn_of_angles(goal, "tracked")  # once for all frames
-            resolution = self._strategy.resolve(
-                self.shown, self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
-            )
+            within = self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
+            resolution = self._strategy.resolve(self.shown, within)
         if motion is None:
             return self._shown(self._kept_from_passing(resolution), began=began)
         if not motion.still:

@@ -229,10 +229,8 @@ class LivePage:
                 known = self._sent.get(number)
                 if known is None or not place.isApprox(known, STILL):
                     handle, self._sent[number] = self._pieces[number], place
-                    handle.position, handle.wxyz = (
-                        place.translation,
-                        np.roll(pin.Quaternion(place.rotation).coeffs(), 1),
-                    )
+                    handle.position = place.translation
+                    handle.wxyz = np.roll(pin.Quaternion(place.rotation).coeffs(), 1)
 
 
 def _handle_color(held: bool) -> tuple[int, int, int]:

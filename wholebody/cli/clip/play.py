@@ -61,9 +61,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise InputError(f"--ghost: {arguments.ghost.name} has {len(ghost)} frames and not {len(clip)}")
     scene = dressed(clip.figure, arguments.equipment)
     if clip.figure.root == "free":
-        scene.add(
-            HalfSpace(), name="floor", at=(0.0, 0.0, min(lowest(clip.figure, q) for q in clip.q))
-        )  # not all have it at 0
+        floor = min(lowest(clip.figure, q) for q in clip.q)  # recordings do not all have it at 0
+        scene.add(HalfSpace(), name="floor", at=(0.0, 0.0, floor))
     with Viewer(scene, title=clip.name) as viewer:
         if clip.figure.root == "free":
             middle = 0.5 * (clip.q[:, :3].min(axis=0) + clip.q[:, :3].max(axis=0))
