@@ -63,6 +63,13 @@ def test_positions_of_joints_are_offsets_or_added_to_them(tmp_path: Path, rows: 
     for there in ((0.0, 20.0, 0.0), (0.0, 0.0, 0.0)):
         given = np.hstack([rows[:, :6], np.tile(there, (8, 1)), rows[:, 6:]])
         np.testing.assert_allclose(read(tmp_path, text(hips(SIX), given)).positions, plain.positions, atol=1e-12)
+    lengths = 20.0 + 3.0 * np.arange(8.0)
+    stretched = read(
+        tmp_path, text(hips(SIX), np.hstack([rows[:, :6], np.outer(lengths, (0.0, 1.0, 0.0)), rows[:, 6:]]))
+    )
+    at = [stretched.positions[:, stretched.names.index(name)] for name in ("Hips", "Spine", "Head")]
+    np.testing.assert_allclose(np.linalg.norm(at[1] - at[0], axis=1), 0.01 * lengths, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(at[2] - at[1], axis=1), 0.4, atol=1e-12)
 
 
 def test_text_of_every_kind_is_read(tmp_path: Path, rows: np.ndarray) -> None:

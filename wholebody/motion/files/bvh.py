@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -58,6 +59,7 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
     turn, scale = UP[up], UNITS[unit]
     local = turn @ local[first:] @ turn.T
     places = scale * root[first:] @ turn.T
+    kept = list(range(len(names)))
     if top:
         places, local = _from_the_world(
             top, places, scale * _positions(found, top)[first:] @ turn.T, parents, local, offsets, scale * turn
@@ -69,11 +71,26 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         offsets[0] = 0.0
         parents = np.array([kept.index(int(parents[k])) if k != top else -1 for k in kept], dtype=np.intp)
     try:
-        return SkeletonMotion.moved(
+        motion = SkeletonMotion.moved(
             names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
         )
+        return replace(motion, positions=_lengthened(motion, found, kept, first, scale * turn))
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
+
+
+def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> Array:
+    """Places (n, j, 3) of the joints where the lengths of bones change."""
+    positions, columns = np.array(motion.positions), _columns(found)
+    for joint, source in enumerate(kept[1:], 1):
+        parent = motion.parents[joint]
+        step: Array = motion.offsets[joint]
+        given = [values for (_, kind), values in columns[source].items() if kind == "position"]
+        if any(values.any() for values in given):
+            step = _positions(found, source)[first:] @ scale.T
+        turned = np.einsum("nij,nj->ni", motion.rotations[:, parent], np.broadcast_to(step, (len(motion), 3)))
+        positions[:, joint] = positions[:, parent] + turned
+    return positions
 
 
 def _positions(found: BvhText, joint: int) -> Array:
@@ -167,7 +184,9 @@ def _offsets(found: BvhText) -> tuple[Array, Array, list[str]]:
             if values is not None and not still[k]:
                 offsets[k, axis] = values.mean()
                 if np.ptp(values) > 0.01 * size:
-                    notes.append(f"the length of the bone to {joint.name} changes; its mean is taken")
+                    notes.append(
+                        f"the length of the bone to {joint.name} changes; its mean is that of the rest posture"
+                    )
     root = _positions(found, 0)
     offsets[0] = 0.0  # the root's channels are its place in the world
     return offsets, root, notes
