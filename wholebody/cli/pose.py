@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -71,18 +72,14 @@ def _pose(path: Path, method: str | None, out: Path, as_json: bool, screenshots:
 
     from rich.console import Console  # needed only for tables and pictures, so imported after the result is written
 
-    console = Console()
-    notes = Console(stderr=True) if as_json else console
     if as_json:
         print(text, end="")
     else:
         from wholebody.cli import tables
 
-        tables.show_solution(console, task, solution)
-    with notes.status("drawing"):
+        tables.show_solution(Console(), task, solution)
+    with Console(stderr=as_json).status("drawing"):
         written, note = picture.draw(task.problem, solution.q, task.view, out, task.title, screenshots)
-    for file in (out / "result.json", *written):
-        notes.print(f"wrote {file}", highlight=False, soft_wrap=True)
-    if note:
-        notes.print(note, highlight=False, soft_wrap=True)
+    told = [f"wrote {file}" for file in (out / "result.json", *written)]
+    print(*told, *filter(None, [note]), sep="\n", file=sys.stderr if as_json else sys.stdout)
     return 0 if solution.solved else 1

@@ -10,6 +10,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.view.server import Command, Op
+from wholebody.view.style import LOOK
 
 if TYPE_CHECKING:
     from wholebody.view.surface import Patch
@@ -103,6 +104,24 @@ def set_property(path: str, name: str, value: Any) -> Command:
 def delete(path: str) -> Command:
     """Remove a node and all below it."""
     return Command(Op.DELETE, path, "", pack({"type": "delete", "path": path}))
+
+
+def look_from(eye: Array, target: Array) -> Command:
+    """Turn the camera at `eye` (3,) to a target (3,)."""
+    return _look(eye=np.asarray(eye, dtype=float).tolist(), target=np.asarray(target, dtype=float).tolist())
+
+
+def look_at(points: Array, direction: Sequence[float], margin: float) -> Command:
+    """Turn the camera to the middle of points (n, 3), from a direction (3,) so far away that all are in the picture.
+
+    `margin` is the width of the picture relative to the points; 1 is exact.
+    """
+    target = (points.min(axis=0) + points.max(axis=0)) / 2
+    return _look(direction=list(direction), target=target.tolist(), points=floats(points), margin=margin)
+
+
+def _look(**how: Any) -> Command:
+    return Command(Op.CAMERA, "", "", pack({"type": "look", "fov": LOOK.field_of_view, **how}))
 
 
 class Track(NamedTuple):

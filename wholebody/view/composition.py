@@ -13,9 +13,8 @@ from wholebody.dynamics.overlaps import Overlap
 from wholebody.figures.figure import Figure
 from wholebody.figures.state import State
 from wholebody.geometry.proximity import PENETRATION
-from wholebody.view import drawing
+from wholebody.view import commands, drawing
 from wholebody.view.bodies import Bodies
-from wholebody.view.camera import camera_on
 from wholebody.view.contact_markers import color_contacts, mark_blockers, mark_contacts, mark_overlaps
 from wholebody.view.goal_markers import Goals, mark_frames
 from wholebody.view.scene_graph import Keyframe, Marker, SceneGraph
@@ -131,4 +130,9 @@ class Composition:
             things.append(self.bodies.corners(state.data, things=True))
             if self._goals is not None:
                 figure.append(self._goals.targets(state))
-        return camera_on(np.concatenate(figure), np.concatenate(things))
+        seen, around = np.concatenate(figure), np.concatenate(things)
+        if not len(seen):
+            seen = around if len(around) else np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 2.0]])
+        # m: distance from the figure within which things are kept in the picture
+        near = np.clip(around, seen.min(axis=0) - 0.3, seen.max(axis=0) + 0.3)
+        return commands.look_at(np.concatenate([seen, near]), LOOK.direction, LOOK.margin)

@@ -22,7 +22,7 @@ from wholebody.base.files import checked_target, write
 from wholebody.dynamics.overlaps import Overlap
 from wholebody.geometry.placement import FARTHEST
 from wholebody.problem import Problem
-from wholebody.view.camera import look
+from wholebody.view import commands
 from wholebody.view.composition import Composition
 from wholebody.view.contact_markers import checked_overlaps
 from wholebody.view.legend import panel
@@ -259,7 +259,7 @@ class Viewer:
             here, there = checks.numbers(eye, (3,), "eye"), checks.numbers(target, (3,), "target")
             if max(np.abs(here).max(), np.abs(there).max()) > FARTHEST or np.linalg.norm(here - there) < 1e-6:
                 raise InputError("look takes two different places; give an eye and a target, metres")
-            camera = look(there, LOOK.field_of_view, eye=here)
+            camera = commands.look_from(here, there)
         self._camera = camera
         if self._seen:
             self._graph.do(self._camera_command())
@@ -299,14 +299,14 @@ class Viewer:
         HTML has the motion, glTF pieces and things at the posture, or at its beginning. FILE.png is `picture`, which
         raises the same; other endings are refused. Returns the path.
         """
-        place, commands = checked_target(path, "save: path", "a scene", SAVED), self._commands()
+        place, drawn = checked_target(path, "save: path", "a scene", SAVED), self._commands()
         if place.suffix.lower() == ".png":
             return self.picture(place)
         if place.suffix.lower() == ".glb":
             from wholebody.view.gltf import posture_glb
 
             return write(place, posture_glb(self._composition.scene, self._seen[0]))
-        return write(place, static_page(commands, self.title))
+        return write(place, static_page(drawn, self.title))
 
     def _repr_html_(self) -> str:
         """The scene in a notebook: a frame with the page that `save` writes; a sentence if nothing is shown yet."""
