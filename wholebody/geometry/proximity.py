@@ -68,22 +68,21 @@ class Contacts(NamedTuple):
 
 
 class _ContactBuffer:
-    """Room for so many contacts; `vectors` has normals, points on the first and on the second piece."""
+    """Room for so many contacts: distances; normals, points on the first and on the second piece; numbers; pairs."""
 
     def __init__(self, size: int) -> None:
-        self.size = size
-        self.distance, self.vectors = np.empty(size), np.empty((3, size, 3))
-        self.number, self.pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
-        self.arrays = self.distance, self.vectors, self.number, self.pair
+        number, pair = np.empty(size, dtype=np.intp), np.empty((size, 2), dtype=np.intp)
+        self.size, self.arrays = size, (np.empty(size), np.empty((3, size, 3)), number, pair)
         self._front: dict[int, Contacts] = {}
 
     def contacts(self, count: int, placements: Array) -> Contacts:
         """The first `count` of the contacts; the same object where both arguments are the same."""
         known = self._front.get(count)
         if known is None or known.placements is not placements:
-            normal, point_a, point_b = self.vectors[:, :count]
+            distance, vectors, number, pair = self.arrays
+            normal, point_a, point_b = vectors[:, :count]
             known = self._front[count] = Contacts(
-                self.pair[:count], self.distance[:count], normal, point_a, point_b, self.number[:count], placements
+                pair[:count], distance[:count], normal, point_a, point_b, number[:count], placements
             )
         return known
 
@@ -195,25 +194,23 @@ class Proximity:
         With `most`, shape (pairs,), a pair that is as far apart as its entry [m] is left out too. Nothing else is left
         out. Results of pairs that were culled are never read: coal leaves old numbers in them.
         """
-        began = time.perf_counter()
-        placements = self.placements(data)
-        most = self._endless if most is None else most
-        index = self._asked(placements, within, most)
-        contacts = self._gather(_ContactBuffer(len(index)), placements, index, within, most)
-        self.seconds += time.perf_counter() - began
-        return contacts
+        return self._query(self.placements(data), within, most, None)
 
     def query_views(self, data: Any, within: float, most: Array | None = None) -> Contacts:
         """What `query` returns, in arrays that the next call of this overwrites."""
-        began = time.perf_counter()
         self.distances.place(self.table.model, data)
-        placements = self._placed
-        placements[:] = self.distances.placed
+        self._placed[:] = self.distances.placed
+        return self._query(self._placed, within, most, self._buffer)
+
+    def _query(self, placements: Array, within: float, most: Array | None, room: _ContactBuffer | None) -> Contacts:
+        began = time.perf_counter()
         most = self._endless if most is None else most
         index = self._asked(placements, within, most)
-        if len(index) > self._buffer.size:
-            self._buffer = _ContactBuffer(2 * len(index))
-        contacts = self._gather(self._buffer, placements, index, within, most)
+        if room is None:
+            room = _ContactBuffer(len(index))
+        elif len(index) > room.size:
+            room = self._buffer = _ContactBuffer(2 * len(index))
+        contacts = self._gather(room, placements, index, within, most)
         self.seconds += time.perf_counter() - began
         return contacts
 
