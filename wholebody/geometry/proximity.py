@@ -159,13 +159,15 @@ class Proximity:
         self.results = self.distances.data
         self._kernel = compiled_kernel()
         count, pairs = self.geometry.ngeoms, len(table.pairs)
-        self._marks, self._count = np.zeros((3, pairs), dtype=np.intp), 0
+        marks, self._count = np.zeros((3, pairs), dtype=np.intp), 0
+        self._index, _, self._changed = marks
+        self._singly = pairs >= SINGLY
         self._travelled, self._endless = np.zeros(count), np.full(pairs, np.inf)
         self._bound = np.array([self._endless, table.points_meet])
         self._placed, self._buffer = np.zeros((count, 4, 3)), _ContactBuffer(64)
         self._looked = (
             table.pairs, table.reach, table.half, np.zeros((count, 4, 3)), self._travelled, self._bound,
-            np.zeros((count, 3)), self._marks,
+            np.zeros((count, 3)), marks,
         )  # fmt: skip
         self._gathered = table.pairs, self._travelled, self._bound
         # memory that is never written takes none
@@ -221,15 +223,15 @@ class Proximity:
             count, gone, came = self._kernel.look(placements, self._looked, within, most, self._count)
             self._count = count
             self.asked += count
-            numbers: Indices = self._marks[0, :count]
+            numbers = self._index[:count]
             if self._read is not None:
                 fields(self._read)[numbers] = self.distances.measured(numbers)
-            elif len(self.table.pairs) >= SINGLY:
+            elif self._singly:
                 for number in numbers.tolist():
                     pin.computeDistance(self.geometry, results, number)
             else:
                 if gone or came:
-                    changed = self._marks[2, : gone + came].tolist()
+                    changed = self._changed[: gone + came].tolist()
                     for number in changed[:gone]:
                         results.deactivateCollisionPair(number)
                     for number in changed[gone:]:
