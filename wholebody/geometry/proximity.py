@@ -109,11 +109,7 @@ class PairTable:
     """
 
     def __init__(self, model: pin.Model, geometry: pin.GeometryModel, pairs: Indices | None = None) -> None:
-        """Read the pieces and pairs; to read a hundred thousand pairs takes half a second, where they are not given.
-
-        Raises:
-            InputError: a geometry that is not a convex piece.
-        """
+        """Read the pieces, and the pairs where they are not given; an InputError for what is no convex piece."""
         self.model, self.geometry = model, geometry
         self.swept = [swept_points(piece.geometry) for piece in geometry.geometryObjects]
         self.pairs: Indices = pairs_of(geometry) if pairs is None else pairs
