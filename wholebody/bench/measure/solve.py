@@ -29,7 +29,7 @@ from wholebody.bench.suite.problem_sets.bodies import TIPS
 from wholebody.bench.suite.problem_sets.reaching import reach_among
 from wholebody.bench.suite.problem_sets.registry import SETS
 from wholebody.bench.tables import programs_text, summed_programs
-from wholebody.methods.simplification.simplify import GROWTH, Parts, leave_out
+from wholebody.methods.simplification.simplify import Parts, leave_out
 from wholebody.problem import Problem
 
 TOLERANCE = 1e-5  # m, rad: what methods are asked for
@@ -177,10 +177,10 @@ SHOWN = "solved", "pairs", "a solve ms", "judgement ms", "inside", "worst deepes
 """Figures of a level of modelling that the report shows."""
 
 LEVELS: dict[str, Parts] = {
-    "all": Parts(joints=False, pairs=False, growth=0.0),
-    "active joints": Parts(joints=True, pairs=False, growth=0.0),
-    "pairs in reach": Parts(joints=False, pairs=True, growth=0.0),
-    "simplified": Parts(joints=True, pairs=True, growth=GROWTH),
+    "all": Parts(joints=False, pairs=False),
+    "active joints": Parts(joints=True, pairs=False),
+    "pairs in reach": Parts(joints=False, pairs=True),
+    "simplified": Parts(joints=True, pairs=True),
 }
 
 
