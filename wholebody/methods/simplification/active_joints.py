@@ -89,10 +89,7 @@ def _squares(problem: Problem) -> list[tuple[list[int], float]]:
 
 
 def _closed(
-    moving: Mask,
-    rows: list[tuple[Constraint, Mask, Mask, Mask]],
-    squares: list[tuple[list[int], float]],
-    frozen: Mask,
+    moving: Mask, rows: list[tuple[Constraint, Mask, Mask, Mask]], squares: list[tuple[list[int], float]], frozen: Mask
 ) -> Mask:
     """Add joints until none is new.
 
