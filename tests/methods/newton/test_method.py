@@ -13,12 +13,12 @@ import pytest
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.methods.newton.equations import unit_lengths
+from wholebody.methods.newton.batches import unit_lengths
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_bodies import FigureBodies
-from wholebody.methods.newton.figure_system import FigureSystem
 from wholebody.methods.newton.inequalities import SquaredSlacks
 from wholebody.methods.newton.system import System
+from wholebody.methods.newton.terms import FigureSystem
 from wholebody.tasks.base import Bound
 
 

@@ -39,17 +39,9 @@ class TangentRows(Batch):
         bound: Array,
         depends: Mask | None = None,
     ) -> None:
-        """Take a function with its derivative.
+        """Take the value (m,) and its derivative (m, nv) at a state; `chosen` (size,) are the used rows among the m.
 
-        Args:
-            bodies: of the figure, whose joints are revolute ones and a free root.
-            label: its name in messages.
-            value: (m,) at a state.
-            jacobian: (m, nv) at a state.
-            chosen: (size,) indices of the used rows among the m.
-            sign: (size,) 1 or -1.
-            bound: (size,) subtracted from the value.
-            depends: (size, nv) the degrees of freedom that each used row depends on; None for all.
+        The degrees of freedom on which each used row depends are `depends` (size, nv); None for all.
         """
         super().__init__(np.arange(bodies.count)[None], [label])
         self._figure, self._value, self._slope = bodies, value, jacobian
@@ -180,11 +172,7 @@ class AssemblyConstraint(ABC):
         """(m, b, 7) its derivative by the bodies."""
 
     def curvature(self, x: Array, force: Array) -> Array:
-        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it.
-
-        Raises:
-            InputError: the class does not write it.
-        """
+        """(b, 7, b, 7) second derivative of force (m,) times residual; only `solve(nearest=True)` needs it."""
         raise InputError(f"{type(self).__name__} has no second derivatives; write curvature, or leave nearest out")
 
 
@@ -214,11 +202,7 @@ class OwnRows(Batch):
 
 
 def checked(term: AssemblyConstraint, x: Array, label: str) -> int:
-    """How many rows a constraint has, after its derivative was compared with differences at the bodies x (b, 7).
-
-    Raises:
-        InputError: a value of the wrong shape, one that is not finite, or a derivative that is wrong.
-    """
+    """How many rows a constraint has, after its derivative was compared with differences at the bodies x (b, 7)."""
     first = np.asarray(term.residual(x.copy()), dtype=float)
     if first.ndim != 1 or not len(first):
         raise InputError(f"{label}: residual has shape {first.shape}; return m values, shape (m,)")
@@ -242,11 +226,7 @@ def checked(term: AssemblyConstraint, x: Array, label: str) -> int:
 
 
 def names_of(term: AssemblyConstraint, label: str) -> list[str]:
-    """The names of a constraint's bodies.
-
-    Raises:
-        InputError: there are none, or one is twice in the list.
-    """
+    """The names of a constraint's bodies."""
     given = getattr(term, "bodies", ())
     names = [text(name, f"{label}: a name in bodies") for name in listed(given, f"{label}: bodies", "('crank',)")]
     if not names or len(set(names)) < len(names):
