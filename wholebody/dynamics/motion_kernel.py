@@ -91,15 +91,7 @@ def angular_momentum(rotation: Array, inertia: Array, spin: Array, result: Array
 
 @compiled()
 def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, time: float) -> None:
-    """Turn a free body for a time: `rotation` (3, 3) and `spin` (3,) are changed in place.
-
-    Args:
-        rotation: of the body.
-        inertia: (3, 3) in the body.
-        inverse: of the inertia.
-        spin: angular velocity in the world, rad/s.
-        time: seconds.
-    """
+    """Turn a free body for a time [s]: rotation (3, 3) and angular velocity (3,) in the world change in place."""
     speed = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
     if speed < 1e-12:  # rad/s: no motion, whose axis would be 0 / 0
         return
@@ -176,14 +168,10 @@ def _orthonormal(rotation: Array) -> None:
 
 @compiled()
 def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
-    """Move all bodies for a time; positions, rotations and angular velocities change in place.
+    """Move all bodies for a time [s]: positions, rotations and angular velocities change in place.
 
-    Args:
-        bodies: with the velocities at the end of the time.
-        pushed: (n,) bodies on which a contact acts: they move with the velocity at the end, the others with the mean
-            of those at the start and at the end.
-        gravity: (3,) m/s2.
-        time: seconds.
+    Bodies on which a contact acts are pushed (n,): they move with the velocity at the end, the others with the mean of
+    those at the start and at the end.
     """
     now, turn = np.empty((3, 3)), np.empty(3)
     for b in range(len(bodies.mass)):
@@ -217,16 +205,7 @@ def displace(bodies: Bodies, way: Array) -> None:
 def place_pieces(
     position: Array, rotation: Array, centre: Array, body: Indices, local: Array, placement: Array
 ) -> None:
-    """Write where all pieces are.
-
-    Args:
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3) of the bodies.
-        centre: (n, 3) centre of mass in the body's axes.
-        body: (pieces,) the body of each piece.
-        local: (pieces, 4, 3) placement of each in its body; see `Contacts.placements`.
-        placement: (pieces, 4, 3) room for their placements in the world.
-    """
+    """Write where all pieces (pieces, 4, 3) are, with the centres of mass and placements in their bodies."""
     for p in range(len(body)):
         b = body[p]
         for row in range(4):

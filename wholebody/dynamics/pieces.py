@@ -217,12 +217,7 @@ def segment_placements(scene: Scene, q: Array) -> dict[str, pin.SE3]:
 
 
 def joined(scene: Scene) -> tuple[tuple[str, str | None], ...]:
-    """Names of things that have joints, each with what holds it; None for the world.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        InputError: a thing is joined to itself.
-    """
+    """Names of things that have joints, each with what holds it; None for the world."""
     found = []
     known = [name for name, thing in scene.objects.items() if thing.segment is None]
     for name, thing in scene.objects.items():
@@ -271,14 +266,7 @@ class ContactFinder:
         return self._proximity.asked
 
     def near(self, position: Array, rotation: Array, margin: Array, active: Mask) -> Contacts:
-        """Pairs that are nearer than the margins (n,) of both bodies together, metres, and have an active body.
-
-        Args:
-            position: (n, 3) centres of mass.
-            rotation: (n, 3, 3).
-            margin: (n,) of each body.
-            active: (n,) whether a body can make contact: it moves.
-        """
+        """Pairs that are nearer than the margins (n,) of both bodies together, metres, and have an active body."""
         pieces = self.pieces
         placement = np.empty((len(pieces.body), 4, 3))
         motion_kernel.place_pieces(position, rotation, pieces.centre, pieces.body, pieces.local, placement)

@@ -34,12 +34,10 @@ class WorldScene:
     """A scene with a tracker, in which things move by themselves.
 
     Attributes:
-        name: its name on the command line.
-        about: one sentence.
+        name, about: its name on the command line, and one sentence.
         scene: figure and things; those with a `wb.Body` move by themselves.
         track: the tracked postures.
-        eye: position of the camera, metres; None for one that sees the figure.
-        target: the point in the middle of the picture, metres.
+        eye, target: the camera and the middle of the picture, metres; None for one that sees the figure.
         see_through: things to draw transparent.
     """
 
@@ -60,15 +58,8 @@ class _Plan(ScenePlan):
 def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt: float = FRAME) -> WorldScene:
     """Build a scene of `WORLD_SCENES`.
 
-    Args:
-        name: of the scene.
-        frames: number of frames; the script is cut, or repeated. By default the whole script once.
-        seed: of the tracked person's tremor.
-        dt: seconds from frame to frame.
-
-    Raises:
-        UnknownNameError: there is no such scene.
-        InputError: fewer than one frame.
+    Its script is cut or repeated to a number of frames, each dt seconds later; the seed is that of the tracked person's
+    tremor.
     """
     known(name, _PLANS, "scene")
     plan = _PLANS[name]
@@ -79,14 +70,7 @@ def build_world_scene(name: str, *, frames: int | None = None, seed: int = 0, dt
 
 
 def standing_scene(name: str, scene: Scene, q: Array, *, frames: int, dt: float = FRAME) -> WorldScene:
-    """A scene of one's own, in which the figure keeps a posture.
-
-    Args:
-        name: of files that are written.
-        scene: figure and things; at least one has a `wb.Body`.
-        q: (nq,) the posture.
-        frames: number of frames.
-        dt: seconds from frame to frame.
+    """A scene of one's own, in which the figure keeps the posture q (nq,) for a number of frames.
 
     Raises:
         InputError: nothing in the scene moves by itself, or a value of the wrong kind, shape or range.
@@ -202,10 +186,7 @@ def _twenty_things(scene: Scene) -> None:
 
 
 def _hand(figure: Figure, at: Place, glove: str, curl: float = 0.0) -> Array:
-    """The hand with its fingers forward (x) and its palm down; the index is bent by `curl` radians at each joint more.
-
-    The wrist is at a place relative to the middle of the table's top.
-    """
+    """The hand with fingers forward (x) and palm down, its wrist at a place over the table's middle, the index bent."""
     q = figure.posture(glove)
     q[:3] = at[0], at[1], TOP + at[2]
     bent = {

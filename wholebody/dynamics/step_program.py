@@ -209,12 +209,7 @@ class StepProgram:
         return -np.asarray((self._rates(moved) * self.impulse).sum(axis=1))
 
     def settle(self, before: tuple[Array, Array, Array], work: Array) -> None:
-        """Scale velocities after the step, so that joints and what is moved add no energy.
-
-        Args:
-            before: positions, rotations and velocities at its start.
-            work: (m + j,) as from `work`, before joints changed the velocities.
-        """
+        """Scale velocities after a step of this work (m + j,), so that joints and what is moved add no energy."""
         bodies, points = self.state.bodies, self.points
         if len(self.joints) or bodies.given[points.bodies[self._bearing()]].any():
             energy_kernel.settle(

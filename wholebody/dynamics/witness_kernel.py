@@ -18,13 +18,8 @@ from wholebody.base.compiled import compiled
 def needed(contact: Indices, count: int, normal: Array, point: Array, gap: Array, within: float) -> Mask:
     """All points (m,) but the witness points between ends of their patch that touch when they do.
 
-    Args:
-        contact: (m,) of each point: first the witness points of all contacts, then the ends, sorted by contact.
-        count: how many contacts there are.
-        normal: (m, 3) unit normals.
-        point: (m, 3) in the plane of its contact.
-        gap: (m,) metres.
-        within: of the ends that count, how much larger the gap may be than that of the witness point, metres.
+    First come the witness points of all `count` contacts, then the ends, sorted by contact. Ends count whose gap is
+    larger than that of the witness point by no more than `within` [m].
     """
     found, first, arm = np.ones(len(contact), dtype=np.bool_), count, np.empty((len(contact) - count, 3))
     while first < len(contact):

@@ -67,16 +67,7 @@ def meets(judgement: Assessment, tolerance: float) -> bool:
 def concluded(
     problem: Problem, ending: Ending, *, method: str, tolerance: float, control: Control, began: float
 ) -> Solution:
-    """The solution.
-
-    Args:
-        problem: to be solved.
-        ending: the end of the search.
-        method: name of the method and of its solver.
-        tolerance: metres and radians to which the method meets goals and constraints.
-        control: the control of the search.
-        began: `time.perf_counter` at the beginning of the call.
-    """
+    """The solution of a problem, whose search began at `began` by `time.perf_counter`."""
     judgement = assess(problem, ending.q) if ending.judgement is None else ending.judgement
     enough = assessed_tolerance(tolerance)
     if control.undefined is not None:

@@ -73,9 +73,6 @@ class Control:
         Args:
             time_limit: seconds on the clock; None for `LONGEST` of processor time, infinity for no limit.
             progress: see `Progress`.
-
-        Raises:
-            InputError: `progress` cannot be called.
         """
         if progress is not None and not callable(progress):
             raise InputError(f"progress is {a(type(progress))}; give a function of one trace entry")

@@ -32,11 +32,7 @@ NEGLIGIBLE = 1e-4  # m, rad: a constraint violated by less than this is no reaso
 
 
 class Stopwatch(threading.local):
-    """Adds up the time that this thread spends within it.
-
-    Attributes:
-        seconds: so far, wall time.
-    """
+    """Adds up the time that this thread spends within it: `seconds` so far, wall time."""
 
     def __init__(self) -> None:
         """Begin at 0."""
@@ -63,18 +59,9 @@ class Stepper(Protocol):
     """A tool, set up for one problem."""
 
     def step(self, q: Array, weight: float, damping: float) -> Array:
-        """One step of the tool.
+        """One step of the tool from the posture q (nq,): the displacement (nv,); a `StepError` if it found none.
 
-        Args:
-            q: (nq,) the posture.
-            weight: of the measures, against goals of weight 1.
-            damping: weight of the motion itself.
-
-        Returns:
-            The displacement (nv,).
-
-        Raises:
-            StepError: the tool found none.
+        `weight` is that of the measures, against goals of weight 1, `damping` that of the motion itself.
         """
 
 

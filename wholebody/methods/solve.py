@@ -55,11 +55,7 @@ def method_named(name: str) -> Method:
 
 
 def imported(name: str) -> Callable[..., Method]:
-    """The class of a method of one's own, from "module:Class"; modules are looked for in the working folder too.
-
-    Raises:
-        InputError: the module or its class cannot be imported, or is no class of methods.
-    """
+    """The class of a method of one's own, from "module:Class"; modules are looked for in the working folder too."""
     module, _, kind = name.partition(":")
     if os.getcwd() not in sys.path:
         sys.path.append(os.getcwd())
@@ -89,12 +85,7 @@ def as_method(given: object) -> Method:
 
 
 def method_for_motions(given: object) -> Method:
-    """A method for motions: by name, with a tolerance of 1e-5 and no restarts; a configured one is used as it is.
-
-    Raises:
-        UnknownNameError: there is no such method.
-        InputError: it is neither a name nor a method.
-    """
+    """A method for motions: by name, with a tolerance of 1e-5 and no restarts; a configured one is used as it is."""
     if not isinstance(given, str):
         return as_method(given)
     if given == "qp":

@@ -88,13 +88,10 @@ class Polygon:
 
 
 class ConeGuard:
-    """Keeps one limb in its cone while the nodes of some limbs move.
+    """Keeps one limb in its cone while the nodes of some limbs move; `nodes` are those that turn it there.
 
     A limb that has left its cone is projected to the nearest direction inside (Wilhelms and Van Gelder 2001): the
     joints of the ball joint turn, each to its best, until the limb points there.
-
-    Attributes:
-        nodes: the nodes that turn the limb in its cone; none if these limbs do not turn it.
     """
 
     def __init__(self, figure: Figure, limbs: Limbs, name: str) -> None:
@@ -142,11 +139,7 @@ class Part(Protocol):
 
 
 class Guard:
-    """Keeps cones and ranges that share nodes.
-
-    Attributes:
-        parts: the cones and ranges.
-    """
+    """Keeps cones and ranges that share nodes."""
 
     def __init__(self, limbs: Limbs, parts: Sequence[Part]) -> None:
         """Take the parts."""
@@ -162,10 +155,7 @@ class Guard:
         self._remember()
 
     def keep(self) -> bool:
-        """Bring the nodes back inside if they have left; true if they are inside then.
-
-        Call it after `limbs.forward()`; if it moves something, it calls `limbs.forward()` itself.
-        """
+        """Bring the nodes back inside, after `limbs.forward`, and call it; true if they are inside then."""
         if self._remember():
             return True
         for _ in range(2):  # to bring a limb back into one may take it out of another

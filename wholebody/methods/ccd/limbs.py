@@ -49,12 +49,7 @@ class Limbs:
     """
 
     def __init__(self, model: pin.Model, joints: Iterable[int]) -> None:
-        """Find the tree of the joints; `read` then reads their values.
-
-        Args:
-            model: Pinocchio's model.
-            joints: indices of joints with one degree of freedom; see `movable`.
-        """
+        """Find the tree of joints with one degree of freedom, see `movable`; `read` then reads their values."""
         self.model = model
         self.joints = tuple(sorted(set(joints)))
         self.node_of = {joint: node for node, joint in enumerate(self.joints)}
@@ -237,18 +232,7 @@ def forward(
     frames: Array,
     lines: Array,
 ) -> None:
-    """Compute frames and lines from values.
-
-    Args:
-        parents: (n,) node that each hangs on; -1 is the world.
-        places: (n, 12) rotation from the parent, row by row, and translation.
-        kinds: (n,) X, Y, Z, OBLIQUE or SLIDE.
-        signs: (n,) -1 where the joint turns about the negative axis.
-        axes: (n, 3) unit axis in the joint's own frame.
-        values: (n,) radians or metres.
-        frames: (n + 1, 12) written: placements, the last being the world.
-        lines: (n, 6) written: unit axis and origin of each node.
-    """
+    """Write frames (n + 1, 12) and lines (n, 6) from values; arguments as the attributes of `Limbs`."""
     for k in range(len(parents)):
         base, place, frame, line = frames[parents[k]], places[k], frames[k], lines[k]
         for row in range(3):

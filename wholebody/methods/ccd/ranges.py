@@ -1,7 +1,4 @@
-"""Ranges of motion: joints that have left one are brought back by the least change of their values.
-
-The ranges are those of `wholebody.figures.motion_ranges`.
-"""
+"""Ranges of motion: joints that have left one are brought back by the least change of their values."""
 
 from __future__ import annotations
 
@@ -63,11 +60,7 @@ class _Sum:
 
 
 class CoupledGuard:
-    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`.
-
-    Attributes:
-        nodes: the nodes that change it.
-    """
+    """Keeps a weighted sum of joint values below its bound; see `CoupledRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: CoupledRange) -> None:
         """Find the nodes among the range's joints."""
@@ -89,11 +82,7 @@ class CoupledGuard:
 
 
 class EllipticGuard:
-    """Keeps angles on or in an ellipse; see `EllipticRange`.
-
-    Attributes:
-        nodes: the nodes that change it.
-    """
+    """Keeps angles on or in an ellipse; see `EllipticRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: EllipticRange) -> None:
         """Find the nodes among the range's joints."""
@@ -127,11 +116,7 @@ class EllipticGuard:
 
 
 class TwistGuard:
-    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`.
-
-    Attributes:
-        nodes: the nodes that turn the limb in its reference.
-    """
+    """Keeps the twist of a limb about its long axis within its bound; see `TwistRange`."""
 
     def __init__(self, figure: Figure, limbs: Limbs, part: TwistRange) -> None:
         """Find the nodes between the reference and the limb."""

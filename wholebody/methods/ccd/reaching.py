@@ -94,13 +94,7 @@ class Reach:
         return q, Reached(error, sweeps, converged)
 
     def disturbed(self, q: Array, size: float, rng: np.random.Generator) -> Array:
-        """Copy of a posture q (nq,) with random joints, near their values or anywhere.
-
-        Args:
-            q: (nq,) posture.
-            size: standard deviation, radians or metres; infinite for anywhere within the limits.
-            rng: the random generator.
-        """
+        """Copy of a posture q (nq,) with random joints, of a deviation `size` [rad, m] or, if infinite, anywhere."""
         q = q.copy()
         limbs = self.limbs
         pin.forwardKinematics(self._model, self._data, q)

@@ -31,13 +31,9 @@ TURN = 2.0 * pi
 
 
 class Plan(NamedTuple):
-    """Which nodes have their turns in a sweep, and what each moves.
+    """Which nodes (s,) have their turns in a sweep, in their order, and what each moves.
 
-    Attributes:
-        nodes: (s,) nodes in the order of their turns.
-        first: (s + 1,) where in `moved` each of them begins.
-        moved: aims that each moves, points before directions.
-        points: (s,) how many of these are points.
+    It is moved[first[k] : first[k + 1]] of the aims, of which the first points[k] are points, the others directions.
     """
 
     nodes: Indices
@@ -47,13 +43,7 @@ class Plan(NamedTuple):
 
 
 class Aims:
-    """Points and directions that nodes of some limbs carry, with their targets.
-
-    Attributes:
-        here: (m, 3) where they are in the world.
-        there: (m, 3) their targets.
-        weights: (m,) factor on each squared distance.
-    """
+    """Points and directions (m, 3) that nodes of some limbs carry: where they are, their targets, and factors (m,)."""
 
     def __init__(
         self, limbs: Limbs, nodes: Sequence[int], local: ArrayLike, there: ArrayLike, points: Sequence[bool],
@@ -67,7 +57,7 @@ class Aims:
             local: (m, 3) each in its node's frame.
             there: (m, 3) targets in the world.
             points: (m,) which are points.
-            weights: (m,); None for all alike.
+            weights: (m,) factors on the squared distances; None for all alike.
         """
         self._limbs, self._kernel = limbs, compiled_kernel()
         self._carriers, self._are_points = tuple(nodes), tuple(points)
@@ -92,13 +82,10 @@ class Aims:
         return plan
 
     def sweep(self, plan: Plan) -> float:
-        """Give each joint its best value, within its limits, and move the aims with it.
+        """Give each joint its best value, within its limits; returns the largest change of one, radians or metres.
 
         When a joint is processed, the joints farther out have moved, but its axis has not, so only the aims are
         updated: a sweep is linear in the number of joints. Call `limbs.forward` and `carry` before the next one.
-
-        Returns:
-            The largest change of a joint, radians or metres.
         """
         limbs = self._limbs
         return float(
@@ -109,10 +96,7 @@ class Aims:
         )  # fmt: skip
 
     def sweep_until(self, nodes: Sequence[int], done: Callable[[], bool]) -> None:
-        """Sweep with these nodes, and call `limbs.forward`, until `done` is true.
-
-        More than two sweeps are needed only near a singularity, or where a joint is at its limit.
-        """
+        """Sweep with these nodes, and call `limbs.forward`, until `done` is true: mostly twice."""
         plan = self.plan(nodes)
         for _ in range(12):
             self.sweep(plan)
@@ -281,15 +265,7 @@ def distance(here: Array, there: Array, weights: Array) -> float:
 
 @compiled()
 def carry(frames: Array, nodes: Indices, local: Array, points: Mask, here: Array) -> None:
-    """Write where points and directions are now.
-
-    Args:
-        frames: (n + 1, 12) of the limbs.
-        nodes: (m,) that carry each; -1 is the world.
-        local: (m, 3) each in its node's frame.
-        points: (m,) which are points.
-        here: (m, 3) written.
-    """
+    """Write where points and directions are now; arguments as of `Aims`."""
     for k in range(len(nodes)):
         frame = frames[nodes[k]]
         for row in range(3):

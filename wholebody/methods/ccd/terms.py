@@ -44,13 +44,7 @@ class GoalPlace:
 
 @dataclass(frozen=True)
 class Request:
-    """A problem in the form that cyclic coordinate descent takes.
-
-    Attributes:
-        goals: the goals.
-        joints: Pinocchio's indices of the joints that move for the goals.
-        kept: what must not move, cones and ranges.
-    """
+    """A problem as cyclic coordinate descent takes it: goals, joints that move for them, and what is kept."""
 
     goals: tuple[GoalPlace, ...]
     joints: tuple[int, ...]
@@ -73,13 +67,7 @@ def read(problem: Problem, state: State | None = None) -> Request:
 
 
 class _Reader:
-    """Reads the terms of one problem.
-
-    Attributes:
-        refused: what cannot be taken, in words.
-        joints: that move for the goals.
-        fixed: that must not move.
-    """
+    """Reads the terms of one problem: what is `refused`, in words, and the joints that move and that must not."""
 
     def __init__(self, problem: Problem, state: State) -> None:
         self._problem, self._figure, self._state = problem, problem.scene.figure, state
@@ -148,11 +136,7 @@ class _Reader:
 
 
 def reaching(figure: Figure, frame: str) -> tuple[int, ...]:
-    """The joints that move a frame to its goal.
-
-    These are the joints of the chain that carries it, from the chain's beginning to the frame; without a chain, all
-    joints between the frame and the root.
-    """
+    """The joints of the frame's chain up to it; without a chain, all between the frame and the root."""
     carrier = _joint(figure, frame)
     for chain in figure.chains.values():
         joints = [figure.joint_id(name) for name in chain.joints]

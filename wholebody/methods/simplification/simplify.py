@@ -106,25 +106,11 @@ class Simplified:
     _embedding: Embedding = field(repr=False)
 
     def posture(self, q: Array) -> Array:
-        """Posture of the whole figure, (nq,), of one of the smaller figure.
-
-        Args:
-            q: (small nq,).
-
-        Raises:
-            InputError: q has the wrong shape or a value that is not finite.
-        """
+        """Posture of the whole figure, (nq,), of one of the smaller figure (small nq,)."""
         return self._embedding.embed(checks.posture(q, self.problem.scene.model.nq))
 
     def restored(self, solution: Solution) -> Solution:
-        """The same answer for the whole problem: its posture, with the whole problem's assessment.
-
-        Args:
-            solution: a method's answer to `problem`.
-
-        Raises:
-            InputError: it is no solution.
-        """
+        """A method's answer to `problem` for the whole problem: its posture, with that one's assessment."""
         checks.instance(solution, Solution, "restored: solution", "give what wb.solve(part.problem) returns")
         q = self.posture(solution.q)
         judged = assess(self.whole, q)
@@ -152,11 +138,7 @@ def simplify(problem: Problem, *, lock: bool = True) -> Simplified:
 
 
 def leave_out(problem: Problem, parts: Parts) -> Simplified:
-    """Leave some kinds of parts out of a problem.
-
-    Raises:
-        InputError: objects were added to or removed from the scene after the problem was made.
-    """
+    """Leave some kinds of parts out of a problem."""
     problem.check_fresh()
     whole = problem.scene
     part = active_joints(problem, parts.lock) if parts.joints else None
