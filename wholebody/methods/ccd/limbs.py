@@ -35,7 +35,7 @@ class Limbs:
     Attributes:
         joints: Pinocchio's index of each node's joint, ascending.
         values: (n,) radians or metres, one a node; change them and call `forward`.
-        lower, upper: (n,) limits of each node; infinite for no limit.
+        limits: (2, n) of each node, `lower` and `upper`; infinite for no limit.
         frames: (n + 1, 12) after `forward`: placement of each node in the world, rotation row by row, then translation;
             the last row is the world itself.
         lines: (n, 6) after `forward`: unit axis and origin of each node in the world.
@@ -55,7 +55,8 @@ class Limbs:
         self.node_of = {joint: node for node, joint in enumerate(self.joints)}
         count = len(self.joints)
         self._kernel = compiled_kernel()
-        self.values, self.lower, self.upper = np.zeros(count), np.full(count, -inf), np.full(count, inf)
+        self.values, self.limits = np.zeros(count), np.array([np.full(count, -inf), np.full(count, inf)])
+        self.lower, self.upper = self.limits
         self.frames, self.lines = np.tile(np.array(WORLD), (count + 1, 1)), np.zeros((count, 6))
         self.parents = np.array([self.carrier(model.parents[joint]) for joint in self.joints], dtype=np.intp)
         self.paths: list[tuple[int, ...]] = []

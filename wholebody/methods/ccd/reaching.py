@@ -75,7 +75,7 @@ class Reach:
         aims = _aims(limbs, self._data, self._goals)
         plan = aims.plan()
         error, last = aims.error, inf
-        sweeps, converged = 0, not len(plan.nodes)
+        sweeps, converged = 0, not len(plan.turns)
         while error > tolerance and sweeps < most and not converged and not self._control.over:
             if sweeps % 25 == 0:  # near a goal convergence is linear, and sometimes slow
                 converged = error > 0.97 * last
