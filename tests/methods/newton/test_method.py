@@ -13,7 +13,7 @@ import pytest
 
 import wholebody as wb
 from tests.answers import honest
-from wholebody.methods.newton.batches import unit_lengths
+from wholebody.methods.newton.batches import Unit
 from wholebody.methods.newton.feasibility import satisfy
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.inequalities import SquaredSlacks
@@ -51,7 +51,7 @@ def test_postures_go_in_and_out(name: str) -> None:
 
 def test_every_joint_of_the_human_holds_at_any_posture(human: wb.Figure) -> None:
     bodies = FigureBodies(human)
-    batches = [unit_lengths(bodies.names), *bodies.equations.batches()]
+    batches = [Unit(bodies.names), *bodies.equations.batches()]
     system = System(batches, bodies.weight)
     for name in human.postures:
         assert np.abs(system.residual(bodies.variables(human.posture(name)))).max() < 1e-12

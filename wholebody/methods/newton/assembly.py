@@ -29,7 +29,7 @@ from wholebody.methods.newton.assembly_solution import (
     explained,
     to_target,
 )
-from wholebody.methods.newton.batches import Batch, EquationSet, unit_lengths
+from wholebody.methods.newton.batches import Batch, EquationSet, Unit
 from wholebody.methods.newton.feasibility import Projection, kkt_algebra, project, satisfy
 from wholebody.methods.newton.inequalities import KINDS, Kind
 from wholebody.methods.newton.linear_algebra import NAMES, QuasiDefinite
@@ -346,7 +346,7 @@ class Assembly(AssemblyJoints):
         """What must hold, in batches."""
         if not self._places:
             raise InputError("the assembly has no bodies; add some with body(...)")
-        held = [unit_lengths(list(self._names)), *self._holding.batches()]
+        held = [Unit(list(self._names)), *self._holding.batches()]
         return held + [batch for figure in self._figures.values() for batch in figure.batches]
 
 

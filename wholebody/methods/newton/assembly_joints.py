@@ -14,8 +14,9 @@ from wholebody.base.checks import choice, flag, instance, known, numbers, shown
 from wholebody.base.errors import InputError
 from wholebody.geometry.placement import PlacementLike
 from wholebody.methods.newton.assembly_bodies import WORLD, AssemblyBodies
-from wholebody.methods.newton.batches import HARD, ONE_SIDED, EquationSet, axes_along
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, EquationSet
 from wholebody.methods.newton.own_rows import AssemblyConstraint, OwnRows, checked, names_of
+from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.task_batches import OnSurface, surface
 from wholebody.tasks.inputs import direction, point, target_placement
 

@@ -10,7 +10,10 @@ derivatives. A relative orientation conj(a) b is bilinear, so the equations of j
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+import pinocchio as pin
 
 from wholebody.base.arrays import Array
 
@@ -103,3 +106,8 @@ def axes_with_z(direction: Array) -> Array:
     result[back] = (1.0, 0.0, 0.0, 0.0)
     result /= np.linalg.norm(result, axis=1, keepdims=True)
     return result
+
+
+def axes_along(direction: Array) -> Any:
+    """Axes (pin.Quaternion) whose z axis is a unit direction (3,)."""
+    return pin.Quaternion(axes_with_z(direction[None])[0])

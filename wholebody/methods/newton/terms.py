@@ -11,10 +11,11 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.state import State
 from wholebody.methods.base import UnsupportedTermError
-from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, EquationSet, Role, axes_along, unit_lengths
+from wholebody.methods.newton.batches import HARD, ONE_SIDED, Batch, EquationSet, Role, Unit
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.measures import Objective
 from wholebody.methods.newton.own_rows import constraint_rows, goal_rows
+from wholebody.methods.newton.quaternions import axes_along
 from wholebody.methods.newton.system import ActiveSystem
 from wholebody.methods.newton.task_batches import Cone, MassCenter, Toward
 from wholebody.problem import Problem
@@ -189,7 +190,7 @@ class FigureSystem(ActiveSystem):
         """
         self.problem, self.workspace, self._yielding = problem, workspace, yielding
         self.bodies = bodies = FigureBodies(problem.scene.figure, problem.start)
-        held = [unit_lengths(bodies.names), bodies.limits, *bodies.equations.batches()]
+        held = [Unit(bodies.names), bodies.limits, *bodies.equations.batches()]
         held += bound_equations(problem, bodies, workspace.state).batches()
         if not yielding:
             held += constraint_equations(problem, bodies).batches()
