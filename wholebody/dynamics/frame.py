@@ -68,7 +68,7 @@ class EngineFrame(NamedTuple):
 
 @dataclass
 class FrameRecord:
-    """A frame while it is being made; attributes as in `EngineFrame`, and besides:
+    """A frame while it is being made; attributes as in `EngineFrame`, and these.
 
     Attributes:
         stops: early ends of steps that are left.

@@ -122,10 +122,10 @@ def turn_freely(rotation: Array, inertia: Array, inverse: Array, spin: Array, ti
             for k in range(3):
                 turn[k] = 0.5 * change / square * pull[k]
             _turned(turn, now, middle)
-            _write(middle, now)
+            now[:] = middle
             _spin(now, inverse, momentum, spin)
         _orthonormal(now)
-        _write(now, rotation)
+        rotation[:] = now
 
 
 @compiled(inner=True)
@@ -140,13 +140,6 @@ def invert(matrix: Array, result: Array) -> None:
             i, j = (column + 1) % 3, (column + 2) % 3
             k, m = (row + 1) % 3, (row + 2) % 3
             result[row, column] = (matrix[i, k] * matrix[j, m] - matrix[i, m] * matrix[j, k]) / determinant
-
-
-@compiled(inner=True)
-def _write(rotation: Array, result: Array) -> None:
-    for i in range(3):
-        for j in range(3):
-            result[i, j] = rotation[i, j]
 
 
 @compiled(inner=True)
@@ -186,7 +179,7 @@ def drift(bodies: Bodies, pushed: Mask, gravity: Array, time: float) -> None:
             for k in range(3):
                 turn[k] = time * bodies.twist[b, 3 + k]
             _turned(turn, bodies.rotation[b], now)
-            _write(now, bodies.rotation[b])
+            bodies.rotation[b] = now
 
 
 @compiled()
@@ -198,7 +191,7 @@ def displace(bodies: Bodies, way: Array) -> None:
             for k in range(3):
                 bodies.position[b, k] += way[b, k]
             _turned(way[b, 3:], bodies.rotation[b], now)
-            _write(now, bodies.rotation[b])
+            bodies.rotation[b] = now
 
 
 @compiled()

@@ -93,18 +93,12 @@ def _table(scene: Scene) -> None:
         scene.add(Box((0.05, 0.05, leg)), name=f"leg {number + 1}", at=(x, y, 0.5 * leg), color=OAK)
 
 
-def _ball(scene: Scene, x: float, y: float, radius: float) -> None:
-    scene.add(Sphere(radius), name="ball", at=(x, y, TOP + radius + GAP), color=RED, body=Body(density=700.0))
+def _ball(x: float, radius: float) -> Callable[[Scene], object]:
+    def put(scene: Scene) -> None:
+        _table(scene)
+        scene.add(Sphere(radius), name="ball", at=(x, 0.0, TOP + radius + GAP), color=RED, body=Body(density=700.0))
 
-
-def _ball_to_flick(scene: Scene) -> None:
-    _table(scene)
-    _ball(scene, 0.30, 0.0, 0.02)
-
-
-def _ball_to_push(scene: Scene) -> None:
-    _table(scene)
-    _ball(scene, -0.05, 0.0, 0.03)
+    return put
 
 
 def _box_to_push(scene: Scene) -> None:
@@ -244,42 +238,37 @@ def _aside(figure: Figure) -> Keys:
 # ---- the avatar
 
 
-def _walking(figure: Figure, x: float, degrees: Mapping[str, float]) -> Array:
-    """The avatar as it stands, with joints at some degrees, at a place along x."""
-    return standing_at(figure, x, 0.0, 0.0, degrees)
-
-
 HANGING = {"shoulder_flexion": 5.0, "elbow_flexion": 15.0}  # degrees: arms
 AHEAD = {"shoulder_flexion": 45.0, "elbow_flexion": 50.0, "shoulder_abduction": 8.0}
 
 
 def _walk_into(figure: Figure) -> Keys:
     return [
-        (0.0, _walking(figure, -0.4, HANGING)),
-        (0.8, _walking(figure, -0.2, AHEAD)),
-        (2.0, _walking(figure, 0.7, AHEAD)),
-        (0.8, _walking(figure, 0.7, AHEAD)),
-        (1.5, _walking(figure, -0.2, HANGING)),
-        (0.8, _walking(figure, -0.4, HANGING)),
+        (0.0, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.2, 0.0, 0.0, AHEAD)),
+        (2.0, standing_at(figure, 0.7, 0.0, 0.0, AHEAD)),
+        (0.8, standing_at(figure, 0.7, 0.0, 0.0, AHEAD)),
+        (1.5, standing_at(figure, -0.2, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
     ]
 
 
 def _walk_through(figure: Figure) -> Keys:
     return [
-        (0.0, _walking(figure, -0.4, HANGING)),
-        (0.8, _walking(figure, -0.2, AHEAD)),
-        (3.5, _walking(figure, 1.7, AHEAD)),
-        (0.8, _walking(figure, 1.9, HANGING)),
-        (1.0, _walking(figure, 1.9, HANGING)),
+        (0.0, standing_at(figure, -0.4, 0.0, 0.0, HANGING)),
+        (0.8, standing_at(figure, -0.2, 0.0, 0.0, AHEAD)),
+        (3.5, standing_at(figure, 1.7, 0.0, 0.0, AHEAD)),
+        (0.8, standing_at(figure, 1.9, 0.0, 0.0, HANGING)),
+        (1.0, standing_at(figure, 1.9, 0.0, 0.0, HANGING)),
     ]
 
 
 _PLANS: dict[str, _Plan] = {
     "flick": _Plan(
-        "a finger flicks a ball off a table", "hand", _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5), put=_ball_to_flick
+        "a finger flicks a ball off a table", "hand", _flick, (1.9, -1.5, 1.5), (0.45, 0.0, 0.5), put=_ball(0.30, 0.02)
     ),
     "push_ball": _Plan(
-        "a fist pushes a ball along a table", "hand", _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5), put=_ball_to_push
+        "a fist pushes a ball along a table", "hand", _push, (1.6, -1.6, 1.6), (0.3, 0.0, 0.5), put=_ball(-0.05, 0.03)
     ),
     "push_box": _Plan(
         "a fist pushes a box along a table", "hand", _push, (0.6, -1.0, 1.35), (0.0, 0.0, 0.72), put=_box_to_push

@@ -14,9 +14,9 @@ from wholebody.dynamics import (
     impact_kernel,
     motion_kernel,
     passing,
+    pieces,
     rows_kernel,
     solve_kernel,
-    witness_kernel,
 )
 from wholebody.dynamics.bodies_state import BodiesState
 from wholebody.dynamics.impact_kernel import SLOW
@@ -279,7 +279,7 @@ def compiled_kernel() -> Any:
     motion_kernel.drift(bodies, mask, np.zeros(3), 1.0)
     motion_kernel.displace(bodies, twist)
     motion_kernel.place_pieces(one, unit, one, _integers(1), placed, placed.copy())
-    witness_kernel.needed(none, 0, vectors, vectors, some, 0.0)
+    pieces.needed(none, 0, vectors, vectors, some, 0.0)
     rows, joints = Rows.room(pairs, 0, mask), JointPoints(pairs, np.zeros((0, 2, 3)), no_mask)
     rows_kernel.contact_rows(ContactPoints(none, pairs, vectors, vectors, some), bodies, rows)
     rows_kernel.joint_rows(joints, bodies, rows)
