@@ -9,8 +9,8 @@ import numpy as np
 
 from wholebody.base.arrays import Array
 from wholebody.methods.ccd.guards import Kept, cone_guards, guards
-from wholebody.methods.ccd.limbs import Limbs, rotated, seen_from
-from wholebody.methods.ccd.links import Link, LinkFinder, Overlap, Vector
+from wholebody.methods.ccd.limbs import Limbs, Vector, rotated, seen_from, three
+from wholebody.methods.ccd.links import Link, LinkFinder, Overlap
 from wholebody.methods.ccd.sweep import Aims
 from wholebody.scene.scene import Scene
 from wholebody.scene.workspace import Workspace
@@ -46,7 +46,7 @@ class ChainResolver:
         self._finder = LinkFinder(workspace, self.limbs, foreign, exact)
         self._guards = guards(scene.figure, self.limbs, kept)
         self._cones = cone_guards(scene.figure, self.limbs, kept)
-        self._tip = _three(scene.model.frames[tip].placement.translation)
+        self._tip = three(scene.model.frames[tip].placement.translation)
         self._bearing = self._links_with_pieces(workspace)
         self.reach = self._reaches(workspace)
 
@@ -183,8 +183,3 @@ class ChainResolver:
 def _columns(frame: Array) -> Array:
     """(3, 3) axes of a row of `Limbs.frames`, one a row."""
     return np.asarray(frame[:9].reshape(3, 3).T)
-
-
-def _three(vector: Any) -> Vector:
-    x, y, z = vector.tolist()
-    return x, y, z

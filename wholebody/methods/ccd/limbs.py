@@ -19,6 +19,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices
 from wholebody.base.compiled import compiled
 
+Vector = tuple[float, float, float]
 Placement = tuple[float, ...]
 """Twelve floats: the rotation row by row, then the translation."""
 
@@ -154,11 +155,11 @@ class CarriedFrame:
         """(3, 3) rotation at the joint placements of Pinocchio's data."""
         return np.asarray(data.oMi[self._joint].rotation @ self._fixed.rotation)
 
-    def direction(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def direction(self, x: float, y: float, z: float) -> Vector:
         """The world's components of a direction of this frame, after `Limbs.forward`."""
         return rotated(self._limbs.frame(self.node), *rotated(self.placement, x, y, z))
 
-    def seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def seen(self, x: float, y: float, z: float) -> Vector:
         """A direction of the world in the components of this frame, after `Limbs.forward`."""
         return seen_from(self.placement, *seen_from(self._limbs.frame(self.node), x, y, z))
 
@@ -169,6 +170,12 @@ def compiled_kernel() -> Any:
     none, places = np.zeros(0), np.zeros(0, dtype=np.intp)
     forward(places, np.zeros((0, 12)), places, none, np.zeros((0, 3)), none, np.zeros((0, 12)), np.zeros((0, 6)))
     return sys.modules[__name__]
+
+
+def three(vector: Any) -> Vector:
+    """A vector (3,) as floats."""
+    x, y, z = vector.tolist()
+    return x, y, z
 
 
 def movable(model: pin.Model, joint: int) -> bool:
@@ -185,19 +192,19 @@ def floats(placement: Any) -> Placement:
     return (*placement.rotation.ravel().tolist(), *placement.translation.tolist())
 
 
-def moved(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def moved(frame: Placement, x: float, y: float, z: float) -> Vector:
     """The world's coordinates of a point of a frame."""
     a, b, c, d, e, f, g, h, i, tx, ty, tz = frame
     return a * x + b * y + c * z + tx, d * x + e * y + f * z + ty, g * x + h * y + i * z + tz
 
 
-def rotated(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def rotated(frame: Placement, x: float, y: float, z: float) -> Vector:
     """The world's components of a direction of a frame."""
     a, b, c, d, e, f, g, h, i, _, _, _ = frame
     return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
-def seen_from(frame: Placement, x: float, y: float, z: float) -> tuple[float, float, float]:
+def seen_from(frame: Placement, x: float, y: float, z: float) -> Vector:
     """A direction of the world in the components of a frame: the inverse of `rotated`."""
     a, b, c, d, e, f, g, h, i, _, _, _ = frame
     return a * x + d * y + g * z, b * x + e * y + h * z, c * x + f * y + i * z
@@ -209,7 +216,7 @@ def _settled(placement: Placement) -> Placement:
     return (*WORLD[:9], *placement[9:]) if near else placement
 
 
-def _kind(joint: Any) -> tuple[int, float, tuple[float, float, float]]:
+def _kind(joint: Any) -> tuple[int, float, Vector]:
     """Kind, sign and axis of a joint."""
     subspace = np.asarray(joint.createData().S).ravel().tolist()
     sliding = max(abs(value) for value in subspace[3:]) < SAME
@@ -269,7 +276,7 @@ def forward(
 
 
 @compiled(inner=True)
-def turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> tuple[float, float, float]:
+def turned(line: Array, co: float, si: float, x: float, y: float, z: float) -> Vector:
     """A vector turned about a line's unit axis (Rodrigues)."""
     ux, uy, uz = line[0], line[1], line[2]
     along = (1.0 - co) * (ux * x + uy * y + uz * z)

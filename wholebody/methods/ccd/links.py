@@ -14,10 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from wholebody.geometry.separation import least_separation
-from wholebody.methods.ccd.limbs import Limbs
+from wholebody.methods.ccd.limbs import Limbs, Vector
 from wholebody.scene.workspace import Workspace
-
-Vector = tuple[float, float, float]
 
 
 class Overlap(NamedTuple):

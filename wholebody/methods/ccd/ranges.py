@@ -12,7 +12,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.figures.motion_ranges import CoupledRange, EllipticRange, TwistRange
-from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, floats, rotated, seen_from
+from wholebody.methods.ccd.limbs import CarriedFrame, Limbs, Vector, floats, rotated, seen_from
 from wholebody.methods.ccd.sweep import Aims
 
 INWARD = 1e-9  # margin inside a range, as a share of an ellipse and in radians of a twist; larger than rounding
@@ -149,7 +149,7 @@ class TwistGuard:
         along = sum(w * part for w, part in zip(self._slope, z, strict=True))
         return float(self._part.sign * atan2(b - d, a + e) - self._part.bound - along)
 
-    def _seen(self, x: float, y: float, z: float) -> tuple[float, float, float]:
+    def _seen(self, x: float, y: float, z: float) -> Vector:
         """A direction of the limb in the axes of the central rotation."""
         return seen_from(self._center, *self._base.seen(*self._limb.direction(x, y, z)))
 

@@ -13,7 +13,7 @@ from wholebody.figures.state import State, joint_support
 from wholebody.geometry.placement import placement
 from wholebody.methods.base import UnsupportedTermError
 from wholebody.methods.ccd.guards import Kept
-from wholebody.methods.ccd.limbs import movable
+from wholebody.methods.ccd.limbs import Vector, movable
 from wholebody.problem import Problem
 from wholebody.tasks.bounds import Freeze, StepLimit
 from wholebody.tasks.frame import Frame, Orientation
@@ -36,8 +36,8 @@ class GoalPlace:
     """
 
     frame: int
-    offset: tuple[float, float, float]
-    place: tuple[float, float, float] | None
+    offset: Vector
+    place: Vector | None
     rotation: Any
     weight: float
 

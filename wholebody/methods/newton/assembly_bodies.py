@@ -26,12 +26,11 @@ from wholebody.methods.newton.assembly_geometry import (
     figure_owners,
     figure_pairs,
     rim,
-    scene_of,
     solids,
 )  # fmt: skip
 from wholebody.methods.newton.system import unit
 from wholebody.problem import CLEARANCE, Problem
-from wholebody.scene.geometry_model import SceneObject
+from wholebody.scene.geometry_model import SceneObject, assemble
 from wholebody.scene.scene import Scene
 from wholebody.tasks.base import Bound, Constraint
 from wholebody.tasks.inputs import target_placement
@@ -290,7 +289,10 @@ class AssemblyBodies:
                 for name in self._parts
             ]
             loose = LooseBodies(parts, owners, lambda one, other: self._tested(one, other, still), own)
-            self._scene = scene_of(loose, self._things, apart)
+            figure: Any = loose  # a scene asks of its figure what LooseBodies has
+            excluded = dict.fromkeys(apart, "said to touch, or standing still")
+            built = assemble(figure, self._things.values(), excluded)
+            self._scene = Scene.of_parts(figure, self._things.values(), built)
         return self._scene
 
     def _owners(self) -> list[Owner]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
 import pinocchio as pin
@@ -22,8 +22,6 @@ from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.own_rows import TangentRows
 from wholebody.methods.newton.terms import bound_equations, constraint_equations
 from wholebody.problem import Problem
-from wholebody.scene.geometry_model import SceneObject, assemble
-from wholebody.scene.scene import Scene
 
 Solid = tuple[Shape, Any]
 """A shape, and its placement (pin.SE3) in its body."""
@@ -185,12 +183,3 @@ class LooseBodies:
     def frame_id(self, name: str) -> int:
         """Index of the frame of a body or segment with pieces."""
         return int(self.model.getFrameId(checks.known(name, self.segments, "body with a shape")))
-
-
-def scene_of(
-    bodies: LooseBodies, things: Mapping[str, SceneObject], apart: Iterable[tuple[str, str]]
-) -> Scene:  # fmt: skip
-    """The bodies among things; pairs (body, thing) of `apart` are not tested."""
-    excluded = dict.fromkeys(apart, "said to touch, or standing still")
-    figure: Any = bodies  # a scene asks of its figure what LooseBodies has
-    return Scene.of_parts(figure, things.values(), assemble(figure, things.values(), excluded))
