@@ -68,16 +68,10 @@ class EngineFrame(NamedTuple):
 
 @dataclass
 class FrameRecord:
-    """A frame while it is being made; attributes as in `EngineFrame`, and these.
+    """A frame while it is being made; attributes as in `EngineFrame`."""
 
-    Attributes:
-        stops: early ends of steps that are left.
-        impulse: (n, 3) of each body.
-        given_up: steps that were halved as often as they may be, and still led too deep.
-    """
-
-    stops: int
-    impulse: Array
+    stops: int  # early ends of steps that are left
+    impulse: Array  # (n, 3) of each body
     time: float = 0.0
     events: list[Event] = field(default_factory=list)
     contacts: int = 0
@@ -86,7 +80,7 @@ class FrameRecord:
     signorini: float = 0.0
     coulomb: float = 0.0
     steps: int = 0
-    given_up: int = 0
+    given_up: int = 0  # steps that were halved as often as they may be, and still led too deep
 
     def finished(self, names: tuple[str, ...], energy: float, sleeping: int) -> EngineFrame:
         """The frame, with the names of the bodies."""

@@ -16,29 +16,17 @@ from wholebody.base.compiled import compiled
 
 
 class Bodies(NamedTuple):
-    """The bodies of a scene.
+    """The bodies of a scene."""
 
-    Attributes:
-        mass: (n,) kg; infinite where nothing is known.
-        inertia: (n, 3, 3) about the centre of mass, along the body's axes.
-        inverse: (n, 3, 3) inverses of these.
-        position: (n, 3) centres of mass.
-        rotation: (n, 3, 3).
-        twist: (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s.
-        moving: (n,) bodies that move by themselves, and do not sleep.
-        given: (n,) bodies whose motion is given.
-        jointed: (n,) bodies that have joints.
-    """
-
-    mass: Array
-    inertia: Array
-    inverse: Array
-    position: Array
-    rotation: Array
-    twist: Array
-    moving: Mask
-    given: Mask
-    jointed: Mask
+    mass: Array  # (n,) kg; infinite where nothing is known
+    inertia: Array  # (n, 3, 3) about the centre of mass, along the body's axes
+    inverse: Array  # (n, 3, 3) inverses of these
+    position: Array  # (n, 3) centres of mass
+    rotation: Array  # (n, 3, 3)
+    twist: Array  # (n, 6) velocities of the centres and angular velocities along the world's axes, m/s and rad/s
+    moving: Mask  # (n,) bodies that move by themselves, and do not sleep
+    given: Mask  # (n,) bodies whose motion is given
+    jointed: Mask  # (n,) bodies that have joints
 
 
 @compiled(inner=True)

@@ -50,29 +50,17 @@ class PassingCheck(NamedTuple):
 
 
 class Way(NamedTuple):
-    """How bodies moved during a step, and the near pairs at both ends of it.
+    """How bodies moved during a step, and the near pairs at both ends of it."""
 
-    Attributes:
-        pair: (k, 2) pieces.
-        body: (pieces,) the body of each piece.
-        gap: (2, k) their distances before the step, and at least those after it.
-        normal: (2, k, 3) from the first to the second; after it zero where none is known.
-        placement: (2, pieces, 4, 3) of all pieces.
-        shift: (n, 3) ways of the centres of mass, metres.
-        angle: (n,) by which each has turned, radians.
-        lever: (n,) greatest distance of a point from its centre of mass, metres.
-        fall: sag of the relative way because of gravity, metres.
-    """
-
-    pair: Indices
-    body: Indices
-    gap: Array
-    normal: Array
-    placement: Array
-    shift: Array
-    angle: Array
-    lever: Array
-    fall: float
+    pair: Indices  # (k, 2) pieces
+    body: Indices  # (pieces,) the body of each piece
+    gap: Array  # (2, k) their distances before the step, and at least those after it
+    normal: Array  # (2, k, 3) from the first to the second; after it zero where none is known
+    placement: Array  # (2, pieces, 4, 3) of all pieces
+    shift: Array  # (n, 3) ways of the centres of mass, metres
+    angle: Array  # (n,) by which each has turned, radians
+    lever: Array  # (n,) greatest distance of a point from its centre of mass, metres
+    fall: float  # sag of the relative way because of gravity, metres
 
 
 def check_passing(

@@ -48,23 +48,14 @@ class PlacedProximity(Proximity):
 
 
 class SweptPoints(NamedTuple):
-    """The points that each piece is swept from, for its heights along directions.
+    """The points that each piece is swept from, for its heights along directions."""
 
-    Attributes:
-        points: (points, 3) of all pieces, in their axes.
-        start: (pieces,) the first of each.
-        number: (pieces,) how many.
-        radius: (pieces,) around the points.
-        axes: (pieces, 3) semi-axes of an ellipsoid; zero for others.
-        plane: (pieces, 4) normal and offset of a half-space; zero for others.
-    """
-
-    points: Array
-    start: Indices
-    number: Indices
-    radius: Array
-    axes: Array
-    plane: Array
+    points: Array  # (points, 3) of all pieces, in their axes
+    start: Indices  # (pieces,) the first of each
+    number: Indices  # (pieces,) how many
+    radius: Array  # (pieces,) around the points
+    axes: Array  # (pieces, 3) semi-axes of an ellipsoid; zero for others
+    plane: Array  # (pieces, 4) normal and offset of a half-space; zero for others
 
 
 class Pieces:
@@ -232,21 +223,13 @@ def joined(scene: Scene) -> tuple[tuple[str, str | None], ...]:
 
 
 class ContactPoints(NamedTuple):
-    """Points of contacts, one row each.
+    """Points of contacts, one row each."""
 
-    Attributes:
-        pair: (m,) place of the pair among the pairs of pieces.
-        bodies: (m, 2) A and B.
-        normal: (m, 3) unit normal from A to B.
-        point: (m, 3) in the world, between the two surfaces.
-        gap: (m,) metres.
-    """
-
-    pair: Indices
-    bodies: Indices
-    normal: Array
-    point: Array
-    gap: Array
+    pair: Indices  # (m,) place of the pair among the pairs of pieces
+    bodies: Indices  # (m, 2) A and B
+    normal: Array  # (m, 3) unit normal from A to B
+    point: Array  # (m, 3) in the world, between the two surfaces
+    gap: Array  # (m,) metres
 
 
 class ContactFinder:

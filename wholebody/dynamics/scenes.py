@@ -31,23 +31,15 @@ BLUE, RED, OAK = (0.30, 0.42, 0.58, 1.0), (0.72, 0.25, 0.20, 1.0), (0.60, 0.48, 
 
 @dataclass(frozen=True)
 class WorldScene:
-    """A scene with a tracker, in which things move by themselves.
+    """A scene with a tracker, in which things move by themselves."""
 
-    Attributes:
-        name, about: its name on the command line, and one sentence.
-        scene: figure and things; those with a `wb.Body` move by themselves.
-        track: the tracked postures.
-        eye, target: the camera and the middle of the picture, metres; None for one that sees the figure.
-        see_through: things to draw transparent.
-    """
-
-    name: str
+    name: str  # its name on the command line, and one sentence
     about: str
-    scene: Scene
-    track: Track
-    eye: Place | None = None
+    scene: Scene  # figure and things; those with a `wb.Body` move by themselves
+    track: Track  # the tracked postures
+    eye: Place | None = None  # the camera and the middle of the picture, metres; None for one that sees the figure
     target: Place | None = None
-    see_through: tuple[str, ...] = ()
+    see_through: tuple[str, ...] = ()  # things to draw transparent
 
 
 @dataclass(frozen=True, kw_only=True)

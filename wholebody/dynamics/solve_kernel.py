@@ -25,17 +25,11 @@ FAST = {"contract", "reassoc"}  # the order of sums is the compiler's, and the s
 
 
 class Laws(NamedTuple):
-    """What a program asks of its points.
+    """What a program asks of its points."""
 
-    Attributes:
-        friction: (m - j,) coefficients of the contact points.
-        target: (m - j,) least u_n after it, m/s.
-        hold: (j, 3) u of the joint points after it, m/s.
-    """
-
-    friction: Array
-    target: Array
-    hold: Array
+    friction: Array  # (m - j,) coefficients of the contact points
+    target: Array  # (m - j,) least u_n after it, m/s
+    hold: Array  # (j, 3) u of the joint points after it, m/s
 
 
 class Limits(NamedTuple):

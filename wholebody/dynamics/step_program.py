@@ -31,21 +31,13 @@ TOUCH = 1e-5  # m: a gap larger than `SKIN` by this still touches
 
 
 class Impulses(NamedTuple):
-    """Impulses of a program, from which the next one starts.
+    """Impulses of a program, from which the next one starts."""
 
-    Attributes:
-        pair: (k,) pair of each point.
-        local: (k, 3) the point in the first body's axes.
-        impulse: (k, 3) on the second body, in the world, N s.
-        joint: (j, 3) of the joint points, likewise.
-        time: of the step, seconds.
-    """
-
-    pair: Indices
-    local: Array
-    impulse: Array
-    joint: Array
-    time: float
+    pair: Indices  # (k,) pair of each point
+    local: Array  # (k, 3) the point in the first body's axes
+    impulse: Array  # (k, 3) on the second body, in the world, N s
+    joint: Array  # (j, 3) of the joint points, likewise
+    time: float  # of the step, seconds
 
     @staticmethod
     def nothing(joints: int) -> Impulses:

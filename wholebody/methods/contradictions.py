@@ -39,17 +39,12 @@ ON_SURFACE = 2e-6  # m: a point outside of a piece by less (twice coal's accurac
 
 
 class Contradiction(NamedTuple):
-    """Two requirements that exclude each other.
+    """Two requirements that exclude each other."""
 
-    Attributes:
-        status: the best possible status: "infeasible", or "unreachable" if one of the two is a goal.
-        text: both, and their difference.
-        least: lower bound of the goal's error, metres, if the error depends on the posture; otherwise zero.
-    """
-
+    # the best possible status: "infeasible", or "unreachable" if one of the two is a goal
     status: Literal["infeasible", "unreachable"]
-    text: str
-    least: float = 0.0
+    text: str  # both, and their difference
+    least: float = 0.0  # lower bound of the goal's error, metres, if the error depends on the posture; otherwise zero
 
 
 class _FixedGroup(NamedTuple):

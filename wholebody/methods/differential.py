@@ -66,24 +66,16 @@ class Stepper(Protocol):
 
 
 class Settings(NamedTuple):
-    """How steps are iterated.
+    """How steps are iterated."""
 
-    Attributes:
-        tolerance: metres and radians to which goals and constraints are met.
-        iterations: most steps.
-        longest: most that a joint or the root moves in one step [rad, m].
-        decay: of the measures' weight from one step to the next.
-        best: whether the answer is the best posture of all, in place of the last one: for tools that may go in and do
-            not lead out again.
-        least: fewest steps before the goals count as met, for tools that get out of the way of what comes.
-    """
-
-    tolerance: float
-    iterations: int
-    longest: float
-    decay: float
+    tolerance: float  # metres and radians to which goals and constraints are met
+    iterations: int  # most steps
+    longest: float  # most that a joint or the root moves in one step [rad, m]
+    decay: float  # of the measures' weight from one step to the next
+    # whether the answer is the best posture of all, in place of the last one: for tools that may go in and do not lead
+    # out again
     best: bool = False
-    least: int = 0
+    least: int = 0  # fewest steps before the goals count as met, for tools that get out of the way of what comes
 
 
 class Iteration:

@@ -31,25 +31,16 @@ ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown pos
 
 @dataclass(frozen=True)
 class OverlapResult:
-    """A posture (nq,) without overlap, and the work to find it.
-
-    Attributes:
-        iterations: number of goals of cyclic coordinate descent.
-        joints: number of joints that moved, counted once for each goal.
-        pairs: number of different pairs of pieces that overlapped during the search.
-        contact_seconds, ik_seconds: time of contact queries, and of cyclic coordinate descent.
-        deepest: deepest remaining overlap, metres.
-        swept: whether the direct motion from the posture shown before was swept and is free.
-    """
+    """A posture (nq,) without overlap, and the work to find it."""
 
     q: Array
-    iterations: int
-    joints: int
-    pairs: int
-    contact_seconds: float
+    iterations: int  # number of goals of cyclic coordinate descent
+    joints: int  # number of joints that moved, counted once for each goal
+    pairs: int  # number of different pairs of pieces that overlapped during the search
+    contact_seconds: float  # time of contact queries, and of cyclic coordinate descent
     ik_seconds: float
-    deepest: float
-    swept: bool
+    deepest: float  # deepest remaining overlap, metres
+    swept: bool  # whether the direct motion from the posture shown before was swept and is free
 
 
 def resolve_overlap(

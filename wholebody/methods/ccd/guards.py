@@ -20,17 +20,11 @@ from wholebody.methods.ccd.sweep import Aims
 
 
 class Kept(NamedTuple):
-    """What descents keep.
+    """What descents keep."""
 
-    Attributes:
-        fixed: Pinocchio's indices of joints that must not move, not even to resolve overlap.
-        cones: names of the reach cones; None for all of the figure's.
-        ranges: names of the ranges of motion.
-    """
-
-    fixed: frozenset[int] = frozenset()
-    cones: tuple[str, ...] | None = None
-    ranges: tuple[str, ...] = ()
+    fixed: frozenset[int] = frozenset()  # Pinocchio's indices of joints that must not move, not even to resolve overlap
+    cones: tuple[str, ...] | None = None  # names of the reach cones; None for all of the figure's
+    ranges: tuple[str, ...] = ()  # names of the ranges of motion
 
 
 NOTHING_FIXED = Kept()

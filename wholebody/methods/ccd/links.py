@@ -32,21 +32,13 @@ class Overlap(NamedTuple):
 
 
 class Link(NamedTuple):
-    """A link that overlaps, and its displacement.
+    """A link that overlaps, and its displacement."""
 
-    Attributes:
-        node: its node in the chain.
-        nodes: the nodes that move it relative to the obstacles.
-        effector: the mean of its contact points.
-        push: the translation that removes the overlap, from PD_g.
-        depth: depth of its deepest pair, metres.
-    """
-
-    node: int
-    nodes: tuple[int, ...]
-    effector: Vector
-    push: Vector
-    depth: float
+    node: int  # its node in the chain
+    nodes: tuple[int, ...]  # the nodes that move it relative to the obstacles
+    effector: Vector  # the mean of its contact points
+    push: Vector  # the translation that removes the overlap, from PD_g
+    depth: float  # depth of its deepest pair, metres
 
 
 class _Side(NamedTuple):

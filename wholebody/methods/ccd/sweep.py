@@ -31,15 +31,11 @@ TURN = 2.0 * pi
 
 
 class Plan(NamedTuple):
-    """Which nodes have their turns in a sweep, and what each moves.
+    """Which nodes have their turns in a sweep, and what each moves."""
 
-    Attributes:
-        turns: (s, 4) node, where in `moved` it begins and ends, and how many of those are points, which come first.
-        moved: aims that the nodes move.
-    """
-
+    # (s, 4) node, where in `moved` it begins and ends, and how many of those are points, which come first
     turns: Indices
-    moved: Indices
+    moved: Indices  # aims that the nodes move
 
 
 class Aims:

@@ -25,21 +25,13 @@ from wholebody.tasks.range_of_motion import RangeOfMotion, ReachCones
 
 @dataclass(frozen=True)
 class GoalPlace:
-    """A frame, or a point of it, and its target.
+    """A frame, or a point of it, and its target."""
 
-    Attributes:
-        frame: index in the model.
-        offset: the point in the frame, metres.
-        place: target position in the world; None if only the orientation counts.
-        rotation: (3, 3) target rotation in the world; None if only the position counts.
-        weight: factor on the squared error.
-    """
-
-    frame: int
-    offset: Vector
-    place: Vector | None
-    rotation: Any
-    weight: float
+    frame: int  # index in the model
+    offset: Vector  # the point in the frame, metres
+    place: Vector | None  # target position in the world; None if only the orientation counts
+    rotation: Any  # (3, 3) target rotation in the world; None if only the position counts
+    weight: float  # factor on the squared error
 
 
 @dataclass(frozen=True)

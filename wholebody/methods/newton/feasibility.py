@@ -16,24 +16,15 @@ from wholebody.methods.newton.system import ActiveSystem, System
 
 
 class FeasibilityResult(NamedTuple):
-    """The end of the iteration.
+    """The end of the iteration."""
 
-    Attributes:
-        x: (7 n,) the variables.
-        met: whether all equations hold to the tolerance.
-        hard, goal: largest error of a joint or constraint, and of the goals.
-        residuals: largest error before each iteration, and at the end.
-        systems: linear systems solved.
-        stationary: whether no further progress is possible.
-    """
-
-    x: Array
-    met: bool
-    hard: float
+    x: Array  # (7 n,) the variables
+    met: bool  # whether all equations hold to the tolerance
+    hard: float  # largest error of a joint or constraint, and of the goals
     goal: float
-    residuals: tuple[float, ...]
-    systems: int
-    stationary: bool
+    residuals: tuple[float, ...]  # largest error before each iteration, and at the end
+    systems: int  # linear systems solved
+    stationary: bool  # whether no further progress is possible
 
     @property
     def iterations(self) -> int:

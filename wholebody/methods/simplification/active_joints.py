@@ -32,19 +32,12 @@ NOTHING = 1e-9  # entries of a Jacobian below this are rounding
 
 @dataclass(frozen=True)
 class ActiveJoints:
-    """The joints of a problem: active, frozen, or locked.
+    """The joints of a problem: active, frozen, or locked."""
 
-    Attributes:
-        moving: (njoints,) the active joints.
-        frozen: (njoints,) the joints that a bound keeps in place.
-        helpers: names of the inequalities that a locked joint could have helped to keep.
-        excess: the measures of the locked joints alone minus their least value.
-    """
-
-    moving: Mask
-    frozen: Mask
-    helpers: tuple[str, ...]
-    excess: float
+    moving: Mask  # (njoints,) the active joints
+    frozen: Mask  # (njoints,) the joints that a bound keeps in place
+    helpers: tuple[str, ...]  # names of the inequalities that a locked joint could have helped to keep
+    excess: float  # the measures of the locked joints alone minus their least value
 
 
 def active_joints(problem: Problem, lock: bool = True) -> ActiveJoints:

@@ -33,17 +33,11 @@ class Range(NamedTuple):
 
 
 class Balls(NamedTuple):
-    """Balls that contain pieces, in the frame of one joint; there is none for a piece without a bound.
+    """Balls that contain pieces, in the frame of one joint; there is none for a piece without a bound."""
 
-    Attributes:
-        center: (k, 3) metres.
-        radius: (k,) metres.
-        piece: (k,) indices of the pieces.
-    """
-
-    center: Array
-    radius: Array
-    piece: Indices
+    center: Array  # (k, 3) metres
+    radius: Array  # (k,) metres
+    piece: Indices  # (k,) indices of the pieces
 
 
 class Reach:

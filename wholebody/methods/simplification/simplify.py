@@ -25,17 +25,11 @@ from wholebody.tasks.bounds import Freeze
 
 @dataclass(frozen=True)
 class Parts:
-    """The kinds of parts to leave out, separately, so that their effects can be measured.
+    """The kinds of parts to leave out, separately, so that their effects can be measured."""
 
-    Attributes:
-        joints: leave out joints that the problem freezes.
-        lock: also lock joints that are not active.
-        pairs: drop pairs that cannot come near, and things without a remaining pair.
-    """
-
-    joints: bool = True
-    lock: bool = True
-    pairs: bool = True
+    joints: bool = True  # leave out joints that the problem freezes
+    lock: bool = True  # also lock joints that are not active
+    pairs: bool = True  # drop pairs that cannot come near, and things without a remaining pair
 
 
 @dataclass(frozen=True)
