@@ -57,7 +57,7 @@ class AssemblyJoints(AssemblyBodies):
     def spherical(self, first: str, second: str, **where: Any) -> Self:
         """A point of one body stays at a point of the other. Takes `at`, or `at_first` and `at_second`."""
         a, b = self._pair(first, second, "spherical joint")
-        ends = self._ends(a, b, "spherical joint", first, second, **where)
+        ends = self._ends(a, b, "spherical joint", (first, second), **where)
         self._holding.coincide(a[0], b[0], f"the spherical joint of {first!r} and {second!r}", *ends)
         return self._connected(a[0], b[0])
 
@@ -93,7 +93,7 @@ class AssemblyJoints(AssemblyBodies):
         low, high = (-np.inf, np.inf) if limits is None else numbers(limits, (2,), f"{what}: limits").tolist()
         if low >= high:
             raise InputError(f"{what}: limits {low:g} and {high:g} leave no room; give the lower one first")
-        ends = self._ends((a, in_a), (b, in_b), "revolute joint", first, second, **where)  # registers it, after checks
+        ends = self._ends((a, in_a), (b, in_b), "revolute joint", (first, second), **where)
         basis_a = axes_along(ours)
         # the second body's axes agree with the first's at the present placements, so that the angle is zero now
         basis_b = (turn_b.inverse() * turn_a * basis_a) if axis_second is None else axes_along(theirs)
@@ -212,14 +212,13 @@ class AssemblyJoints(AssemblyBodies):
         a: tuple[int, Any],
         b: tuple[int, Any],
         kind: str,
-        first: str,
-        second: str,
+        names: tuple[str, str],
         at: Any = None,
         at_first: Any = None,
         at_second: Any = None,
     ) -> tuple[Array, Array]:
-        """The joint's position in either body."""
-        where = f"{kind} of {first!r} and {second!r}"
+        """The joint's position in either body; the joint is registered."""
+        where = f"{kind} of {names[0]!r} and {names[1]!r}"
         if (at is None) == (at_first is None) or (at_first is None) != (at_second is None):
             raise InputError(f"{where}: give its place as at=(x, y, z) in the world, or as at_first and at_second")
         if at is None:
@@ -228,5 +227,5 @@ class AssemblyJoints(AssemblyBodies):
             place = point(at, f"{where}: at")
             sides = [self._placed(index).actInv(place) for index in (a[0], b[0])]
             ends = np.array(sides[0]), np.array(sides[1])
-        self._joints.add(kind, first, second, ends)
+        self._joints.add(kind, *names, ends)
         return ends

@@ -24,27 +24,23 @@ from wholebody.tasks.base import Constraint, Goal, Measure
 from wholebody.tasks.checks import defined
 from wholebody.terms.plan import checked_count
 
+_Function = tuple[Callable[[State], Array], Callable[[State], Array]]
+"""Values (m,) and derivatives (m, nv) at a state."""
+
 
 class TangentRows(Batch):
     """Rows sign (value(posture) - bound) of all bodies of a figure."""
 
     def __init__(
-        self,
-        bodies: FigureBodies,
-        label: str,
-        value: Callable[[State], Array],
-        jacobian: Callable[[State], Array],
-        chosen: Indices,
-        sign: Array,
-        bound: Array,
+        self, bodies: FigureBodies, label: str, function: _Function, chosen: Indices, sign: Array, bound: Array,
         depends: Mask | None = None,
-    ) -> None:
-        """Take the value (m,) and its derivative (m, nv) at a state; `chosen` (size,) are the used rows among the m.
+    ) -> None:  # fmt: skip
+        """Take a function, of whose rows those with the indices `chosen` (size,) are used.
 
         The degrees of freedom on which each used row depends are `depends` (size, nv); None for all.
         """
         super().__init__(np.arange(bodies.count)[None], [label])
-        self._figure, self._value, self._slope = bodies, value, jacobian
+        self._figure, (self._value, self._slope) = bodies, function
         self.chosen, self.sign, self.bound = chosen, sign, bound
         self.size = len(chosen)
         self.pattern = np.tile(_reads(bodies), (self.size, 1))
@@ -70,7 +66,7 @@ def goal_rows(bodies: FigureBodies, goal: Goal, label: str) -> TangentRows:
     """Rows of a goal: its error."""
     error = np.atleast_1d(goal.error(bodies.start_state))
     return TangentRows(
-        bodies, label, *_of_rows(goal, goal.error, len(error)),
+        bodies, label, _of_rows(goal, goal.error, len(error)),
         np.arange(len(error)), np.ones(len(error)), np.zeros(len(error)),
     )  # fmt: skip
 
@@ -94,14 +90,12 @@ def square_rows(bodies: FigureBodies, measure: Measure, label: str) -> TangentRo
     seen = [squares(state)[1] != 0.0 for state in defined(measure, map(bodies.state_of, postures))]
     depends = np.any(seen, axis=0) if seen else np.ones((count, bodies.model.nv), dtype=bool)
     return TangentRows(
-        bodies, label, lambda state: squares(state)[0], lambda state: squares(state)[1], np.arange(count),
+        bodies, label, (lambda state: squares(state)[0], lambda state: squares(state)[1]), np.arange(count),
         np.ones(count), np.zeros(count), depends,
     )  # fmt: skip
 
 
-def _of_rows(
-    term: Goal | Constraint, ask: Callable[[State], Array], count: int
-) -> tuple[Callable[[State], Array], Callable[[State], Array]]:
+def _of_rows(term: Goal | Constraint, ask: Callable[[State], Array], count: int) -> _Function:
     """Values and derivatives of a term, which has as many rows at all postures as at the start."""
 
     def value(state: State) -> Array:
@@ -130,7 +124,7 @@ def constraint_rows(
     def rows(chosen: Indices, sign: Array, bound: Array) -> TangentRows | None:
         if not len(chosen):
             return None
-        return TangentRows(bodies, label, *_of_rows(term, term.value, size[0]), chosen, sign, bound)
+        return TangentRows(bodies, label, _of_rows(term, term.value, size[0]), chosen, sign, bound)
 
     sides = np.concatenate([np.ones(len(above)), -np.ones(len(below))])
     return (
