@@ -10,7 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field, fields
-from math import inf
+from math import inf, sqrt
 from typing import Any
 
 import numpy as np
@@ -146,13 +146,13 @@ def _judged(problem: Problem, pairs: AllPairs, q: Array, began: float) -> Assess
     state = pairs.state
     distance, angle, each = goal_errors(problem, state)
     pairs.ask(problem.clearances)
-    violation = float((problem.clearances - pairs.distance).max(initial=0.0))
+    violation = float(np.maximum.reduce(problem.clearances - pairs.distance, initial=0.0))
     missed = largest_violation(problem, state)
     fits = all(left <= MET for left in (distance, angle, violation, missed))
     return Assessment(
         goal_error=distance,
         goal_angle=angle,
-        penetration=max(0.0, -pairs.least) if np.isfinite(pairs.least) else 0.0,
+        penetration=max(0.0, -pairs.least),
         least_distance=pairs.least,
         clearance_violation=violation,
         limit_violation=_limit_violation(problem, q),
@@ -169,9 +169,10 @@ def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[flo
     distances, angles, each = [0.0], [0.0], []
     for goal in problem.goals:
         error = _values(goal, goal.error, state)
-        angular = np.broadcast_to(goal.angular, error.shape)
-        distances.append(float(np.linalg.norm(error[~angular])))
-        angles.append(float(np.linalg.norm(error[angular])))
+        angular = np.zeros(error.shape, dtype=bool) | goal.angular
+        far, turned = error[~angular], error[angular]
+        distances.append(sqrt(far.dot(far)))
+        angles.append(sqrt(turned.dot(turned)))
         each.append(max(distances[-1], angles[-1]))
     return max(distances), max(angles), tuple(each)
 
@@ -179,7 +180,7 @@ def goal_errors(problem: Problem, state: State) -> tuple[float, float, tuple[flo
 def _limit_violation(problem: Problem, q: Array) -> float:
     limits = problem.scene.figure.limits
     values = q[limits.idx_q]
-    return float(np.maximum(limits.lower - values, values - limits.upper).max(initial=0.0))
+    return float(np.maximum.reduce(np.maximum(limits.lower - values, values - limits.upper), initial=0.0))
 
 
 def largest_violation(problem: Problem, state: State) -> float:

@@ -247,10 +247,14 @@ class FixedAttributes:
 
     _settable: ClassVar[frozenset[str]] = frozenset()
     _correction: ClassVar[str] = "make another one"
+    _properties: ClassVar[frozenset[str]] = frozenset()
+
+    def __init_subclass__(cls) -> None:
+        kinds = {name: kind for base in reversed(cls.__mro__) for name, kind in vars(base).items()}
+        cls._properties = frozenset(name for name, kind in kinds.items() if isinstance(kind, property))
 
     def __setattr__(self, name: str, value: Any) -> None:
-        given = name in vars(self)
-        if not name.startswith("_") and (given or isinstance(getattr(type(self), name, None), property)):
+        if (name in self.__dict__ or name in self._properties) and name[0] != "_":
             if name not in self._settable:
                 raise InputError(f"{name} of a {type(self).__name__} cannot be set; {self._correction}")
             value = self._checked_value(name, value)

@@ -90,12 +90,13 @@ def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what
     """Check both parts, and round the rotation to the nearest orthonormal matrix (polar decomposition)."""
     _check_values(translation, what)
     _check_values(rotation, what)
-    error = float(np.abs(rotation @ rotation.T - np.eye(3)).max())
+    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
+    lengths = a * a + b * b + c * c - 1.0, d * d + e * e + f * f - 1.0, g * g + h * h + i * i - 1.0
+    error = max(map(abs, (*lengths, a * d + b * e + c * f, a * g + b * h + c * i, d * g + e * h + f * i)))
     if error > ROUNDING:
         raise InputError(
             f"{what}: the rotation is not orthonormal (off by {error:.3g}); give a rotation without scale or shear"
         )
-    (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     if a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0:
         raise InputError(f"{what}: the rotation is a reflection (determinant -1); give a right-handed rotation")
     if error >= 1e-14:
@@ -105,7 +106,8 @@ def _rigid(rotation: NDArray[np.float64], translation: NDArray[np.float64], what
 
 
 def _check_values(values: NDArray[np.float64], what: str) -> None:
+    if np.abs(values).max() <= FARTHEST:  # NaN is not
+        return
     if not np.isfinite(values).all():
         raise InputError(f"{what}: not every value is finite; give finite numbers")
-    if np.abs(values).max() > FARTHEST:
-        raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")
+    raise InputError(f"{what}: a value is beyond {FARTHEST:g}; give metres")

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
-from typing import TYPE_CHECKING, NoReturn
+from collections.abc import Callable, Collection, Mapping
+from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 import pinocchio as pin
@@ -12,6 +11,7 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.checks import a
 from wholebody.base.errors import InputError
+from wholebody.base.pool import Loan
 from wholebody.figures.state import State
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.approach import largest_approach
@@ -173,9 +173,6 @@ class Workspace(NotCopyable):
         return self.proximity.placements(self.state.update(q))
 
 
-@contextmanager
-def borrowed(built: SceneGeometry) -> Iterator[Workspace]:
+def borrowed(built: SceneGeometry, begin: Callable[[Workspace], Any] = Workspace.begin) -> Loan[Workspace]:
     """A workspace of a scene for one run; it is used again when the context ends."""
-    with built.pool(Workspace, lambda: Workspace(built)).borrow() as workspace:
-        workspace.begin()
-        yield workspace
+    return built.pool(Workspace, lambda: Workspace(built)).borrow(begin)

@@ -18,7 +18,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.records import with_values
 from wholebody.figures.figure import Figure
-from wholebody.geometry.proximity import COAL_ACCURACY, PairTable
+from wholebody.geometry.pieces import COAL_ACCURACY
+from wholebody.geometry.proximity import PairTable
 from wholebody.tasks.base import Constraint
 from wholebody.tasks.hold import Hold
 
