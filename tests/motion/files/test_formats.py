@@ -17,11 +17,9 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import CubicSpline
 
 import wholebody as wb
 from wholebody.figures.figure import Figure
-from wholebody.motion.files import joint_profile
 from wholebody.tracking.tracks import MOST_FRAMES
 
 CLOSE = {".npz": 1e-14, ".csv": 1e-14, ".txt": 1e-6, ".bvh": 1e-4}
@@ -117,21 +115,6 @@ def test_a_joint_profile_of_other_hands_is_read(human: Figure, tmp_path: Path) -
     assert len(clip) == 2
     assert clip.dt == 0.033333
     assert clip.q[0, 7:] == pytest.approx(0.01 * np.arange(6, 55), abs=1e-9)
-
-
-def test_splines_are_sampled(human: Figure) -> None:
-    times = np.array([0.5, 1.0, 1.7])
-    curves = np.random.default_rng(3).uniform(-0.4, 0.4, (3, 55))
-    frames = joint_profile.sampled(times, curves, human, 0.1)
-    assert len(frames.q) == 13
-    assert frames.q[5, 7:] == pytest.approx(curves[1, 6:], abs=1e-12)
-    wanted = CubicSpline(times, curves[:, 6:], bc_type="clamped")(0.5 + 0.1 * np.arange(13))
-    assert frames.q[:, 7:] == pytest.approx(wanted, abs=1e-12)
-    for wrong in ([0.5, 0.5, 1.0], [0.5, np.nan, 1.0]):
-        with pytest.raises(wb.InputError, match="times are"):
-            joint_profile.sampled(np.array(wrong), curves, human, 0.1)
-    with pytest.raises(wb.InputError, match="curves have shape"):
-        joint_profile.sampled(times, curves[:, :5], human, 0.1)
 
 
 PROFILE = ["# comment", "0.1", "2", "\t".join(["0"] * 55), "\t".join(["0"] * 55)]

@@ -24,16 +24,7 @@ from wholebody.motion.structure import recognised_unit
 
 
 def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> SkeletonMotion:
-    """Read a moving skeleton.
-
-    Args:
-        path: the file.
-        unit: "metres", "centimetres", ... of `UNITS`; recognised by the size of the skeleton if left out.
-        up: "y" or "z"; recognised by the rest posture if left out.
-
-    Raises:
-        FileFormatError: the file cannot be read; the line is named.
-    """
+    """Read a moving skeleton; see `wholebody.motion.reading.read_skeleton`."""
     found = parsed(read_foreign_text(path, "motion", LARGEST_FILE), path.name)
     mark, _, rest = found.joints[0].name.partition(":")
     ours = mark == MARK and bool(rest)
@@ -142,10 +133,7 @@ def _begins_with_rest(angles: Array) -> bool:
     """Whether the first frame is a rest posture, and the second is not.
 
     No joint but the root turns in it; or few do, and a jump leads to the second frame: in CMU's converted files some
-    joints of the rest posture turn by whole degrees.
-
-    Args:
-        angles: (frames, joints, 3) of all joints but the root, radians.
+    joints of the rest posture turn by whole degrees. Angles (frames, joints, 3), radians, are without the root's.
     """
     if len(angles) < 2:
         return False
@@ -230,11 +218,7 @@ MARK = "centimetres"  # before the name of a root, as a name space: an own file 
 
 
 def write(motion: Motion, path: Path) -> Path:
-    """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place.
-
-    Raises:
-        InputError: a joint of the figure slides, or the file cannot be written.
-    """
+    """Write a clip as BVH: y up, z forward, centimetres, one joint for all of the figure's joints at one place."""
     nodes = nodes_of(motion.figure)
     local, root = rotations(motion.figure, nodes, motion.q)
     back, scale = UP["y"].T, 1.0 / UNITS["centimetres"]  # six digits of which are 1e-8 m

@@ -27,12 +27,7 @@ def write(motion: Motion, path: Path) -> Path:
 
 
 def read(path: Path, figure: Figure) -> Frames:
-    """Read such a file.
-
-    Raises:
-        FileFormatError: as for `read_track`.
-        UnknownNameError: a column that is no joint of the figure.
-    """
+    """Read such a file; see `read_track`."""
     try:
         track = read_track(path, figure)
     except FileFormatError:
