@@ -65,23 +65,25 @@ def read_motion(path: Path, unit: str | None = None, up: str | None = None) -> S
         motion = SkeletonMotion.moved(
             names, parents, scale * offsets @ turn.T, local, places, found.dt, title_of(path), tuple(notes)
         )
-        return replace(motion, positions=_lengthened(motion, found, kept, first, scale * turn))
+        return _lengthened(motion, found, kept, first, scale * turn)
     except InputError as error:
         raise FileFormatError(f"{path.name}: {error}") from None
 
 
-def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> Array:
-    """Places (n, j, 3) of the joints where the lengths of bones change."""
-    positions, columns = np.array(motion.positions), _columns(found)
+def _lengthened(motion: SkeletonMotion, found: BvhText, kept: list[int], first: int, scale: Array) -> SkeletonMotion:
+    """The motion with the places of the joints where the lengths of bones change."""
+    moving = [
+        any(values.any() for (_, kind), values in columns.items() if kind == "position") for columns in _columns(found)
+    ]
+    if not any(moving[source] for source in kept[1:]):
+        return motion
+    positions = np.array(motion.positions)
     for joint, source in enumerate(kept[1:], 1):
         parent = motion.parents[joint]
-        step: Array = motion.offsets[joint]
-        given = [values for (_, kind), values in columns[source].items() if kind == "position"]
-        if any(values.any() for values in given):
-            step = _positions(found, source)[first:] @ scale.T
+        step: Array = _positions(found, source)[first:] @ scale.T if moving[source] else motion.offsets[joint]
         turned = np.einsum("nij,nj->ni", motion.rotations[:, parent], np.broadcast_to(step, (len(motion), 3)))
         positions[:, joint] = positions[:, parent] + turned
-    return positions
+    return replace(motion, positions=positions)
 
 
 def _positions(found: BvhText, joint: int) -> Array:
