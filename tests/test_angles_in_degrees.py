@@ -104,6 +104,12 @@ def test_far_out_of_the_limits_is_said_also_where_degrees_would_be(scene):
         scene.figure.with_joints(scene.figure.neutral, {ELBOW: 720.0})
 
 
+def test_postures_may_be_lists(scene, wrong):
+    assert not scene.figure.warn_of_angles(scene.figure.neutral.tolist(), "here")
+    with pytest.warns(UserWarning, match=SAID):
+        assert scene.figure.warn_of_angles(wrong.tolist(), "here")
+
+
 def test_postures_within_and_a_little_beyond_the_limits_are_not_said(scene):
     figure = scene.figure
     high = figure.model.upperPositionLimit[figure.model.joints[figure.joint_id(ELBOW)].idx_q]

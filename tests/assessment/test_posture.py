@@ -12,6 +12,7 @@ import pytest
 
 import wholebody as wb
 from wholebody.assessment.all_pairs import AllPairs, NearPairs
+from wholebody.geometry.pieces import Piece
 from wholebody.geometry.proximity import Proximity
 
 LENGTHS = (0.5, 0.4)
@@ -250,6 +251,23 @@ def test_all_distances_are_those_of_coal_pair_by_pair(human):
             found = coal.distance(*sides, coal.DistanceRequest(), coal.DistanceResult())
             assert pairs.distance[number] == pytest.approx(found, abs=2e-6)
         assert pairs.least == pairs.distance.min()
+
+
+class Unmeasured(wb.Shape):
+    """A shape of one's own that is broken: its radius is not a number."""
+
+    def pieces(self):
+        return (Piece(coal.Sphere(np.nan), pin.SE3.Identity(), 1.0),)
+
+
+@pytest.mark.parametrize("many", [0, 3000])
+def test_a_distance_that_is_not_a_number_is_refused(free_bodies, monkeypatch, many):
+    """Also where most pairs are never asked for: where there are many."""
+    monkeypatch.setattr("wholebody.assessment.all_pairs.MANY", many)
+    scene = wb.Scene(free_bodies(wb.Sphere(0.1))).add(wb.Sphere(0.1), name="ball", at=(0.15, 0.0, 0.0))
+    problem = wb.Problem(scene.add(Unmeasured(), name="broken", at=(0.0, 0.0, 2.0)))
+    with pytest.raises(wb.InputError, match="a distance is not a number"):
+        wb.assess(problem, problem.start)
 
 
 def everything(found):

@@ -12,6 +12,7 @@ import pytest
 
 import wholebody as wb
 from tests.needs import each
+from wholebody.bench.suite.stability.bodies import spatial_arm
 from wholebody.methods.control import Control
 
 METHODS = {
@@ -77,6 +78,21 @@ def test_ctrl_c_answers_with_the_best_so_far(reach, name):
 
     answer = wb.solve(reach, METHODS[name](), progress=progress)
     assert answer.status == "stalled"
+    assert "Ctrl-C ended it" in answer.message
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+@pytest.mark.parametrize("target", [(0.3, 0.2, 0.5), (9.0, 9.0, 9.0)])
+def test_ctrl_c_answers_while_an_arm_goes_to_its_goals_as_if_nothing_were_in_its_way(target):
+    arm, told = spatial_arm(), []
+
+    def progress(entry):
+        told.append(entry.note)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    problem = wb.Problem(wb.Scene(arm), goals=[wb.Point("tip", target)])
+    answer = wb.solve(problem, progress=progress)
+    assert told == ["seed"]
     assert "Ctrl-C ended it" in answer.message
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 

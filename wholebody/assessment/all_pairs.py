@@ -82,10 +82,12 @@ class AllPairs:
         number = self._below(within)
         number = number[self._row[number] < 0]
         self.distance[number] = np.maximum(self.distance[number], self._between_boxes(number))
-        self._ask(number[self.distance[number] < np.broadcast_to(within, self.distance.shape)[number]])
+        self._ask(number[~(self.distance[number] >= np.broadcast_to(within, self.distance.shape)[number])])
 
     def _below(self, within: Array | float) -> Indices:
-        return np.flatnonzero(np.less(self.distance, within, out=self._near))
+        """Pairs (k,) that are nearer, and those whose bound is not a number."""
+        beyond = np.greater_equal(self.distance, within, out=self._near)
+        return np.flatnonzero(np.logical_not(beyond, out=beyond))
 
     def _ask(self, number: Indices) -> None:
         """Ask coal for pairs (k,)."""

@@ -63,6 +63,7 @@ class Turning:
 
     def warn(self, q: Array, what: str) -> bool:
         """Warn of the joint that is farthest out in a posture (nq,) or several (n, nq); whether it was said."""
+        q = np.asarray(q)
         if q.ndim == 1 and ((q >= self._least) & (q <= self._most)).all():  # at every step of a tracker
             return False
         rows = np.atleast_2d(q)
@@ -75,7 +76,7 @@ class Turning:
             return False
         values = rows[:, self._places[column]]
         frame = int(np.argmax(np.maximum(self._low[column] - values, values - self._high[column])))
-        where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if np.ndim(q) > 1 else "")
+        where = f"{what}: joint {self._names[column]!r}" + (f" of frame {frame}" if q.ndim > 1 else "")
         warn(self._told(where, float(values[frame]), column))
         return True
 

@@ -108,17 +108,15 @@ class QP(Checked):
             self.tolerance, self.iterations, self.budget, self.restarts, self.seed, self.measures,
             self.restarts_for_measure,
         )  # fmt: skip
-        control = Control(self.time_limit, progress, LONGEST)
-        with problem.borrow() as workspace:
+        with problem.borrow() as workspace, Control(self.time_limit, progress, LONGEST) as control:
             met = from_seeds(problem, workspace, budget, control)
             judgement = assess(problem, met.q) if met is not None and met.complete else None
             if met is not None and judgement is not None and meets(judgement, self.tolerance):
                 ending = Ending(met.q, True, len(met.trace), met.trace, "directly", judgement=judgement)
             else:
-                with control:
-                    search = Multistart(problem, workspace, self._qp_solver(), budget, control)
-                    begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
-                    best = search.run(begin, None if met is None else met.blocked)
+                search = Multistart(problem, workspace, self._qp_solver(), budget, control)
+                begin, before = (None, ()) if met is None else (met.q if judgement is None else None, met.trace)
+                best = search.run(begin, None if met is None else met.blocked)
                 ending = Ending(
                     best.q, best.converged, len(before) + search.spent, (*before, *search.trace), search.how,
                     contradictions=search.contradictions, programs=search.solver.counted(),
