@@ -14,9 +14,9 @@ from wholebody.figures.figure import Figure
 from wholebody.figures.model_check import Turning
 from wholebody.figures.state import State
 from wholebody.geometry.large_models import geometry_model
+from wholebody.geometry.pieces import swept_points
 from wholebody.geometry.placement import PlacementLike, placement
 from wholebody.geometry.shapes import Shape
-from wholebody.geometry.swept_points import swept_points
 from wholebody.methods.newton.batches import Batch
 from wholebody.methods.newton.figure_bodies import FigureBodies
 from wholebody.methods.newton.own_rows import TangentRows
