@@ -4,11 +4,11 @@ import re
 from pathlib import Path
 
 import wholebody as wb
-from wholebody.taskfile.page import INTRODUCTION, page
+from tests.audits.taskfile import INTRODUCTION, page
 
 
 def test_the_page_in_the_documentation_is_the_one_the_tables_say(root: Path) -> None:
-    assert (root / "docs" / "taskfile.md").read_text() == page(), "run: python -m wholebody.taskfile.page"
+    assert (root / "docs" / "taskfile.md").read_text() == page(), "run: python -m tests.audits.taskfile"
 
 
 def test_the_example_on_the_page_is_solved(tmp_path: Path) -> None:

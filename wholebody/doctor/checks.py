@@ -17,15 +17,10 @@ TIMEOUT = 300.0
 
 
 class Outcome(NamedTuple):
-    """The outcome of a check.
+    """The outcome of a check."""
 
-    Attributes:
-        works: whether the check succeeded.
-        detail: the finding, or the reason of the failure, in a few words.
-    """
-
-    works: bool
-    detail: str
+    works: bool  # whether the check succeeded
+    detail: str  # the finding, or the reason of the failure, in a few words
 
 
 def import_module(name: str) -> str:
@@ -100,16 +95,7 @@ CHECKS: dict[str, Callable[[str], str]] = {
 
 
 def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, Outcome]:
-    """Try names one after the other.
-
-    Args:
-        kind: a key of `CHECKS`.
-        names: names to try.
-        timeout: time limit of a check, seconds.
-
-    Returns:
-        An outcome for every name.
-    """
+    """Try names one after the other."""
     child, outcomes = Child(), dict[str, Outcome]()
     try:
         for name in names:
@@ -117,10 +103,8 @@ def run(kind: str, names: Sequence[str], timeout: float = TIMEOUT) -> dict[str, 
                 outcomes[name] = Outcome(*child.call(attempt, kind, name, seconds=timeout))
             except EndedError as error:
                 said = f": {error.said}" if error.said else ""
-                end = (
-                    f"no answer within {timeout:.0f} s" if error.overtime else f"ended the process ({error.how}){said}"
-                )
-                outcomes[name] = Outcome(False, end)
+                late = f"no answer within {timeout:.0f} s"
+                outcomes[name] = Outcome(False, late if error.overtime else f"ended the process ({error.how}){said}")
     finally:
         child.close()
     return outcomes

@@ -12,8 +12,7 @@ from wholebody.ergonomics.owas_score import Owas, owas_code
 from wholebody.ergonomics.posture_torques import StaticTorques, static_torques
 from wholebody.ergonomics.reba_score import Reba, reba_parts
 from wholebody.ergonomics.rula_score import Rula, rula_parts
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import Work
+from wholebody.ergonomics.work import Work, seen
 from wholebody.figures.figure import Figure
 from wholebody.motion.strength import Strength
 from wholebody.scene.scene import Scene

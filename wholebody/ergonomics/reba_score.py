@@ -8,39 +8,24 @@ from typing import Annotated
 
 from wholebody.base.arrays import Array
 from wholebody.base.fields import Checked, Range
-from wholebody.ergonomics.angles import SIDES, BodyAngles, BothSides
-from wholebody.ergonomics.published import action, published
+from wholebody.ergonomics.angles import SIDES, BodyAngles
+from wholebody.ergonomics.published import BothSides, action, published
 from wholebody.ergonomics.rula_score import (
-    ABDUCTED,
     DEVIATED,
     END_OF_TWIST,
     NEUTRAL,
-    RAISED,
     lower_arm,
-    position,
+    raised,
     turned,
 )
-from wholebody.ergonomics.seat import seen
-from wholebody.ergonomics.work import COUPLINGS, Work, both_feet
+from wholebody.ergonomics.work import COUPLINGS, Work, both_feet, seen
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
 
 @dataclass(frozen=True)
 class RebaParts(Checked):
-    """Scores of the parts of the body, which the tables combine.
-
-    Attributes:
-        neck: 1 to 3.
-        trunk: 1 to 5.
-        legs: 1 to 4.
-        upper_arm: 1 to 6.
-        lower_arm: 1 or 2.
-        wrist: 1 to 3.
-        load: 0 to 3.
-        coupling: 0 to 3.
-        activity: 0 to 3.
-    """
+    """Scores of the parts of the body, which the tables combine; an InputError if one is out of its range."""
 
     neck: Annotated[int, Range(1, 3, whole=True)]
     trunk: Annotated[int, Range(1, 5, whole=True)]
@@ -73,8 +58,11 @@ class RebaParts(Checked):
         return action("reba", self.score)
 
 
-class Reba(BothSides[RebaParts]):
+class Reba(BothSides):
     """REBA of both sides: the parts with the arm and the leg of each side."""
+
+    left: RebaParts
+    right: RebaParts
 
 
 def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
@@ -95,13 +83,13 @@ def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
 def reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
-    upper = position(arm) + int(arm.shoulder_rise > RAISED) + int(abs(arm.shoulder_abduction) > ABDUCTED)
+
     twisted = abs(arm.wrist_deviation) > DEVIATED or abs(arm.forearm_twist) > END_OF_TWIST
     return RebaParts(
         neck=_neck(angles),
         trunk=_trunk(angles),
         legs=_legs(angles, side, work),
-        upper_arm=max(upper - int(work.arms_supported), 1),
+        upper_arm=max(raised(arm) - int(work.arms_supported), 1),
         lower_arm=lower_arm(arm),
         wrist=(1 if abs(arm.wrist_flexion) <= radians(15.0) else 2) + int(twisted),
         load=(0 if work.load < 5.0 else 1 if work.load <= 10.0 else 2) + int(work.shock),

@@ -32,28 +32,16 @@ COLORS: Mapping[str, str] = MappingProxyType(
 
 
 class Cell(NamedTuple):
-    """A case in the table.
+    """A case in the table."""
 
-    Attributes:
-        row: name of its row.
-        column: name of its column.
-        outcome: a name of `COLORS`.
-        left: residual distance of the goals, metres; 0 writes nothing.
-    """
-
-    row: str
-    column: str
-    outcome: str
-    left: float
+    row: str  # name of its row
+    column: str  # name of its column
+    outcome: str  # a name of `COLORS`
+    left: float  # residual distance of the goals, metres; 0 writes nothing
 
 
 def draw_outcomes(cells: Sequence[Cell], path: Path) -> Path:
-    """Draw the outcomes of cases as a table into a PNG file; returns the path.
-
-    Raises:
-        InputError: no cells, two in one place, too many rows or columns, or an outcome without a colour; the file
-            cannot be written.
-    """
+    """Draw the outcomes of cases as a table into a PNG file; returns the path."""
     from matplotlib.patches import Patch
 
     if unknown := {one.outcome for one in cells} - COLORS.keys():

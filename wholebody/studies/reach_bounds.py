@@ -14,16 +14,7 @@ SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be 
 
 
 def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Array]:
-    """Balls in the world that contain a point of a frame in every posture within limits and holds.
-
-    Args:
-        problem: whose holds, bounds and limits count.
-        frame: name of the frame.
-        offset: (3,) the point, in the frame's axes.
-
-    Returns:
-        Centres (k, 3) and radii (k,), metres; none where nothing bounds the point.
-    """
+    """Balls in the world that contain a point of a frame in every posture within limits and holds."""
     figure, model = problem.scene.figure, problem.scene.model
     held = model.frames[figure.frame_id(frame)]
     point = (held.placement.act(offset))[None]

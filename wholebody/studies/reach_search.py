@@ -19,44 +19,27 @@ SURE = 0.95  # share of the distance to a missed place within which no place is 
 
 
 class Try(NamedTuple):
-    """A place that was searched.
+    """A place that was searched."""
 
-    Attributes:
-        place: its number.
-        reached: whether a posture was found.
-        inside: whether the place contradicts the constraints, so that it was not searched.
-        left: distance to the nearest posture that was found, metres.
-        sure: whether the search says that there is nothing nearer, so that places within that distance are left out.
-        measure: weighted sum of the measures at the posture.
-        q: (nq,) the posture.
-    """
-
-    place: int
-    reached: bool
-    inside: bool
-    left: float
+    place: int  # its number
+    reached: bool  # whether a posture was found
+    inside: bool  # whether the place contradicts the constraints, so that it was not searched
+    left: float  # distance to the nearest posture that was found, metres
+    # whether the search says that there is nothing nearer, so that places within that distance are left out
     sure: bool
-    measure: float
-    q: Array
+    measure: float  # weighted sum of the measures at the posture
+    q: Array  # (nq,) the posture
 
 
 @dataclass(frozen=True)
 class Asked:
-    """The problem of every place.
+    """The problem of every place."""
 
-    Attributes:
-        problem: its goals are met at every place too.
-        frame: the frame that reaches.
-        offset: (3,) the point of the frame, in its axes.
-        whole: method of whole solves.
-        quick: method of those that begin at a neighbour.
-    """
-
-    problem: Problem
-    frame: str
-    offset: Array
-    whole: Method
-    quick: Method
+    problem: Problem  # its goals are met at every place too
+    frame: str  # the frame that reaches
+    offset: Array  # (3,) the point of the frame, in its axes
+    whole: Method  # method of whole solves
+    quick: Method  # method of those that begin at a neighbour
 
     def at(self, place: Array, start: Array) -> Problem:
         """The problem of a place (3,), from a start (nq,)."""
@@ -72,27 +55,17 @@ class Asked:
 
 @dataclass
 class Brick:
-    """Places that are searched together, in one process.
+    """Places that are searched together, in one process."""
 
-    Attributes:
-        places: number -> (3,) metres.
-        neighbours: number -> numbers of the neighbours of a place, those of other bricks included.
-        open: places that are searched.
-        again: (place, neighbour) to be tried once more from there.
-        reached: number -> posture (nq,) of what is reached already, here and around.
-        whole: whether places are solved by whole solves from the problem's start.
-        tried: (place, neighbour) of tries of earlier rounds.
-        tries: the answer.
-    """
-
-    places: dict[int, Array]
+    places: dict[int, Array]  # number -> (3,) metres
+    # number -> numbers of the neighbours of a place, those of other bricks included
     neighbours: dict[int, tuple[int, ...]]
-    open: list[int]
-    again: list[tuple[int, int]]
-    reached: dict[int, Array]
-    whole: bool = False
-    tried: set[tuple[int, int]] = field(default_factory=set)
-    tries: list[tuple[Try, int]] = field(default_factory=list)
+    open: list[int]  # places that are searched
+    again: list[tuple[int, int]]  # (place, neighbour) to be tried once more from there
+    reached: dict[int, Array]  # number -> posture (nq,) of what is reached already, here and around
+    whole: bool = False  # whether places are solved by whole solves from the problem's start
+    tried: set[tuple[int, int]] = field(default_factory=set)  # (place, neighbour) of tries of earlier rounds
+    tries: list[tuple[Try, int]] = field(default_factory=list)  # the answer
 
     def search(self, asked: Asked) -> list[tuple[Try, int]]:
         """Search the places: each try, with the neighbour that it began from, -1 for none."""

@@ -17,12 +17,7 @@ class RecordStore:
     """Records by the fingerprint of what was asked; a record is there whole or not at all."""
 
     def __init__(self, folder: Path) -> None:
-        """Open the folder, or make it.
-
-        Raises:
-            InputError: the folder cannot be made, or the file cannot be written.
-            FileFormatError: the file is none of ours.
-        """
+        """Open the folder, or make it."""
         make_folder(folder)
         self.path = folder / NAME
         try:
@@ -34,11 +29,7 @@ class RecordStore:
             raise self._foreign() from None
 
     def read(self) -> dict[str, SolveRecord]:
-        """All records by fingerprint, without those whose process ended, which are done again.
-
-        Raises:
-            FileFormatError: the file holds something else.
-        """
+        """All records by fingerprint, without those whose process ended, which are done again."""
         try:
             with closing(self._connection()) as connection:
                 rows = connection.execute("SELECT asked, record FROM records").fetchall()

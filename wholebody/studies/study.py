@@ -168,11 +168,7 @@ def _fixed(person: Mapping[str, Any]) -> tuple[tuple[str, Any], ...]:
 
 
 def _person(given: Any) -> Any:
-    """A figure as it is, or options of `load`.
-
-    Raises:
-        InputError, UnknownNameError: no such person.
-    """
+    """A figure as it is, or options of `load`."""
     if isinstance(given, Figure):
         return given
     if isinstance(given, str):

@@ -12,29 +12,21 @@ from wholebody.base.files import is_file
 from wholebody.methods import METHODS
 from wholebody.taskfile.kinds import PLACEMENT, POSITION, ByName, Choice, Flag, Kind, Text
 from wholebody.taskfile.reading import read_toml
-from wholebody.taskfile.things import FIGURES
+from wholebody.taskfile.schema import FIGURES
 from wholebody.taskfile.where import Where
 
 
 @dataclass(frozen=True)
 class StudyFile:
-    """The content of a study file: the arguments of `wb.study`.
+    """The content of a study file: the arguments of `wb.study`."""
 
-    Attributes:
-        path: the file.
-        task: the task file.
-        people, targets, layouts: by name; None where the file has none.
-        method: None for that of the task.
-        warm_start: see `wb.study`.
-    """
-
-    path: Path
-    task: Path
-    people: dict[str, Any] | None
+    path: Path  # the file
+    task: Path  # the task file
+    people: dict[str, Any] | None  # by name; None where the file has none
     targets: dict[str, Any] | None
     layouts: dict[str, Any] | None
-    method: str | None
-    warm_start: bool
+    method: str | None  # None for that of the task
+    warm_start: bool  # see `wb.study`
 
 
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
@@ -44,12 +36,7 @@ _TABLES = ("person", "target", "layout")
 
 
 def read_study(path: Path) -> StudyFile:
-    """Read a study file; paths in it are relative to its folder.
-
-    Raises:
-        FileFormatError: a file that cannot be read, or a value of the wrong kind; file, key and fix are named.
-        UnknownNameError: an unknown key or a missing file, with the nearest names.
-    """
+    """Read a study file; paths in it are relative to its folder."""
     text, data = read_toml(path, "study file")
     where = Where(path, text)
     for name in data:

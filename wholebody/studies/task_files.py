@@ -22,23 +22,14 @@ class TaskFile:
     """A task file of which variants are made; it can be sent to another process."""
 
     def __init__(self, path: Path) -> None:
-        """Read the file and check it.
-
-        Raises:
-            FileFormatError, UnknownNameError, InputError: as for `read_task`.
-        """
+        """Read the file and check it."""
         self.path = path
         self._place = path.absolute()  # a process that reads it again may work in another folder
         self.contents = read_contents(path)
         self.task = task_from(self.contents, path)
 
     def check(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> None:
-        """Check values of a variant.
-
-        Raises:
-            InputError: the file has no goal with a place, or a value is of another kind.
-            UnknownNameError: an unknown thing or option.
-        """
+        """Check values of a variant."""
         if target is not None:
             self._goal()
             checks.numbers(target, (3,), "study: a target")
@@ -48,13 +39,7 @@ class TaskFile:
             self._figure(person)
 
     def __call__(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> Problem:
-        """The problem of a variant.
-
-        Args:
-            person: options of the figure, see `wb.load`; None for those of the file.
-            target: (3,) metres, of the first goal of type point or frame; None for that of the file.
-            layout: name of a thing to its placement; None for those of the file.
-        """
+        """The problem of a variant."""
         tables = dict(self.contents.tables)
         if person is not None:
             tables["figure"] = [self._figure(person)]

@@ -11,43 +11,27 @@ from wholebody.base.checks import shown
 from wholebody.base.errors import FileFormatError, UnknownNameError, one_line
 from wholebody.base.files import is_file, parsed_toml, read_text
 from wholebody.figures.figure import Figure
+from wholebody.taskfile.kinds import Form, Key, Table
 from wholebody.taskfile.schema import TABLES, TOP
-from wholebody.taskfile.tables import Form, Key, Table
 from wholebody.taskfile.where import Where
 
 
 class Entry(NamedTuple):
-    """One table of the file, checked.
+    """One table of the file, checked."""
 
-    Attributes:
-        where: its place.
-        form: its type; None if the table has no types.
-        name: name of the type.
-        keys: the keys that it can have.
-        values: the values of the keys that it has.
-    """
-
-    where: Where
-    form: Form | None
-    name: str
-    keys: Mapping[str, Key]
-    values: dict[str, Any]
+    where: Where  # its place
+    form: Form | None  # its type; None if the table has no types
+    name: str  # name of the type
+    keys: Mapping[str, Key]  # the keys that it can have
+    values: dict[str, Any]  # the values of the keys that it has
 
     def check_names(self, figure: Figure) -> None:
-        """Check names against the figure.
-
-        Raises:
-            UnknownNameError: with the nearest names, file and key.
-        """
+        """Check names against the figure."""
         for name, value in self.values.items():
             self.keys[name].kind.names(value, figure, self.where.at(name))
 
     def make(self) -> Any:
-        """Make the object of this type.
-
-        Raises:
-            FileFormatError: the values contradict each other.
-        """
+        """Make the object of this type."""
         assert self.form is not None
         assert self.form.make is not None
         try:
@@ -69,12 +53,7 @@ class Contents(NamedTuple):
 
 
 def read_contents(path: Path) -> Contents:
-    """Read a task file and check every table, key and value.
-
-    Raises:
-        FileFormatError: with file, line, key and correction.
-        UnknownNameError: a table, key or type that does not exist, with the nearest ones.
-    """
+    """Read a task file and check every table, key and value."""
     text, data = read_toml(path, "task file")
     where = Where(path, text)
     plain = {name: value for name, value in data.items() if name not in TABLES}
@@ -89,16 +68,7 @@ def read_contents(path: Path) -> Contents:
 
 
 def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """The text of a TOML file and what it says.
-
-    Args:
-        path: the file.
-        kind: what it is, for the message: "task file".
-
-    Raises:
-        FileFormatError: it cannot be read or is no TOML.
-        UnknownNameError: there is no such file.
-    """
+    """The text of a TOML file and what it says."""
     text = _text(path, kind)
     return text, parsed_toml(text, path.name)
 

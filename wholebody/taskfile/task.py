@@ -32,17 +32,12 @@ _OF_BODIES = ("density", "mass", "material", "velocity", "angular_velocity", "jo
 
 
 class View(NamedTuple):
-    """The camera of a picture of the task.
+    """The camera of a picture of the task."""
 
-    Attributes:
-        eye: position of the camera, metres; None for an automatic one.
-        target: the point in the middle of the picture, metres; given with the eye.
-        see_through: names of things drawn transparent.
-    """
-
-    eye: tuple[float, float, float] | None = None
+    eye: tuple[float, float, float] | None = None  # position of the camera, metres; None for an automatic one
+    # the point in the middle of the picture, metres; given with the eye
     target: tuple[float, float, float] | None = None
-    see_through: tuple[str, ...] = ()
+    see_through: tuple[str, ...] = ()  # names of things drawn transparent
 
 
 @dataclass(frozen=True)
@@ -83,15 +78,7 @@ def read_task(path: str | PathLike[str]) -> Task:
 
 
 def task_from(contents: Contents, file: Path) -> Task:
-    """The task that the contents of a file state.
-
-    Args:
-        contents: of the file, or changed since.
-        file: which paths are relative to.
-
-    Raises:
-        FileFormatError, UnknownNameError, InputError: as for `read_task`.
-    """
+    """The task that the contents of a file state."""
     figure = _figure(contents)
     for entries in contents.tables.values():
         for entry in entries:
@@ -178,12 +165,7 @@ def _scene(contents: Contents, figure: Figure) -> Scene:
 
 
 def _check_joints(contents: Contents, scene: Scene) -> None:
-    """Look up what holds things.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        FileFormatError: a thing is to hold itself.
-    """
+    """Look up what holds things."""
     things = [name for name, thing in scene.objects.items() if thing.segment is None]
     for entry in contents.tables.get("object", ()):
         for number, joint in enumerate(entry.values.get("joints", ())):
@@ -195,11 +177,7 @@ def _check_joints(contents: Contents, scene: Scene) -> None:
 
 
 def _body(options: dict[str, Any]) -> dict[str, Any]:
-    """Take what makes a thing move by itself from the options: its body, or its material alone.
-
-    Raises:
-        InputError: both a density and a mass.
-    """
+    """Take what makes a thing move by itself from the options: its body, or its material alone."""
     given: dict[str, Any] = {name: options.pop(name) for name in _OF_BODIES if name in options}
     if not given.keys() - {"material"}:
         return given

@@ -9,18 +9,11 @@ from typing import Any
 from wholebody import methods, tasks
 from wholebody.methods.inputs import BUDGET, CCD_TOLERANCE, DAMPING, ITERATIONS, RESTARTS, SEED, TIME_LIMIT, TOLERANCE
 from wholebody.taskfile import kinds
-from wholebody.taskfile.kinds import FRAME, Kind, Number, kind_of
-from wholebody.taskfile.tables import Form, Key
+from wholebody.taskfile.kinds import FRAME, Form, Key, Kind, Number, kind_of
 
 
 def _form(made: type, says: str, **keys: str | tuple[Kind, str]) -> Form:
-    """A form whose keys are fields of the class that it makes; those without a default are required.
-
-    Args:
-        made: the class.
-        says: its meaning.
-        **keys: their meaning by name, with the kind of their values where the field does not say it.
-    """
+    """A form whose keys are fields of the class that it makes; those without a default are required."""
     needed = {field.name for field in fields(made) if field.default is field.default_factory is MISSING}
     found = []
     for name, said in keys.items():
@@ -188,36 +181,20 @@ CONSTRAINTS = {
 }
 
 MEASURES = {
-    "effort": _form(
-        tasks.Effort,
-        "Displacement from the start, weighted by joint.",
-        weight=_weight("1/rad^2"),
-    ),
+    "effort": _form(tasks.Effort, "Displacement from the start, weighted by joint.", weight=_weight("1/rad^2")),
     "rotation_effort": _form(
         tasks.RotationEffort,
         "Displacement from the start, a ball joint's by its rotation vector.",
         weight=_weight("1/rad^2"),
     ),
     "discomfort": _form(
-        tasks.Discomfort,
-        "Distance of joints from neutral, and nearness to their limits.",
-        weight=_weight("no unit"),
+        tasks.Discomfort, "Distance of joints from neutral, and nearness to their limits.", weight=_weight("no unit")
     ),
-    "displacement": _form(
-        tasks.Displacement,
-        "Displacement from the neutral posture.",
-        weight=_weight("1/rad^2"),
-    ),
+    "displacement": _form(tasks.Displacement, "Displacement from the neutral posture.", weight=_weight("1/rad^2")),
     "rhythm": _form(
-        tasks.Rhythm,
-        "How clavicles follow the arms, and the lumbar spine the pelvis.",
-        weight=_weight("no unit"),
+        tasks.Rhythm, "How clavicles follow the arms, and the lumbar spine the pelvis.", weight=_weight("no unit")
     ),
-    "potential_energy": _form(
-        tasks.PotentialEnergy,
-        "Lifting and lowering of segments.",
-        weight=_weight("1/J^2"),
-    ),
+    "potential_energy": _form(tasks.PotentialEnergy, "Lifting and lowering of segments.", weight=_weight("1/J^2")),
 }
 
 
@@ -275,11 +252,7 @@ METHODS = {
     ),
     "placo": Form(
         "placo's differential inverse kinematics, iterated; to compare with.",
-        (
-            _TOLERANCE,
-            _ITERATIONS,
-            _TIME_LIMIT,
-        ),
+        (_TOLERANCE, _ITERATIONS, _TIME_LIMIT),
         _later("Placo"),
     ),
     "dls": Form(

@@ -13,21 +13,13 @@ _HEADER = re.compile(r"^\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 
 @dataclass(frozen=True)
 class Where:
-    """A table of a task file, or a key in it.
+    """A table of a task file, or a key in it."""
 
-    Attributes:
-        file: the task file.
-        text: its text, used to find lines.
-        table: name of the table; empty at the top of the file.
-        number: number of the table among those of its name, from 1; 0 if there can be only one.
-        key: key in the table; empty for the table as a whole.
-    """
-
-    file: Path
-    text: str = ""
-    table: str = ""
-    number: int = 0
-    key: str = ""
+    file: Path  # the task file
+    text: str = ""  # its text, used to find lines
+    table: str = ""  # name of the table; empty at the top of the file
+    number: int = 0  # number of the table among those of its name, from 1; 0 if there can be only one
+    key: str = ""  # key in the table; empty for the table as a whole
 
     def at(self, key: str) -> Where:
         """The place of a key in this table, or of an entry (such as "[0]") in this key."""

@@ -83,8 +83,8 @@ class Axis(Goal):
 
     @property
     def angular(self) -> Mask:
-        """(2,) both rows are in radians."""
-        return np.ones(2, dtype=bool)
+        """Both rows are in radians."""
+        return np.ones((), dtype=bool)
 
     def error(self, state: State) -> Array:
         """(2,) the angle along the two directions perpendicular to the axis [rad]."""

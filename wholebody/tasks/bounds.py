@@ -91,12 +91,7 @@ class StepLimit(Bound):
         object.__setattr__(self, "joints", speeds)
 
     def resolve(self, scene: Surroundings, start: Array) -> StepLimit:
-        """Find the joints.
-
-        Raises:
-            UnknownNameError: the figure has no such joint or group.
-            InputError: a velocity of the root is given and the figure is fixed to the world.
-        """
+        """Find the joints."""
         velocity = np.full(scene.model.nv, self.velocity)
         if scene.figure.root == "free":
             root = inputs.find_dofs(scene, ("root",), "StepLimit")

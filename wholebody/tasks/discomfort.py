@@ -22,23 +22,14 @@ POWER = 200
 
 
 class LimitedJoints(NamedTuple):
-    """The n joints that have two limits.
+    """The n joints that have two limits."""
 
-    Attributes:
-        idx_q: (n,) indices in the posture.
-        idx_v: (n,) indices in the tangent vector.
-        neutral: (n,) values in the neutral posture.
-        weights: (n,) g over the squared range.
-        limits: (2, n) upper, then lower limits.
-        phase: (2, n) derivative of the phase 2.5 r by the joint's value: r falls towards the upper limit.
-    """
-
-    idx_q: NDArray[np.intp]
-    idx_v: NDArray[np.intp]
-    neutral: Array
-    weights: Array
-    limits: Array
-    phase: Array
+    idx_q: NDArray[np.intp]  # (n,) indices in the posture
+    idx_v: NDArray[np.intp]  # (n,) indices in the tangent vector
+    neutral: Array  # (n,) values in the neutral posture
+    weights: Array  # (n,) g over the squared range
+    limits: Array  # (2, n) upper, then lower limits
+    phase: Array  # (2, n) derivative of the phase 2.5 r by the joint's value: r falls towards the upper limit
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,19 +19,12 @@ LEAST_CURVATURE = 1e-6
 
 
 class SquaredDistance(NamedTuple):
-    """``sum_i w_i d_i^2`` with d the tangent vector (nv,) from a reference posture.
+    """``sum_i w_i d_i^2`` with d the tangent vector (nv,) from a reference posture."""
 
-    Attributes:
-        reference: (nq,) posture that has distance zero.
-        weights: (nv,) not negative.
-        curvature: (nv,) positive diagonal of the second derivative.
-        straight: whether the Jacobian of d is the identity.
-    """
-
-    reference: Array
-    weights: Array
-    curvature: Array
-    straight: bool
+    reference: Array  # (nq,) posture that has distance zero
+    weights: Array  # (nv,) not negative
+    curvature: Array  # (nv,) positive diagonal of the second derivative
+    straight: bool  # whether the Jacobian of d is the identity
 
     @classmethod
     def build(cls, model: Any, reference: Array, weights: Array) -> SquaredDistance:
@@ -69,13 +62,9 @@ class SquaredDistance(NamedTuple):
 
 
 class DistanceMeasure(Measure):
-    """A measure that is a weighted squared distance from a posture.
+    """A measure that is a weighted squared distance from a posture."""
 
-    Attributes:
-        distance: the posture, and the weight of every degree of freedom; once resolved.
-    """
-
-    distance: SquaredDistance
+    distance: SquaredDistance  # the posture, and the weight of every degree of freedom; once resolved
 
     def value(self, state: State) -> float:
         """The distance [rad^2]."""
@@ -240,13 +229,7 @@ class RotationEffort(Measure):
 
 
 def ball_joints(model: Any, start: Array, weights: Array) -> tuple[BallJoint, ...]:
-    """The ball joints of a model: three hinges in a row with one centre and axes at right angles.
-
-    Args:
-        model: Pinocchio's model.
-        start: (nq,) posture from which rotations count.
-        weights: (nv,) of the degrees of freedom.
-    """
+    """The ball joints of a model: three hinges in a row with one centre and axes at right angles."""
     state = State(model).update(pin.neutral(model))
     jacobian = pin.computeJointJacobians(model, state.data, state.q)
     found: list[BallJoint] = []

@@ -41,36 +41,22 @@ class Elevation(NamedTuple):
 
     With an onset o it follows the flexion f alone: ``most (f + sqrt(f^2 + o^2) - o) / 2 + rest``, which is about
     ``most f`` where f is much more than o, and does not change where the limb is bent back.
-
-    Attributes:
-        idx_q: the joint, flexion and abduction of the limb: places in the posture.
-        idx_v: the same in the tangent.
-        weight: of the square, 1/rad^2.
-        most: the share where the limb is level, radians; with an onset, radians for each of the flexion.
-        rest: what the joint has beyond its share at the start, radians.
-        onset: flexion about which the share begins, radians; zero for a share of the elevation.
     """
 
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    weight: float
-    most: float
-    rest: float = 0.0
-    onset: float = 0.0
+    idx_q: tuple[int, int, int]  # the joint, flexion and abduction of the limb: places in the posture
+    idx_v: tuple[int, int, int]  # the same in the tangent
+    weight: float  # of the square, 1/rad^2
+    most: float  # the share where the limb is level, radians; with an onset, radians for each of the flexion
+    rest: float = 0.0  # what the joint has beyond its share at the start, radians
+    onset: float = 0.0  # flexion about which the share begins, radians; zero for a share of the elevation
 
 
 class Lumbar(NamedTuple):
-    """The lumbar joints and the free root.
+    """The lumbar joints and the free root."""
 
-    Attributes:
-        idx_q: their flexion: places in the posture.
-        idx_v: the same in the tangent.
-        rest: what they have beyond their share at the start, radians.
-    """
-
-    idx_q: tuple[int, int, int]
-    idx_v: tuple[int, int, int]
-    rest: float
+    idx_q: tuple[int, int, int]  # their flexion: places in the posture
+    idx_v: tuple[int, int, int]  # the same in the tangent
+    rest: float  # what they have beyond their share at the start, radians
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +86,7 @@ class Rhythm(Measure):
     lumbar: Lumbar | None = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
-        """Find the joints, and what the lumbar spine has at the start.
-
-        Raises:
-            InputError: the figure has neither a clavicle with its arm nor a lumbar spine on a free root.
-        """
+        """Find the joints, and what the lumbar spine has at the start."""
         figure = scene.figure
         girdles, lumbar = girdles_of(figure), _lumbar(figure, start)
         if not girdles and lumbar is None:

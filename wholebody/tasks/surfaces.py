@@ -27,29 +27,19 @@ ACCURACY = 1e-9  # m: to which coal computes a distance; coarser, and a normal i
 
 
 class Surface(NamedTuple):
-    """Convex pieces that count as one surface.
+    """Convex pieces that count as one surface."""
 
-    Attributes:
-        name: of the segment, thing, piece or frame.
-        owners: segments and things that the pieces are part of; none for a point and for what is only drawn.
-        geometry: the geometry model that has the pieces' placements; None for a point.
-        pieces: (k,) indices of the pieces in it.
-        joints: (k,) joint that carries each.
-        shapes: (k,) coal's shapes.
-        reach: (k,) radius of each about its origin, metres.
-        swept: (k,) their points and flat faces, which take longer to find than what they are asked for.
-        fixed: placement of a point in its joint; None for pieces.
-    """
-
-    name: str
+    name: str  # of the segment, thing, piece or frame
+    # segments and things that the pieces are part of; none for a point and for what is only drawn
     owners: tuple[str, ...]
-    geometry: Any
-    pieces: tuple[int, ...]
-    joints: tuple[int, ...]
-    shapes: tuple[Any, ...]
-    reach: tuple[float, ...]
+    geometry: Any  # the geometry model that has the pieces' placements; None for a point
+    pieces: tuple[int, ...]  # (k,) indices of the pieces in it
+    joints: tuple[int, ...]  # (k,) joint that carries each
+    shapes: tuple[Any, ...]  # (k,) coal's shapes
+    reach: tuple[float, ...]  # (k,) radius of each about its origin, metres
+    # (k,) their points and flat faces, which take longer to find than what they are asked for
     swept: tuple[SweptPoints, ...]
-    fixed: Any = None
+    fixed: Any = None  # placement of a point in its joint; None for pieces
 
     def placed(self, number: int, state: State) -> Any:
         """Placement (pin.SE3) of a piece in the world."""
@@ -58,23 +48,14 @@ class Surface(NamedTuple):
 
 
 class Nearest(NamedTuple):
-    """The nearest points of two surfaces.
+    """The nearest points of two surfaces."""
 
-    Attributes:
-        distance: signed, metres; negative in an overlap.
-        normal: (3,) unit vector from the first surface to the second.
-        point: (3,) a point on the line of both nearest points [m].
-        joint: joint that carries the piece of the second surface.
-        against: joint that carries the piece of the first.
-        pieces: number of the piece of the first surface, and of the second.
-    """
-
-    distance: float
-    normal: Array
-    point: Array
-    joint: int
-    against: int
-    pieces: tuple[int, int]
+    distance: float  # signed, metres; negative in an overlap
+    normal: Array  # (3,) unit vector from the first surface to the second
+    point: Array  # (3,) a point on the line of both nearest points [m]
+    joint: int  # joint that carries the piece of the second surface
+    against: int  # joint that carries the piece of the first
+    pieces: tuple[int, int]  # number of the piece of the first surface, and of the second
 
 
 def surface(scene: Surroundings, name: str, where: str) -> Surface:
@@ -82,11 +63,6 @@ def surface(scene: Surroundings, name: str, where: str) -> Surface:
 
     A link of a file may have no pieces of its own: then its surface is the convex hull of what is drawn of it. If
     nothing is drawn, and it has mass or a joint of its own, it is that of all that moves with it.
-
-    Raises:
-        UnknownNameError: there is nothing of that name.
-        InputError: the name is not a string.
-        WholebodyError: what is drawn cannot be read.
     """
     if not isinstance(name, str):
         raise InputError(f"{where} takes the name of a segment, thing, piece or frame, not {shown(name)}")
@@ -215,19 +191,12 @@ def _between(first: Array, second: Array) -> Array:
 
 
 class Face(NamedTuple):
-    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes.
+    """A flat face of a thing, in the axes of one of its pieces, so that it goes where the thing goes."""
 
-    Attributes:
-        surface: of the thing.
-        center: (3,) middle of the face [m].
-        axes: (3, 3) rows: two directions in the face, and its outward normal.
-        half: (2,) half its size along the two directions; inf for a half-space [m].
-    """
-
-    surface: Surface
-    center: Array
-    axes: Array
-    half: Array
+    surface: Surface  # of the thing
+    center: Array  # (3,) middle of the face [m]
+    axes: Array  # (3, 3) rows: two directions in the face, and its outward normal
+    half: Array  # (2,) half its size along the two directions; inf for a half-space [m]
 
     @property
     def joint(self) -> int:
@@ -241,19 +210,7 @@ class Face(NamedTuple):
 
 
 def face(scene: Surroundings, name: str, direction: Array, state: State, where: str) -> Face:
-    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest.
-
-    Args:
-        scene: has the thing.
-        name: of the thing, or of one of its pieces.
-        direction: (3,) in the world.
-        state: at the start.
-        where: the calling term, for messages.
-
-    Raises:
-        UnknownNameError: there is no such thing.
-        InputError: it is a frame, which has no face.
-    """
+    """The face of a thing that looks towards a direction: of a box the nearest one, else where it reaches farthest."""
     found = surface(scene, name, where)
     if found.fixed is not None:
         raise InputError(f"{where}: {shown(name)} is a frame and has no face; name a thing or a segment")

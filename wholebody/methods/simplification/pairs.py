@@ -14,7 +14,7 @@ from wholebody.figures.figure import Figure
 from wholebody.geometry.proximity import COAL_ACCURACY
 from wholebody.methods.simplification.reach import Balls, Reach, about_point, placed
 from wholebody.tasks.base import Constraint
-from wholebody.tasks.hold import Hold
+from wholebody.tasks.frame import Hold
 
 PROBE = 1e-4  # m: radius of the ball that represents a point in coal
 

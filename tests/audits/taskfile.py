@@ -1,6 +1,6 @@
 """The documentation of task files, written from the tables that the reader uses.
 
-``python -m wholebody.taskfile.page`` prints it; docs/taskfile.md is its output.
+``python -m tests.audits.taskfile`` prints it; docs/taskfile.md is its output.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ import sys
 from collections.abc import Mapping
 from dataclasses import replace
 
+from wholebody.taskfile.kinds import Form, Key, Table
 from wholebody.taskfile.schema import TABLES, TOP
-from wholebody.taskfile.tables import Form, Key, Table
 
 _UNIT = re.compile(r" \[[^]]*\]")
 
 INTRODUCTION = """\
 # Task files
 
-<!-- Written by `python -m wholebody.taskfile.page`; change the tables in wholebody/taskfile, not this page. -->
+<!-- Written by `python -m tests.audits.taskfile`; change the tables in wholebody/taskfile, not this page. -->
 
 A task file states one problem in [TOML](https://toml.io): the figure, the things around it, goals, constraints and
 measures. `wholebody pose TASK.toml` solves it, `wholebody show TASK.toml` shows its start, and
