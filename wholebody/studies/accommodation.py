@@ -18,7 +18,7 @@ from wholebody.methods.base import Method
 from wholebody.studies.many import SolveProgress
 from wholebody.studies.records import Records
 from wholebody.studies.study import TaskFunction, Variant, study
-from wholebody.studies.task_files import TaskFile
+from wholebody.studies.study_files import TaskFile
 from wholebody.tasks import inputs
 
 SEXES = {"male": "M", "female": "F"}

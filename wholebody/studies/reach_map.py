@@ -19,9 +19,18 @@ from wholebody.methods.inputs import check_problem
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.many import MOST_JOBS
-from wholebody.studies.reach_bounds import SLACK, distance_beyond, reach_balls
 from wholebody.studies.reach_result import BEYOND, EXCLUDED, INSIDE, MISSED, NOT_TRIED, REACHED, ReachMap
-from wholebody.studies.reach_search import SURE, Asked, Brick, Try, covered, search_brick
+from wholebody.studies.reach_search import (
+    SLACK,
+    SURE,
+    Asked,
+    Brick,
+    Try,
+    covered,
+    distance_beyond,
+    reach_balls,
+    search_brick,
+)
 from wholebody.tasks import inputs
 
 MOST_PLACES = 1_000_000

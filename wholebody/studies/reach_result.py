@@ -132,7 +132,7 @@ class ReachMap:
         Raises:
             InputError: the name has another ending, or the file cannot be written.
         """
-        from wholebody.studies.reach_pictures import draw_slices
+        from wholebody.studies.pictures import draw_slices
 
         return draw_slices(self, checked_target(path, "picture: path", "a picture", (".png",)))
 
@@ -142,6 +142,6 @@ class ReachMap:
         Raises:
             InputError: the name has another ending, or the file cannot be written.
         """
-        from wholebody.studies.reach_pictures import write_page
+        from wholebody.studies.pictures import write_page
 
         return write_page(self, checked_target(path, "html: path", "a page", (".htm", ".html")))

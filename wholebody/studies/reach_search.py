@@ -1,17 +1,19 @@
-"""The search of one brick of a reach map: each place from the posture of a neighbour that is reached."""
+"""The search of one brick of a reach map, each place from a neighbour that is reached; places provably out of reach."""
 
 from __future__ import annotations
 
 import pickle
 from dataclasses import dataclass, field
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
 from wholebody.base.arrays import Array, Mask
+from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
+from wholebody.methods.simplification.pairs import held_balls
+from wholebody.methods.simplification.reach import Balls, Reach
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 
@@ -46,11 +48,6 @@ class Asked:
         made = self.problem.with_start(start)
         made.goals = (*self.problem.goals, Point(self.frame, place, offset=self.offset).resolve(made.scene, made.start))
         return made
-
-    @cached_property
-    def alone(self) -> bool:
-        """Whether the place is the only goal, so that its residual is its distance from the reach."""
-        return not self.problem.goals
 
 
 @dataclass
@@ -112,17 +109,20 @@ class Brick:
         self.tried.add((place, begin))
         start = self.reached.get(begin, asked.problem.start)
         problem = asked.at(self.places[place], start)
-        found = self._contradiction(problem, place) or _solved(asked, problem, place, self.whole or begin < 0)
+        with problem.borrow() as workspace:
+            inside = bool(contradictions(problem, workspace))
+        if inside:
+            found = Try(place, False, True, 0.0, False, 0.0, problem.start)
+        else:
+            solution = (asked.whole if self.whole or begin < 0 else asked.quick).solve(problem)
+            judged, q = solution.assessment, np.asarray(solution.q)
+            # only where the place is the only goal its residual is its distance from the reach
+            sure = not asked.problem.goals and solution.status == "unreachable"
+            found = Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, q)
         self.tries.append((found, begin))
         if found.reached:
             self.reached[place] = found.q
         return found
-
-    def _contradiction(self, problem: Problem, place: int) -> Try | None:
-        with problem.borrow() as workspace:
-            if contradictions(problem, workspace):
-                return Try(place, False, True, 0.0, False, 0.0, problem.start)
-        return None
 
     def _once_more(self) -> None:
         """Ask for another try of places that were not reached and of which many neighbours are."""
@@ -136,13 +136,6 @@ class Brick:
             # reached neighbours from which a place that was not reached is tried once more
             if len(near) >= 3 and fresh and tries < 4 and (place, fresh[0]) not in self.again:
                 self.again.append((place, fresh[0]))
-
-
-def _solved(asked: Asked, problem: Problem, place: int, whole: bool) -> Try:
-    solution = (asked.whole if whole else asked.quick).solve(problem)
-    judged = solution.assessment
-    sure = asked.alone and solution.status in ("unreachable",)
-    return Try(place, solution.solved, False, judged.goal_errors[-1], sure, judged.measure, np.asarray(solution.q))
 
 
 _known: dict[str, Asked] = {}
@@ -163,3 +156,34 @@ def covered(places: Array, center: Array, radius: Array) -> Mask:
     for middle, size in zip(center, radius, strict=True):
         inside |= np.linalg.norm(places - middle, axis=1) < SURE * size
     return inside
+
+
+SLACK = 1e-6  # m: for rounding: a place that is out of reach by no more may be reached
+
+
+def reach_balls(problem: Problem, frame: str, offset: Array) -> tuple[Array, Array]:
+    """Centres (k, 3) and radii (k,) of balls that hold a point of a frame in every posture within limits and holds."""
+    figure, model = problem.scene.figure, problem.scene.model
+    held = model.frames[figure.frame_id(frame)]
+    point = (held.placement.act(offset))[None]
+    joint = np.array([held.parentJoint], dtype=np.intp)
+    state = State(model).update(problem.start)
+    stuck = np.zeros(model.nv, dtype=bool)
+    for bound in problem.bounds:
+        low, high = bound.bounds(state, None)
+        stuck |= (low == 0.0) & (high == 0.0)
+    resting = Balls(point, np.zeros(1), np.zeros(1, dtype=np.intp))
+    reach = Reach(model, problem.start, resting, joint, np.flatnonzero(stuck).tolist())
+    found = [reach.seen_from(0), *held_balls(figure, reach, problem.constraints)]
+    center = np.concatenate([balls.center for balls in found])
+    radius = np.concatenate([balls.radius for balls in found])
+    bounded = np.isfinite(radius)
+    return center[bounded], radius[bounded]
+
+
+def distance_beyond(places: Array, center: Array, radius: Array) -> Array:
+    """By how much (n,) places are at least out of reach, metres."""
+    least = np.zeros(len(places))
+    for middle, size in zip(center, radius, strict=True):
+        least = np.maximum(least, np.linalg.norm(places - middle, axis=1) - size)
+    return least

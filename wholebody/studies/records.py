@@ -1,4 +1,4 @@
-"""What a run of many solves found: one record a case, and the table of all."""
+"""What a run of many solves found: one record a case, the table of all, and the records on disk."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import csv
 import io
 import json
 import os
+import sqlite3
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -15,8 +17,8 @@ import numpy as np
 
 from wholebody.base import checks
 from wholebody.base.arrays import Array
-from wholebody.base.errors import MissingPackageError
-from wholebody.base.files import checked_target, write
+from wholebody.base.errors import FileFormatError, InputError, MissingPackageError
+from wholebody.base.files import checked_target, make_folder, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
@@ -192,7 +194,7 @@ class Records(Sequence[SolveRecord]):
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
                 outcome that no solve has; the name has another ending, or the file cannot be written.
         """
-        from wholebody.studies.outcome_chart import Cell, draw_outcomes
+        from wholebody.studies.pictures import Cell, draw_outcomes
 
         file, cells = checked_target(path, "chart: path", "a chart", (".png",)), []
         for one in self._records:
@@ -234,3 +236,43 @@ class Records(Sequence[SolveRecord]):
         sink = pyarrow.BufferOutputStream()
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(self.rows()), sink)
         return write(file, sink.getvalue().to_pybytes())
+
+
+NAME = "records.sqlite"
+
+
+class RecordStore:
+    """Records by the fingerprint of what was asked; a record is there whole or not at all."""
+
+    def __init__(self, folder: Path) -> None:
+        """Open the folder, or make it."""
+        make_folder(folder)
+        self.path = folder / NAME
+        try:
+            with closing(self._connection()) as connection, connection:
+                connection.execute("CREATE TABLE IF NOT EXISTS records (asked TEXT PRIMARY KEY, record TEXT NOT NULL)")
+        except sqlite3.OperationalError as error:
+            raise InputError(f"{self.path} cannot be written ({error}); give another folder") from None
+        except sqlite3.DatabaseError:
+            raise self._foreign() from None
+
+    def read(self) -> dict[str, SolveRecord]:
+        """All records by fingerprint, without those whose process ended, which are done again."""
+        try:
+            with closing(self._connection()) as connection:
+                rows = connection.execute("SELECT asked, record FROM records").fetchall()
+            found = {str(asked): SolveRecord.from_json(record) for asked, record in rows}
+        except (sqlite3.DatabaseError, ValueError, TypeError, KeyError, AttributeError):
+            raise self._foreign() from None
+        return {asked: record for asked, record in found.items() if record.outcome not in (ENDED, CANCELLED)}
+
+    def add(self, asked: str, record: SolveRecord) -> None:
+        """Keep a record."""
+        with closing(self._connection()) as connection, connection:
+            connection.execute("INSERT OR REPLACE INTO records VALUES (?, ?)", (asked, record.as_json()))
+
+    def _connection(self) -> sqlite3.Connection:
+        return sqlite3.connect(self.path, timeout=60.0)  # s: that another process may hold the file
+
+    def _foreign(self) -> FileFormatError:
+        return FileFormatError(f"{self.path}: holds no records of wb.solve_many; give another folder")

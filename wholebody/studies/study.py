@@ -19,9 +19,8 @@ from wholebody.figures.anthropometry import design_cases
 from wholebody.methods.base import Method
 from wholebody.problem import Problem
 from wholebody.studies.many import RUN, Case, Running, SolveProgress, fingerprint, run_cases, runs_of
-from wholebody.studies.records import Records, SolveRecord
-from wholebody.studies.store import RecordStore
-from wholebody.studies.task_files import TaskFile
+from wholebody.studies.records import Records, RecordStore, SolveRecord
+from wholebody.studies.study_files import TaskFile
 
 MOST_CASES = 1_000_000
 

@@ -323,7 +323,6 @@ class Key:
 
     name: str  # its name in the file; also the name of the argument
     kind: Kind  # the accepted values
-    says: str  # its meaning, for the documentation
     required: bool = False  # whether the table must have it
 
 
@@ -331,7 +330,6 @@ class Key:
 class Form:
     """One type of a table, such as a goal of type "point"."""
 
-    says: str  # its meaning, for the documentation
     keys: tuple[Key, ...] = ()  # its own keys, in addition to those of the table
     make: Callable[..., Any] | None = None  # makes the object from the keys; None if the caller makes it
 
@@ -340,7 +338,6 @@ class Form:
 class Table:
     """A table of the file."""
 
-    says: str  # its meaning, for the documentation
     keys: tuple[Key, ...] = ()  # keys of every type
     many: bool = False  # whether the file can have several, written in double brackets
     chooser: str = ""  # key that names the type; empty if there are no types

@@ -23,8 +23,7 @@ from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.matter.body import BallJoint
 from wholebody.scene.scene import Scene
 from wholebody.taskfile.kinds import JOINTS
-from wholebody.taskfile.schema import SHAPES
-from wholebody.taskfile.terms import CONSTRAINTS, GOALS, MEASURES
+from wholebody.taskfile.schema import CONSTRAINTS, GOALS, MEASURES, SHAPES
 
 
 def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: str | None = None) -> Path:
