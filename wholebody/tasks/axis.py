@@ -51,9 +51,7 @@ class Axis(Goal):
         direction: (3,) its target direction in the world; any length.
         toward: (3,) the point in the world to which it should point from the frame's origin [m].
         weight: factor on the squared error [1/rad^2].
-        place: the frame and the joint that carries it, once resolved.
         basis: (3, 3) rows in the frame: two directions perpendicular to the axis, and the axis, each of length 1.
-        resolved_target: (3,) `direction` as a unit vector, or `toward` [m].
 
     Raises:
         InputError: neither or both of `direction` and `toward` are given, or a vector has no direction.
@@ -66,8 +64,8 @@ class Axis(Goal):
     toward: inputs.Position | None = None
     weight: inputs.Weight = 1.0
     basis: Array = field(init=False, repr=False)
-    resolved_target: Array = field(init=False, repr=False)
-    place: inputs.Place = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)  # (3,) `direction` as a unit vector, or `toward` [m]
+    place: inputs.Place = field(init=False, repr=False)  # the frame and the joint that carries it
 
     def __post_init__(self) -> None:
         """Check the values."""

@@ -133,8 +133,6 @@ class Balance(Constraint):
     Attributes:
         feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
-        normals: (m, 2) unit normals of the edges of the support polygon, inward; once resolved.
-        offsets: (m,) of the edges: inside, normals @ x >= offsets [m]; once resolved.
 
     Raises:
         InputError: no feet are named, or the margin is negative.
@@ -143,8 +141,8 @@ class Balance(Constraint):
     feet: Feet = ("left_foot", "right_foot")
     _: KW_ONLY
     margin: Margin = 0.0
-    normals: Array = field(init=False, repr=False)
-    offsets: Array = field(init=False, repr=False)
+    normals: Array = field(init=False, repr=False)  # (m, 2) unit normals of the edges of the support polygon, inward
+    offsets: Array = field(init=False, repr=False)  # (m,) of the edges: inside, normals @ x >= offsets [m]
 
     def resolve(self, scene: Surroundings, start: Array) -> Balance:
         """Compute the support polygon at the start."""

@@ -17,7 +17,6 @@ import pinocchio as pin
 from wholebody.base.arrays import Array, Mask
 from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks.axis import equidistant_error, equidistant_jacobian
 from wholebody.tasks.base import Constraint, Goal, SupportingPlanes, filled
 from wholebody.tasks.inputs import Place
@@ -248,9 +247,9 @@ def between(state: State, wrench: Array, joint: int, against: int) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class TermOfParts(Constraint):
-    """A constraint made of parts."""
+    """A constraint made of parts, whose rows are one after the other."""
 
-    parts: Sequence[Part] = field(init=False, repr=False)
+    parts: Sequence[Part] = field(init=False, repr=False)  # once resolved
     touches: tuple[tuple[str, str], ...] = field(init=False, repr=False, default=())
 
     @property
@@ -342,8 +341,5 @@ def _approached(part: Any, distance: float) -> Any:
         return part
     whole, normal = part.face.surface, part.face.axes[2]
     space = coal.Halfspace(normal, float(normal @ part.face.center) + distance)
-    plane = with_values(
-        whole, pieces=whole.pieces[:1], joints=whole.joints[:1], shapes=(space,), reach=(np.inf,),
-        swept=(swept_points(space),),
-    )  # fmt: skip
-    return with_values(part, second=plane)
+    plane = with_values(whole, pieces=whole.pieces[:1], joints=whole.joints[:1])
+    return with_values(part, second=plane.with_shapes((space,)))

@@ -47,11 +47,10 @@ class Discomfort(Measure):
 
     Attributes:
         weight: factor on the measure.
-        limited: the joints that have two limits, once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    limited: LimitedJoints = field(init=False, repr=False)
+    limited: LimitedJoints = field(init=False, repr=False)  # the joints that have two limits
 
     def resolve(self, scene: Surroundings, start: Array) -> Discomfort:
         """Read the limits, the neutral posture and the weights of the figure."""

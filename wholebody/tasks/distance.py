@@ -92,11 +92,10 @@ class Effort(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        distance: the start, and the weight of every degree of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    distance: SquaredDistance = field(init=False, repr=False)
+    distance: SquaredDistance = field(init=False, repr=False)  # the start, and the weight of every degree of freedom
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Store the start."""
@@ -112,7 +111,6 @@ class Displacement(DistanceMeasure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        distance: the neutral posture, and the weight of every degree of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
@@ -178,12 +176,11 @@ class RotationEffort(Measure):
 
     Attributes:
         weight: factor on the measure [1/rad^2].
-        balls: the ball joints, once resolved.
         others: the start, and the weights of all other degrees of freedom; once resolved.
     """
 
     weight: inputs.Weight = 1.0
-    balls: tuple[BallJoint, ...] = field(init=False, repr=False)
+    balls: tuple[BallJoint, ...] = field(init=False, repr=False)  # the ball joints
     others: SquaredDistance = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> RotationEffort:

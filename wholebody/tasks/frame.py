@@ -47,8 +47,6 @@ class Frame(PlacementGoal):
         target: its target: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
             pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
-        resolved_target: `target` as a pin.SE3.
-        residual: computes the error, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is none of these, or not in metres.
@@ -58,8 +56,8 @@ class Frame(PlacementGoal):
     target: inputs.Target
     _: KW_ONLY
     weight: inputs.Weight = 1.0
-    resolved_target: Any = field(init=False, repr=False)
-    residual: PlacementResidual = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3
+    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frame, joint and target
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
@@ -77,8 +75,6 @@ class Orientation(PlacementGoal):
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
-        resolved_target: `target` as a pin.SE3 without translation.
-        residual: computes the error, with frame, joint and target; once resolved.
 
     Raises:
         InputError: the target is not a rotation.
@@ -88,8 +84,8 @@ class Orientation(PlacementGoal):
     target: Annotated[ArrayLike, inputs.target_rotation]
     _: KW_ONLY
     weight: inputs.Weight = 1.0
-    resolved_target: Any = field(init=False, repr=False)
-    residual: PlacementResidual = field(init=False, repr=False)
+    resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3 without translation
+    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frame, joint and target
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""
@@ -112,7 +108,6 @@ class Relative(PlacementGoal):
             metres. None for the relative placement at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
-        residual: computes the error, with frames, joints and target; once resolved.
 
     Raises:
         InputError: the placement is none of these, or not in metres.
@@ -125,7 +120,7 @@ class Relative(PlacementGoal):
     orientation: bool = True
     weight: inputs.Weight = 1.0
     resolved_placement: Any = field(init=False, repr=False, default=None)
-    residual: PlacementResidual = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frames, joints and target
 
     def resolve(self, scene: Surroundings, start: Array) -> Relative:
         """Find the frames, and their relative placement at the start."""
@@ -147,7 +142,6 @@ class Hold(Constraint):
             (4, 4) or a pin.SE3; metres. None for its placement at the start.
         orientation: False holds only the frame's origin and leaves the frame free to turn.
         relative_to: name of the frame that `at` is relative to; None for the world.
-        residual: computes the value, with frames, joints and target; once resolved.
 
     Raises:
         InputError: `at` is none of these, or not in metres.
@@ -159,7 +153,7 @@ class Hold(Constraint):
     orientation: bool = True
     relative_to: str | None = None
     resolved_at: Any = field(init=False, repr=False, default=None)
-    residual: PlacementResidual = field(init=False, repr=False)
+    residual: PlacementResidual = field(init=False, repr=False)  # computes the value, with frames, joints and target
 
     def resolve(self, scene: Surroundings, start: Array) -> Hold:
         """Find the frames, and their placements at the start."""

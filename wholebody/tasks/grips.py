@@ -19,9 +19,7 @@ import pinocchio as pin
 
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
-from wholebody.base.records import with_values
 from wholebody.figures.state import State
-from wholebody.geometry.swept_points import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes
 from wholebody.tasks.contact_parts import Gap, between, one_sided, through
@@ -211,7 +209,7 @@ def rounded(thing: Surface) -> Surface:
             shapes.append(coal.Box(*(2.0 * half)))
         else:
             shapes.append(shape)
-    return with_values(thing, shapes=tuple(shapes), swept=tuple(swept_points(shape) for shape in shapes))
+    return thing.with_shapes(tuple(shapes))
 
 
 def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:

@@ -26,9 +26,6 @@ class Point(Goal):
         target: (3,) position in the world [m].
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
-        place: the frame and the joint that carries it, once resolved.
-        resolved_target: (3,) `target` as an array [m].
-        resolved_offset: (3,) `offset` as an array [m].
 
     Raises:
         InputError: a value is not finite, of the wrong shape or not in metres.
@@ -39,9 +36,9 @@ class Point(Goal):
     _: KW_ONLY
     offset: inputs.Position = (0.0, 0.0, 0.0)
     weight: inputs.Weight = 1.0
-    place: inputs.Place = field(init=False, repr=False)
-    resolved_target: Array = field(init=False, repr=False)
-    resolved_offset: Array = field(init=False, repr=False)
+    place: inputs.Place = field(init=False, repr=False)  # the frame and the joint that carries it
+    resolved_target: Array = field(init=False, repr=False)  # (3,) `target` as an array [m]
+    resolved_offset: Array = field(init=False, repr=False)  # (3,) `offset` as an array [m]
 
     def resolve(self, scene: Surroundings, start: Array) -> Point:
         """Find the frame."""
@@ -66,7 +63,6 @@ class CenterOfMass(Goal):
         target: (3,) position in the world [m].
         axes: "xyz", or "xy" to leave the height free.
         weight: factor on the squared error [1/m^2].
-        resolved_target: (2,) or (3,) the components of `target` along `axes` [m].
 
     Raises:
         InputError: the target is not in metres, or the axes are others.
@@ -76,7 +72,7 @@ class CenterOfMass(Goal):
     _: KW_ONLY
     axes: Literal["xy", "xyz"] = "xyz"
     weight: inputs.Weight = 1.0
-    resolved_target: Array = field(init=False, repr=False)
+    resolved_target: Array = field(init=False, repr=False)  # (2,) or (3,) the components of `target` along `axes` [m]
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -110,8 +106,6 @@ class Plane(Constraint):
         normal: (3,) direction normal to the plane, in the world; any length.
         point: (3,) a point in the plane [m]; None for the frame's position at the start.
         side: "on" keeps it in the plane, "above" lets it move to the side to which the normal points.
-        resolved_normal: (3,) `normal` as a unit vector.
-        place: the frame and the joint that carries it, once resolved.
         height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
 
     Raises:
@@ -123,9 +117,9 @@ class Plane(Constraint):
     _: KW_ONLY
     point: inputs.Position | None = None
     side: Literal["on", "above"] = "on"
-    resolved_normal: Array = field(init=False, repr=False)
+    resolved_normal: Array = field(init=False, repr=False)  # (3,) `normal` as a unit vector
     resolved_point: Array | None = field(init=False, repr=False, default=None)
-    place: inputs.Place = field(init=False, repr=False)
+    place: inputs.Place = field(init=False, repr=False)  # the frame and the joint that carries it
     height: float = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Plane:

@@ -39,14 +39,13 @@ class ReachCones(Constraint):
 
     Attributes:
         names: names of the figure's cones; None for all of them.
-        limbs: each cone with its frames and joints, once resolved.
 
     Raises:
         InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
-    limbs: tuple[Limb, ...] = field(init=False, repr=False)
+    limbs: tuple[Limb, ...] = field(init=False, repr=False)  # each cone with its frames and joints
     _joints: NDArray[np.intp] = field(init=False, repr=False)
     _against: NDArray[np.intp] = field(init=False, repr=False)
 
@@ -210,16 +209,14 @@ class RangeOfMotion(Constraint):
 
     Attributes:
         names: names of the figure's ranges; None for all of them.
-        rows: each range with its frames and joints, once resolved.
-        row_names: its name, once resolved.
 
     Raises:
         InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None
-    rows: tuple[Row, ...] = field(init=False, repr=False)
-    row_names: tuple[str, ...] = field(init=False, repr=False)
+    rows: tuple[Row, ...] = field(init=False, repr=False)  # each range with its frames and joints
+    row_names: tuple[str, ...] = field(init=False, repr=False)  # its name
 
     def resolve(self, scene: Surroundings, start: Array) -> RangeOfMotion:
         """Find the ranges, their frames and joints."""

@@ -75,15 +75,13 @@ class Rhythm(Measure):
 
     Attributes:
         weight: factor on the measure.
-        girdles: clavicles with their arms, once resolved.
         knees: knees with their hips, once resolved; they count where there is a lumbar spine.
-        lumbar: the lumbar spine, once resolved; None without a free root.
     """
 
     weight: inputs.Weight = 1.0
-    girdles: tuple[Elevation, ...] = field(init=False, repr=False)
+    girdles: tuple[Elevation, ...] = field(init=False, repr=False)  # clavicles with their arms
     knees: tuple[Elevation, ...] = field(init=False, repr=False)
-    lumbar: Lumbar | None = field(init=False, repr=False)
+    lumbar: Lumbar | None = field(init=False, repr=False)  # the lumbar spine; None without a free root
 
     def resolve(self, scene: Surroundings, start: Array) -> Rhythm:
         """Find the joints, and what the lumbar spine has at the start."""
