@@ -29,7 +29,9 @@ NAMES = {"pelvis", "thorax", "neck", "head"}.union(
 class SideAngles:
     """Angles of one side of the body, radians."""
 
-    shoulder_flexion: float  # of the upper arm against the trunk in the sagittal plane; forward is positive, 0 hangs
+    # of the upper arm against the trunk in the sagittal plane: 0 hangs or points straight out sideways, forward is
+    # positive, -90 degrees points backward, and whatever points higher is more than 90 degrees, up to 270
+    shoulder_flexion: float
     shoulder_abduction: float  # of the upper arm out of the sagittal plane; outward is positive
     # height of the shoulder's centre above that of the upright body, in the thorax's axes, metres
     shoulder_rise: float
@@ -76,11 +78,7 @@ class BodyAngles:
     center_ahead: float
 
     def side(self, name: str) -> SideAngles:
-        """The angles of "left" or "right".
-
-        Raises:
-            InputError: another name.
-        """
+        """The angles of "left" or "right"."""
         return self.left if checks.choice(name, SIDES, "side") == "left" else self.right
 
 
@@ -139,8 +137,7 @@ class _Body:
 
     def turn(self, base: str, name: str) -> Array:
         """Rotation (3, 3) of a segment in the axes of another."""
-        result: Array = self.axes[base].T @ self.axes[name]
-        return result
+        return np.asarray(self.axes[base].T @ self.axes[name])
 
     def trunk(self) -> Array:
         """The line from the middle of the hips to the neck (3,): forward, left and up, by the heading of the pelvis."""
@@ -170,10 +167,10 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
     rise = [body.axes["thorax"].T @ (body.at[f"{side}_shoulder"] - body.at["thorax"]) for body in (now, upright)]
     hand = -now.turn(f"{side}_forearm", f"{side}_hand")[:, 2]  # the long axis of a hanging hand points down
     thigh, shank = _unit(knee - hip), _unit(ankle - knee)
-    # length of an upper arm's direction in the sagittal plane below which it points sideways and has no flexion
-    # there
+    flexion = float(np.arctan2(upper[0], -upper[2]))
+    sideways = np.hypot(upper[0], upper[2]) <= 0.2  # length in the sagittal plane below which an arm has no flexion
     return SideAngles(
-        shoulder_flexion=float(np.arctan2(upper[0], -upper[2])) if np.hypot(upper[0], upper[2]) > 0.2 else 0.0,
+        shoulder_flexion=0.0 if sideways else flexion + (2.0 * np.pi if flexion < -0.5 * np.pi else 0.0),
         shoulder_abduction=float(np.arcsin(np.clip(out * upper[1], -1.0, 1.0))),
         shoulder_rise=float(rise[0][2] - rise[1][2]),
         elbow_flexion=_between(upper, lower),
@@ -191,8 +188,7 @@ def _side(now: _Body, upright: _Body, side: str, lowest: float) -> SideAngles:
 
 
 def _unit(vector: Array) -> Array:
-    result: Array = vector / np.linalg.norm(vector)
-    return result
+    return np.asarray(vector / np.linalg.norm(vector))
 
 
 def _between(one: Array, other: Array) -> float:

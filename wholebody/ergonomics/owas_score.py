@@ -56,16 +56,7 @@ class Owas(Checked):
 
 
 def owas(figure: Figure | Scene, q: Array, work: Work | None = None) -> Owas:
-    """OWAS of a person's posture.
-
-    Args:
-        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
-        q: (nq,) posture.
-        work: the load, and whether the person walks; none if left out.
-
-    Raises:
-        InputError: no person, no posture, or no work.
-    """
+    """OWAS of a person's posture; arguments and errors as for `rula`. Of `work` counts whether the person walks too."""
     person = seen(figure, q, work, "owas")
     return owas_code(person.angles, person.work)
 

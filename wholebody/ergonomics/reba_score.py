@@ -66,16 +66,7 @@ class Reba(BothSides):
 
 
 def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
-    """REBA of a person's posture.
-
-    Args:
-        figure: a person, see `body_angles`; or a scene, whose things then tell whether the person sits.
-        q: (nq,) posture.
-        work: load, grip and repetition; none if left out.
-
-    Raises:
-        InputError: no person, no posture, or no work.
-    """
+    """REBA of a person's posture; arguments and errors as for `rula`. Of `work` the grip counts too."""
     person = seen(figure, q, work, "reba")
     return Reba(*(reba_parts(person.angles, side, person.work) for side in SIDES))
 

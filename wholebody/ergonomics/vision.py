@@ -17,10 +17,7 @@ from wholebody.base.fields import Checked, Range
 from wholebody.scene.scene import Scene
 from wholebody.tasks import inputs
 
-EYES = "gaze"
-"""Frame between the eyes; its x axis points ahead."""
-
-
+EYES = "gaze"  # frame between the eyes; its x axis points ahead
 RAY = 1e-3  # m: radius of a line of sight
 NEAR = 0.02  # m: at both ends of a line of sight that is not looked at: the thing that is seen hides nothing
 BLURRED = 0.05  # m: nearer points are not seen

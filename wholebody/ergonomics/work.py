@@ -67,16 +67,11 @@ class Work(Checked):
             raise InputError("Work: a person who walks is not seated; leave one of them out")
 
     def sits(self, angles: BodyAngles) -> bool:
-        """Whether the person is seated.
-
-        Raises:
-            InputError: no angles of a body.
-        """
+        """Whether the person is seated."""
         checks.instance(angles, BodyAngles, "sits: angles", "give those of wb.ergonomics.body_angles(figure, q)")
         if self.seated is not None:
             return self.seated
-        # rad: of both thighs, from which a body with bent knees counts as seated
-        # rad: 30 degrees
+        # rad: slopes of both thighs, and of the knees 30 degrees, from which a body counts as seated
         lies = all(
             side.thigh_slope > 0.7854 and side.knee_flexion > 0.5236 and side.knee_height > KNEELING
             for side in (angles.left, angles.right)

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from wholebody.base.errors import FileFormatError, one_line
+from wholebody.base.errors import FileFormatError, InputError, UnknownNameError, WholebodyError, one_line
 
 _HEADER = re.compile(r"^\s*\[\[?\s*([\w.-]+)\s*\]\]?")
 
@@ -33,6 +35,18 @@ class Where:
     def fault(self, sentence: str) -> FileFormatError:
         """Make an error that names this place."""
         return FileFormatError(f"{self}: {sentence}")
+
+    @contextmanager
+    def named(self) -> Iterator[None]:
+        """Inside it an error names this place."""
+        try:
+            yield
+        except UnknownNameError as error:
+            raise UnknownNameError(error.kind, error.name, error.known, str(self)) from None
+        except InputError as error:
+            raise InputError(f"{self}: {error}") from None
+        except WholebodyError as error:
+            raise type(error)(f"{self}: {error}") from None
 
     def __str__(self) -> str:
         """Return file, line if known, table and key."""
