@@ -40,9 +40,6 @@ class Lift(Checked):
         duration: of the lifting, hours, up to 8.
         coupling: "good", "fair" or "poor".
         load: kg; None for a lift of which only the limit is asked.
-
-    Raises:
-        InputError: a value of the wrong kind or out of range.
     """
 
     horizontal: Annotated[float, Range(0.0, 3.0, "m")]

@@ -32,9 +32,6 @@ class FieldOfView(Checked):
         up: above the normal line of sight, radians.
         down: below it, radians.
         declination: of the normal line of sight below the head's own axis ahead, radians.
-
-    Raises:
-        InputError: a value out of range.
     """
 
     horizontal: Annotated[float, Range(1e-3, pi, "rad")] = radians(35.0)

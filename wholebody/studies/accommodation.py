@@ -127,12 +127,11 @@ def accommodation(
     if point is not None:
         make = TaskFile(checks.path(task, "task")) if isinstance(task, (str, os.PathLike)) else task
         variants = [Variant(make, person, None, None) for person in population.values()]
-        seen = tuple(_seen(variant, one.q, point) for variant, one in zip(variants, records, strict=True))
+        seen = tuple(  # a problem that failed is not made again
+            one.q is not None and sight(variant().scene, one.q, point).seen
+            for variant, one in zip(variants, records, strict=True)
+        )
     return Accommodation(records, reaches, fits, seen)
-
-
-def _seen(variant: Variant, q: Any, point: Any) -> bool:
-    return q is not None and sight(variant().scene, q, point).seen  # a problem that failed is not made again
 
 
 def _statures(sex: str) -> tuple[float, float]:

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -151,27 +151,21 @@ COLORS: Mapping[str, str] = MappingProxyType(
 """Of outcomes, by Okabe and Ito (2008), whose colours are also told apart by people who are colour-blind."""
 
 
-class Cell(NamedTuple):
-    """A case in the table."""
-
-    row: str  # name of its row
-    column: str  # name of its column
-    outcome: str  # a name of `COLORS`
-    left: float  # residual distance of the goals, metres; 0 writes nothing
-
-
-def draw_outcomes(cells: Sequence[Cell], path: Path) -> Path:
-    """Draw the outcomes of cases as a table into a PNG file; returns the path."""
+def draw_outcomes(records: Sequence[Any], path: Path) -> Path:
+    """Draw the outcomes of records as a table into a PNG file: targets are columns; returns the path."""
     from matplotlib.patches import Patch
 
-    if unknown := {one.outcome for one in cells} - COLORS.keys():
+    if unknown := {one.outcome for one in records} - COLORS.keys():
         raise InputError(f"chart: no outcome is called {sorted(unknown)[0]!r}; outcomes are {', '.join(COLORS)}")
-    places = Counter((one.row, one.column) for one in cells)
-    if twice := [place for place, count in places.items() if count > 1]:
+    factors = [one.factors or {"": one.name} for one in records]
+    places = [
+        (", ".join(value for factor, value in each.items() if factor != "target"), each.get("target", ""))
+        for each in factors
+    ]
+    if twice := [place for place, count in Counter(places).items() if count > 1]:
         name = ", ".join(filter(None, twice[0]))
-        raise InputError(f"chart: {places[twice[0]]} records are called {name!r}; give records of one run")
-    rows = list(dict.fromkeys(one.row for one in cells))
-    columns = list(dict.fromkeys(one.column for one in cells))
+        raise InputError(f"chart: {places.count(twice[0])} records are called {name!r}; give records of one run")
+    rows, columns = (list(dict.fromkeys(place[k] for place in places)) for k in (0, 1))
     if not 0 < max(len(rows), len(columns)) <= MOST:
         raise InputError(
             f"chart: {len(rows)} rows and {len(columns)} columns; give records of 1 to {MOST} of each, such as a part"
@@ -179,21 +173,19 @@ def draw_outcomes(cells: Sequence[Cell], path: Path) -> Path:
     wide = WIDTH * len(columns) + 0.09 * max(map(len, rows)) + 1.8  # inches of a letter of a row's name
     chart, axes = new_chart(1, 1, (wide, HEIGHT * len(rows) + 1.2))
     axis = axes[0, 0]
-    for one in cells:
-        x, y = columns.index(one.column), rows.index(one.row)
+    for one, (row, column) in zip(records, places, strict=True):
+        x, y = columns.index(column), rows.index(row)
         axis.fill([x, x + 1, x + 1, x], [y, y, y + 1, y + 1], facecolor=COLORS[one.outcome], edgecolor="white")
-        if one.left > 0.0:
-            axis.text(x + 0.5, y + 0.5, f"{1e3 * one.left:.0f} mm", ha="center", va="center", fontsize="x-small")
+        if one.goal_error > 0.0 and not one.solved:
+            axis.text(x + 0.5, y + 0.5, f"{1e3 * one.goal_error:.0f} mm", ha="center", va="center", fontsize="x-small")
     axis.set(xlim=(0, len(columns)), ylim=(len(rows), 0))
-    axis.set_xticks(np.arange(len(columns)) + 0.5, [*map(_plain, columns)], fontsize="x-small")
-    axis.set_yticks(np.arange(len(rows)) + 0.5, [*map(_plain, rows)], fontsize="x-small")
+    # so that matplotlib reads no formula in a name
+    axis.set_xticks(
+        np.arange(len(columns)) + 0.5, [*(name.replace("$", r"\$") for name in columns)], fontsize="x-small"
+    )
+    axis.set_yticks(np.arange(len(rows)) + 0.5, [*(name.replace("$", r"\$") for name in rows)], fontsize="x-small")
     axis.tick_params(length=0)
-    seen = [outcome for outcome in COLORS if any(one.outcome == outcome for one in cells)]
-    patches = [Patch(facecolor=COLORS[outcome], label=outcome) for outcome in seen]
+    seen = {one.outcome for one in records}
+    patches = [Patch(facecolor=color, label=outcome) for outcome, color in COLORS.items() if outcome in seen]
     chart.legend(handles=patches, loc="outside right upper", fontsize="x-small", frameon=False)
     return write(path, png(chart))
-
-
-def _plain(name: str) -> str:
-    """The name so that matplotlib reads no formula in it."""
-    return name.replace("$", r"\$")

@@ -7,7 +7,8 @@ import io
 import json
 import os
 import sqlite3
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from wholebody.base.files import checked_target, make_folder, write
 from wholebody.solution import Solution
 
 REFUSED, ENDED, CANCELLED = "refused", "ended", "cancelled"
-COLUMN = "target"  # the factor that has columns in a chart; the others have rows
+JUDGED = ("goal_error", "goal_angle", "penetration", "limit_violation", "constraint_violation", "measure")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,13 +77,8 @@ class SolveRecord:
             message=solution.message,
             seconds=solution.seconds,
             iterations=solution.iterations,
-            goal_error=judged.goal_error,
-            goal_angle=judged.goal_angle,
-            penetration=judged.penetration,
-            limit_violation=judged.limit_violation,
-            constraint_violation=judged.constraint_violation,
-            measure=judged.measure,
             q=np.array(solution.q, dtype=float),
+            **{name: getattr(judged, name) for name in JUDGED},
         )
 
     def row(self) -> dict[str, Any]:
@@ -98,25 +94,21 @@ class SolveRecord:
 
     @classmethod
     def from_json(cls, text: str) -> SolveRecord:
-        """Read what `as_json` wrote.
-
-        Raises:
-            ValueError, TypeError: it is something else.
-        """
+        """Read what `as_json` wrote."""
         plain = json.loads(text)
         q = plain.pop("q")
         return cls(q=None if q is None else np.array(q, dtype=float), **plain)
 
 
 class Records(Sequence[SolveRecord]):
-    """The records of many solves, in the order in which they were asked."""
+    """The records of many solves, in the order in which they were asked.
+
+    Raises:
+        InputError: no list of records; of its files: another ending, or it cannot be written.
+    """
 
     def __init__(self, records: Sequence[SolveRecord]) -> None:
-        """Keep the records.
-
-        Raises:
-            InputError: records is no list, or an entry is no `SolveRecord`.
-        """
+        """Keep the records."""
         listed = checks.listed(records, "Records: records", "those of wb.solve_many")
         for one in listed:
             checks.instance(one, SolveRecord, "Records: a record", "give those of wb.solve_many")
@@ -127,9 +119,6 @@ class Records(Sequence[SolveRecord]):
 
     def __len__(self) -> int:
         return len(self._records)
-
-    def __iter__(self) -> Iterator[SolveRecord]:
-        return iter(self._records)
 
     def __repr__(self) -> str:
         counts = ", ".join(f"{number} {outcome}" for outcome, number in self.counts().items()) or "none"
@@ -161,10 +150,7 @@ class Records(Sequence[SolveRecord]):
 
     def counts(self) -> dict[str, int]:
         """How many records have each outcome."""
-        found: dict[str, int] = {}
-        for one in self._records:
-            found[one.outcome] = found.get(one.outcome, 0) + 1
-        return found
+        return dict(Counter(one.outcome for one in self._records))
 
     @property
     def solved(self) -> float:
@@ -192,24 +178,14 @@ class Records(Sequence[SolveRecord]):
 
         Raises:
             InputError: there are no records, more than 100 rows or columns, two records of one name and factors, or an
-                outcome that no solve has; the name has another ending, or the file cannot be written.
+                outcome that no solve has.
         """
-        from wholebody.studies.pictures import Cell, draw_outcomes
+        from wholebody.studies.pictures import draw_outcomes
 
-        file, cells = checked_target(path, "chart: path", "a chart", (".png",)), []
-        for one in self._records:
-            others = [value for factor, value in (one.factors or {}).items() if factor != COLUMN]
-            row = ", ".join(others) if one.factors else one.name
-            left = 0.0 if one.solved else one.goal_error
-            cells.append(Cell(row, (one.factors or {}).get(COLUMN, ""), one.outcome, left))
-        return draw_outcomes(cells, file)
+        return draw_outcomes(self._records, checked_target(path, "chart: path", "a chart", (".png",)))
 
     def to_csv(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows as CSV; returns the path.
-
-        Raises:
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write the rows as CSV; returns the path."""
         file = checked_target(path, "to_csv: path", "a table", (".csv",))
         rows = self.rows()
         sheet = io.StringIO()
@@ -219,12 +195,7 @@ class Records(Sequence[SolveRecord]):
         return write(file, sheet.getvalue())
 
     def to_parquet(self, path: str | os.PathLike[str]) -> Path:
-        """Write the rows as Parquet; returns the path.
-
-        Raises:
-            MissingPackageError: pyarrow is not installed.
-            InputError: the name has another ending, or the file cannot be written.
-        """
+        """Write the rows as Parquet; returns the path; a MissingPackageError without pyarrow."""
         file = checked_target(path, "to_parquet: path", "a table", (".parquet", ".pq"))
         try:
             import pyarrow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,15 +35,15 @@ class TaskFile:
         self.contents = read_contents(path)
         self.task = task_from(self.contents, path)
 
-    def check(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> None:
-        """Check values of a variant."""
-        if target is not None:
+    def check(self, people: Iterable[Mapping[str, Any]], targets: Iterable[Any], layouts: Iterable[Any]) -> None:
+        """Check values of variants."""
+        for person in people:
+            self._figure(person)
+        for target in targets:
             self._goal()
             checks.numbers(target, (3,), "study: a target")
-        if layout is not None:
+        for layout in layouts:
             self._things(layout)
-        if person is not None:
-            self._figure(person)
 
     def __call__(self, person: Mapping[str, Any] | None, target: Any, layout: Any) -> Problem:
         """The problem of a variant."""

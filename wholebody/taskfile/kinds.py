@@ -211,6 +211,7 @@ class ByName(Kind):
     what: str  # the names, such as "dimensions"
     example: str  # a name and a value as they are written
     unit: str  # of the values
+    names_of: Kind | None = None  # of the names, where the figure knows them
 
     @property
     def words(self) -> str:
@@ -223,19 +224,11 @@ class ByName(Kind):
             raise where.fault(f"{shown(value)} is not a table of {self.what}; write {{ {self.example} }}")
         return {name: self.kind.read(entry, where.at(name)) for name, entry in value.items()}
 
-
-class Joints(ByName):
-    """Values of joints by name."""
-
-    def __init__(self) -> None:
-        """Radians, and metres of sliding joints."""
-        number = Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad"))
-        super().__init__(number, "joints", "left_elbow_flexion = 0.5", "rad (m for sliding joints)")
-
     def names(self, value: Any, figure: Figure, where: Where) -> None:
-        """Look the joints up."""
-        for name in value:
-            JOINT.names(name, figure, where.at(name))
+        """Look the names up."""
+        if self.names_of is not None:
+            for name in value:
+                self.names_of.names(name, figure, where.at(name))
 
 
 class ThingJoints(Kind):
@@ -278,8 +271,6 @@ class ThingJoints(Kind):
 
 JOINTS: dict[str, type[BallJoint]] = {"hinge": Hinge, "ball": BallJoint}
 
-_ROOT: dict[str, tuple[str, ...]] = {"free": ("root",), "fixed": ()}
-
 POSITION = Numbers(Vector(3, Range(-FARTHEST, FARTHEST, "m")), "[x, y, z]")
 DIRECTION = Numbers(Vector(3, Range(-1e6, 1e6)), "[x, y, z], any length")
 PLACEMENT = Placement()
@@ -292,6 +283,10 @@ FRAME = Name("frame", lambda figure: {*figure.frames, *figure.segments, *figure.
 SEGMENT = Name("segment", lambda figure: figure.segments)
 POSTURE = Name("posture", lambda figure: figure.postures)
 PROPORTIONS = ByName(Number(DIMENSION), "dimensions", "sitting_height = 0.93", "m")
+JOINT_VALUES = ByName(
+    Number(Range(-2.0 * math.pi, 2.0 * math.pi, "rad")), "joints", "left_elbow_flexion = 0.5",
+    "rad (m for sliding joints)", JOINT,
+)  # fmt: skip
 CONE = Name("reach cone", lambda figure: figure.cones)
 RANGE = Name("range of motion", lambda figure: figure.ranges)
 

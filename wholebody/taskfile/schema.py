@@ -185,7 +185,7 @@ TOP = _keys(
 
 TABLES = {
     "figure": Table(_keys(joints=Several(GROUP)), chooser="name", implied=(("path", "urdf"),), forms=FIGURES),
-    "start": Table(_keys(posture=kinds.POSTURE, joints=kinds.Joints(), root=PLACEMENT)),
+    "start": Table(_keys(posture=kinds.POSTURE, joints=kinds.JOINT_VALUES, root=PLACEMENT)),
     "object": Table((*_needed(name=Text()), *_THING, *_BODY), True, "shape", forms=SHAPES),
     "attach": Table(
         (*_needed(name=Text(), to=FRAME), *_keys(rests_on=Several(Text())), *_THING), True, "shape", forms=SHAPES

@@ -23,7 +23,7 @@ from wholebody.scene.geometry_model import SceneObject
 from wholebody.scene.matter.body import BallJoint
 from wholebody.scene.scene import Scene
 from wholebody.taskfile.kinds import JOINTS
-from wholebody.taskfile.schema import CONSTRAINTS, GOALS, MEASURES, SHAPES
+from wholebody.taskfile.schema import CONSTRAINTS, FIGURES, GOALS, MEASURES, SHAPES
 
 
 def write_task(problem: Problem | Scene, path: str | PathLike[str], *, title: str | None = None) -> Path:
@@ -85,10 +85,7 @@ def _figure(figure: Figure, target: Path) -> dict[str, Any]:
     named = {"name": spec} if spec in ("human", "avatar", "hand") else {"path": _beside(spec, target)}
     if options.get("package_dirs"):
         options = {**options, "package_dirs": [_beside(str(folder), target) for folder in options["package_dirs"]]}
-    known = {
-        "sex", "stature", "mass", "percentile", "proportions", "age", "detail", "hands", "side", "root", "package_dirs",
-        "concavity",
-    }  # fmt: skip
+    known = {key.name for form in FIGURES.values() for key in form.keys}
     for option in options:
         if option not in known or (option == "concavity" and isinstance(options[option], dict)):
             raise InputError(f"write_task: the figure was loaded with {option}, which a task file cannot say")

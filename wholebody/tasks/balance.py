@@ -133,9 +133,6 @@ class Balance(Constraint):
     Attributes:
         feet: names of the segments that carry the figure, including their child segments, such as toes.
         margin: least distance from the edges [m].
-
-    Raises:
-        InputError: no feet are named, or the margin is negative.
     """
 
     feet: Feet = ("left_foot", "right_foot")

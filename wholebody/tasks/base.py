@@ -71,7 +71,11 @@ class SupportingPlanes(NamedTuple):
 
 
 class Term(Checked):
-    """Base of goals, constraints, bounds and measures; `Checked` says how the fields of one are checked."""
+    """Base of goals, constraints, bounds and measures.
+
+    Raises:
+        InputError: a value of the wrong kind or out of range; it names the term, the argument and what it takes.
+    """
 
     _answered: ClassVar[Mapping[str, answers.Check]] = {}
 

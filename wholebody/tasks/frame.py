@@ -11,27 +11,31 @@ from numpy.typing import ArrayLike
 from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State, Wrench
 from wholebody.tasks import inputs
-from wholebody.tasks.base import Constraint, Goal, Surroundings, filled
+from wholebody.tasks.base import Constraint, Goal, Surroundings, Term, filled
 from wholebody.tasks.residuals import PlacementResidual, placement_between
 
 
-class PlacementGoal(Goal):
-    """A goal whose error is that of its residual: in position [m], then in orientation [rad], of those asked for."""
+class PlacementTerm(Term):
+    """A term whose rows are those of a residual: in position [m], then in orientation [rad], of those asked for."""
 
-    residual: PlacementResidual
+    residual: PlacementResidual  # with frames, joints and target; once resolved
 
     @property
     def angular(self) -> Mask:
         """(m,) which rows are in radians: three of six, or of three all or none."""
         return self.residual.angular
 
-    def error(self, state: State) -> Array:
-        """(m,) difference in position [m] and orientation [rad]."""
-        return self.residual.value(state)
-
     def jacobian(self, state: State) -> Wrench:
         """(m, 6) rows on the frame's joint, or between the joints of the two frames."""
         return self.residual.wrench(state)
+
+
+class PlacementGoal(PlacementTerm, Goal):
+    """A goal to place a frame."""
+
+    def error(self, state: State) -> Array:
+        """(m,) difference in position [m] and orientation [rad]."""
+        return self.residual.value(state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,9 +51,6 @@ class Frame(PlacementGoal):
         target: its target: (x, y, z) with the axes of the world, (x, y, z, qx, qy, qz, qw), a matrix (4, 4) or a
             pin.SE3; metres.
         weight: factor on the squared error [1/m^2 and 1/rad^2: a metre counts as much as a radian].
-
-    Raises:
-        InputError: the target is none of these, or not in metres.
     """
 
     frame: str
@@ -57,7 +58,7 @@ class Frame(PlacementGoal):
     _: KW_ONLY
     weight: inputs.Weight = 1.0
     resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3
-    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frame, joint and target
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Frame:
         """Find the frame."""
@@ -75,9 +76,6 @@ class Orientation(PlacementGoal):
         frame: name of the frame, segment or joint.
         target: quaternion (x, y, z, w) or rotation matrix (3, 3) of the frame in the world.
         weight: factor on the squared error [1/rad^2].
-
-    Raises:
-        InputError: the target is not a rotation.
     """
 
     frame: str
@@ -85,7 +83,7 @@ class Orientation(PlacementGoal):
     _: KW_ONLY
     weight: inputs.Weight = 1.0
     resolved_target: Any = field(init=False, repr=False)  # `target` as a pin.SE3 without translation
-    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frame, joint and target
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Orientation:
         """Find the frame."""
@@ -108,9 +106,6 @@ class Relative(PlacementGoal):
             metres. None for the relative placement at the start.
         orientation: False leaves the frame free to turn about its origin.
         weight: factor on the squared error [1/m^2 and 1/rad^2].
-
-    Raises:
-        InputError: the placement is none of these, or not in metres.
     """
 
     frame: str
@@ -120,7 +115,7 @@ class Relative(PlacementGoal):
     orientation: bool = True
     weight: inputs.Weight = 1.0
     resolved_placement: Any = field(init=False, repr=False, default=None)
-    residual: PlacementResidual = field(init=False, repr=False)  # computes the error, with frames, joints and target
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Relative:
         """Find the frames, and their relative placement at the start."""
@@ -131,7 +126,7 @@ class Relative(PlacementGoal):
 
 
 @dataclass(frozen=True, eq=False)
-class Hold(Constraint):
+class Hold(PlacementTerm, Constraint):
     """Keep a frame at a placement, in the world or relative to another frame of the figure.
 
     Relative to another frame it closes a loop: two hands that carry one box, or the second hand on a two-handed tool.
@@ -142,9 +137,6 @@ class Hold(Constraint):
             (4, 4) or a pin.SE3; metres. None for its placement at the start.
         orientation: False holds only the frame's origin and leaves the frame free to turn.
         relative_to: name of the frame that `at` is relative to; None for the world.
-
-    Raises:
-        InputError: `at` is none of these, or not in metres.
     """
 
     frame: str
@@ -153,7 +145,7 @@ class Hold(Constraint):
     orientation: bool = True
     relative_to: str | None = None
     resolved_at: Any = field(init=False, repr=False, default=None)
-    residual: PlacementResidual = field(init=False, repr=False)  # computes the value, with frames, joints and target
+    residual: PlacementResidual = field(init=False, repr=False)
 
     def resolve(self, scene: Surroundings, start: Array) -> Hold:
         """Find the frames, and their placements at the start."""
@@ -172,15 +164,6 @@ class Hold(Constraint):
         """Zero, as `lower`."""
         return np.zeros(())
 
-    @property
-    def angular(self) -> Mask:
-        """(m,) the last three of six rows are in radians."""
-        return self.residual.angular
-
     def value(self, state: State) -> Array:
         """(m,) difference in position [m] and orientation [rad]."""
         return self.residual.value(state)
-
-    def jacobian(self, state: State) -> Wrench:
-        """Rows between the joint of the frame and that of the other."""
-        return self.residual.wrench(state)

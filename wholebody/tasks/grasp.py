@@ -65,10 +65,6 @@ class Grasp(ContactTerm):
         approach: "overhand", the palm looks down, "underhand", it looks up, or "side", it looks to the side, within 45
             degrees each; any if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-
-    Raises:
-        InputError: the hand is neither, the kind or the approach is another word, the side has no direction, or an
-            angle or a place is out of range.
     """
 
     hand: inputs.Name

@@ -26,9 +26,6 @@ class Point(Goal):
         target: (3,) position in the world [m].
         offset: (3,) the point in the frame's own axes [m].
         weight: factor on the squared error [1/m^2].
-
-    Raises:
-        InputError: a value is not finite, of the wrong shape or not in metres.
     """
 
     frame: str
@@ -63,9 +60,6 @@ class CenterOfMass(Goal):
         target: (3,) position in the world [m].
         axes: "xyz", or "xy" to leave the height free.
         weight: factor on the squared error [1/m^2].
-
-    Raises:
-        InputError: the target is not in metres, or the axes are others.
     """
 
     target: inputs.Position
@@ -107,9 +101,6 @@ class Plane(Constraint):
         point: (3,) a point in the plane [m]; None for the frame's position at the start.
         side: "on" keeps it in the plane, "above" lets it move to the side to which the normal points.
         height: n . p of the plane, its distance from the world's origin along the normal [m]; once resolved.
-
-    Raises:
-        InputError: the normal has no direction, the point is not in metres, or the side is another word.
     """
 
     frame: str

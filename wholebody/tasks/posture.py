@@ -29,9 +29,6 @@ class Posture(Goal):
         target: name of one of the figure's postures, or a posture (nq,).
         joints: names of the joints and groups that the goal moves; None for all, including the root.
         weight: factor on the squared error [1/rad^2 and 1/m^2].
-
-    Raises:
-        InputError: the posture has the wrong shape, is not finite, or has a quaternion that is not of unit length.
     """
 
     target: str | ArrayLike

@@ -39,9 +39,6 @@ class ReachCones(Constraint):
 
     Attributes:
         names: names of the figure's cones; None for all of them.
-
-    Raises:
-        InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['left_shoulder']", least=0)] | None = None
@@ -209,9 +206,6 @@ class RangeOfMotion(Constraint):
 
     Attributes:
         names: names of the figure's ranges; None for all of them.
-
-    Raises:
-        InputError: names is no list.
     """
 
     names: Annotated[Sequence[str], Names("['neck']", least=0)] | None = None

@@ -36,9 +36,6 @@ class Sit(ContactTerm):
         pelvis: the segment that sits.
         trunk: the last of the segments above the pelvis that may touch the back.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-
-    Raises:
-        InputError: a name is not a string, or the weight is not positive.
     """
 
     on: inputs.Name

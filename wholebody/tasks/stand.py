@@ -36,9 +36,6 @@ class Stand(TermOfParts):
         margin: distance of the centre of mass from the edges of the polygon [m].
         parts: of each foot the distance, two angles, and two rows over the face, which are zero; then, with balance,
             the distances of the centre of mass inside the edges [m]; once resolved.
-
-    Raises:
-        InputError: no feet are named, a name is not a string, or the margin is negative.
     """
 
     on: inputs.Name

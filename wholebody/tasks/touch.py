@@ -34,9 +34,6 @@ class Touch(ContactTerm):
             without pieces what is drawn of it touches, else, if it has mass or a joint, what moves with it.
         thing: name of a thing or of one of its pieces, such as "chair:2", or of another segment.
         weight: factor on the squared distance, as a goal [1/m^2].
-
-    Raises:
-        InputError: a name is not a string, or the weight is not positive.
     """
 
     part: inputs.Name
@@ -74,9 +71,6 @@ class Lean(ContactTerm):
         part: the segment that leans on it.
         side: (3,) direction in the part's axes that looks at the thing; backwards if left out.
         weight: factor on the squared error, as a goal [1/m^2 and 1/rad^2].
-
-    Raises:
-        InputError: a name is not a string, the side has no direction, or the weight is not positive.
     """
 
     on: inputs.Name
