@@ -121,7 +121,8 @@ class Relative(PlacementGoal):
         """Find the frames, and their relative placement at the start."""
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
-        target = placement_between(scene, start, place, base) if self.placement is None else self.resolved_placement
+        given = self.placement is not None
+        target = self.resolved_placement if given else placement_between(scene, start, self.frame, self.to)
         return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))
 
 
@@ -151,7 +152,7 @@ class Hold(PlacementTerm, Constraint):
         """Find the frames, and their placements at the start."""
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
-        at = placement_between(scene, start, place, base) if self.at is None else self.resolved_at
+        at = placement_between(scene, start, self.frame, self.relative_to) if self.at is None else self.resolved_at
         return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
 
     @property

@@ -61,7 +61,7 @@ class RootEffort(DistanceMeasure):
         """Store the start."""
         weights = np.zeros(scene.model.nv)
         weights[:6] = ROOT_WEIGHT
-        return filled(self, distance=SquaredDistance.build(scene.model, start, weights))
+        return filled(self, distance=SquaredDistance.build(start, weights))
 
 
 class Prediction(NamedTuple):
