@@ -74,10 +74,10 @@ def reba(figure: Figure | Scene, q: Array, work: Work | None = None) -> Reba:
 def reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
-
+    head = 1 if -NEUTRAL <= angles.neck_flexion <= radians(20.0) else 2
     twisted = abs(arm.wrist_deviation) > DEVIATED or abs(arm.forearm_twist) > END_OF_TWIST
     return RebaParts(
-        neck=_neck(angles),
+        neck=head + min(turned(angles.neck_twist, angles.neck_lateral), 1),
         trunk=_trunk(angles),
         legs=_legs(angles, side, work),
         upper_arm=max(raised(arm) - int(work.arms_supported), 1),
@@ -87,11 +87,6 @@ def reba_parts(angles: BodyAngles, side: str, work: Work) -> RebaParts:
         coupling=COUPLINGS.index(work.coupling),
         activity=int(work.static) + int(work.repeated) + int(work.unstable),
     )
-
-
-def _neck(angles: BodyAngles) -> int:
-    score = 1 if -NEUTRAL <= angles.neck_flexion <= radians(20.0) else 2
-    return score + min(turned(angles.neck_twist, angles.neck_lateral), 1)
 
 
 def _trunk(angles: BodyAngles) -> int:

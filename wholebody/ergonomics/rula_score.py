@@ -89,15 +89,18 @@ def rula(figure: Figure | Scene, q: Array, work: Work | None = None) -> Rula:
 def rula_parts(angles: BodyAngles, side: str, work: Work) -> RulaParts:
     """Scores of the parts of one side."""
     arm = angles.side(side)
+    bent = abs(arm.wrist_flexion)
+    wrist = 1 if bent <= NEUTRAL else 2 if bent <= radians(15.0) else 3
+    balanced = work.sits(angles) or both_feet(angles)
     outward = arm.forearm_outward > radians(30.0)  # "out to the side of the body"
     return RulaParts(
         upper_arm=max(raised(arm) - int(work.arms_supported), 1),
         lower_arm=lower_arm(arm) + int(arm.across or outward),
-        wrist=_wrist(arm),
+        wrist=wrist + int(abs(arm.wrist_deviation) > DEVIATED),
         wrist_twist=1 + int(abs(arm.forearm_twist) > END_OF_TWIST),
         neck=_neck(angles),
         trunk=_trunk(angles, work),
-        legs=_legs(angles, work),
+        legs=1 if work.legs_supported and balanced else 2,
         muscle=int(work.static or work.repeated),
         force=_force(work),
     )
@@ -122,12 +125,6 @@ def turned(*angles: float) -> int:
     return sum(abs(angle) > radians(10.0) for angle in angles)
 
 
-def _wrist(arm: SideAngles) -> int:
-    bent = abs(arm.wrist_flexion)
-    score = 1 if bent <= NEUTRAL else 2 if bent <= radians(15.0) else 3
-    return score + int(abs(arm.wrist_deviation) > DEVIATED)
-
-
 def _neck(angles: BodyAngles) -> int:
     bent = angles.neck_flexion
     score = 4 if bent < -NEUTRAL else 1 if bent <= radians(10.0) else 2 if bent <= radians(20.0) else 3
@@ -142,11 +139,6 @@ def _trunk(angles: BodyAngles, work: Work) -> int:
     rests = bool(work.back_supported) and work.sits(angles) and opened >= radians(90.0)
     score = 1 if rests else 1 if bent <= NEUTRAL else 2 if bent <= radians(20.0) else 3 if bent <= radians(60.0) else 4
     return score + turned(angles.trunk_twist, angles.trunk_lateral)
-
-
-def _legs(angles: BodyAngles, work: Work) -> int:
-    balanced = work.sits(angles) or both_feet(angles)
-    return 1 if work.legs_supported and balanced else 2
 
 
 def _force(work: Work) -> int:

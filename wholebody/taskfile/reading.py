@@ -54,35 +54,28 @@ class Contents(NamedTuple):
 
 def read_contents(path: Path) -> Contents:
     """Read a task file and check every table, key and value."""
-    text, data = read_toml(path, "task file")
-    where = Where(path, text)
-    plain = {name: value for name, value in data.items() if name not in TABLES}
-    for name in plain:
-        if name not in {key.name for key in TOP}:
-            raise UnknownNameError("key or table", name, [*(key.name for key in TOP), *TABLES], str(where))
-    top = Entry(where, None, "", {key.name: key for key in TOP}, _values(plain, TOP, where))
-    tables = {name: _entries(name, data[name], TABLES[name], where) for name in TABLES if name in data}
-    if "figure" not in tables:
-        raise where.fault('there is no [figure] table; add [figure] with name = "human"')
-    return Contents(top, tables)
+    contents = contents_of(path, "task file", TOP, TABLES)
+    if "figure" not in contents.tables:
+        raise contents.top.where.fault('there is no [figure] table; add [figure] with name = "human"')
+    return contents
 
 
-def read_toml(path: Path, kind: str) -> tuple[str, dict[str, Any]]:
-    """The text of a TOML file and what it says."""
-    text = _text(path, kind)
-    return text, parsed_toml(text, path.name)
-
-
-def _text(path: Path, kind: str) -> str:
+def contents_of(path: Path, kind: str, keys: tuple[Key, ...], known: Mapping[str, Table]) -> Contents:
+    """Read a TOML file of a kind, such as "task file", with these keys at its top and these tables."""
     try:
-        return read_text(path, kind).replace("\r\n", "\n")
+        text = read_text(path, kind).replace("\r\n", "\n")
     except FileFormatError:
-        if is_file(path):
-            raise
-        if os.path.lexists(path):
+        if is_file(path) or os.path.lexists(path):
             raise
         there = sorted(file.name for file in path.parent.glob("*.toml")) if os.path.isdir(path.parent) else []
         raise UnknownNameError(kind, path.name, there, one_line(str(path.parent))) from None
+    data, where, names = parsed_toml(text, path.name), Where(path, text), {key.name: key for key in keys}
+    plain = {name: value for name, value in data.items() if name not in known}
+    for name in plain:
+        if name not in names:
+            raise UnknownNameError("key or table", name, [*names, *known], str(where))
+    top = Entry(where, None, "", names, _values(plain, keys, where))
+    return Contents(top, {name: _entries(name, data[name], known[name], where) for name in known if name in data})
 
 
 def _entries(name: str, data: Any, table: Table, where: Where) -> list[Entry]:
