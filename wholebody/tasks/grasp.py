@@ -49,7 +49,7 @@ class Grasp(ContactTerm):
       needs fingers.
 
     Two sides oppose where the normals of their contacts are antiparallel, within `opposed`; of several fingers the
-    mean of the normals counts. Edges of boxes count as rounded.
+    mean of the normals counts. Edges of boxes and hulls count as rounded.
 
     Use it as a goal or as a constraint. The clearance between hand and thing is zero.
 
@@ -182,7 +182,7 @@ class Grasp(ContactTerm):
         parts: list[Part] = [Gap(finger, thing) for finger in (thumb, *others)]
         # m: distance of the farthest of fingertips from which they begin to oppose the thumb
         far = CLOSED if self.kind == "pinch" else 0.1
-        parts.append(Opposing(thumb, tuple(others), thing, rounded(thing), float(self.opposed), far))
+        parts.append(Opposing(thumb, tuple(others), thing, rounded(thing), float(self.opposed), far, lever=0.02))
         bar = bar_of(thing, state, where) if np.isfinite(thing.reach).all() else None
         # ratio of its longest to its next half size from which a thing that is taken by fingertips has ends
         if bar is not None and (self.along is not None or bar.half[2] > 2.0 * bar.half[1]):

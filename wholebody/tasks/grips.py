@@ -11,7 +11,7 @@ force-closure grasps"). Of several fingers the mean of their normals counts.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import coal
 import numpy as np
@@ -20,6 +20,8 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.figures.state import State
+from wholebody.geometry.hull import coal_convex
+from wholebody.geometry.pieces import swept_points
 from wholebody.tasks.axis import across
 from wholebody.tasks.base import SupportingPlanes
 from wholebody.tasks.contact_parts import Gap, between, one_sided, through
@@ -151,20 +153,27 @@ class Looking(NamedTuple):
 
 
 class Opposing(NamedTuple):
-    """The normals of one contact and of several others on a thing within an angle of opposite: one row [rad].
+    """The normals of one contact and of several others on a thing within an angle of opposite: one row.
 
-    The row is the angle beyond it, zero within it.
+    The row is the angle beyond it, zero within it, times a lever.
     """
 
     first: Surface  # surface on one side, such as a thumb
     others: tuple[Surface, ...]  # surfaces on the other, such as fingers
     thing: Surface  # what is between them
-    smooth: Surface  # the same with the edges of its boxes `rounded`, whose normals count
+    smooth: Surface  # the same with its edges `rounded`, whose normals count
     most: float  # largest angle from opposite [rad]
     # distance of the farthest contact from which the angle does not count; nearer, it counts more and more [m]. Far
     # away the normals say where the thing is, not how it is held
     far: float
-    in_radians: tuple[bool, ...] = (True,)
+    # of the arc that the row then measures [m]: so short that a finger rather turns than leaves to where the angle does
+    # not count, which ends a descent there. 1 for the angle itself
+    lever: float = 1.0
+
+    @property
+    def in_radians(self) -> tuple[bool, ...]:
+        """Whether the row is the angle itself."""
+        return (self.lever == 1.0,)
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """The angle beyond, and wrenches on every finger."""
@@ -195,21 +204,30 @@ class Opposing(NamedTuple):
             force = share * (toward if number == 0 else other / length)
             wrench = _by_twist(surface, self.smooth, state, near.pieces) @ force
             row += between(state, wrench[None], near.against, near.joint)
-        return np.array([share * beyond]), row
+        return np.array([self.lever * share * beyond]), self.lever * row
 
 
 def rounded(thing: Surface) -> Surface:
-    """The surface with boxes smaller by the radius of their rounded edges; the normals on others stay."""
-    shapes = []
-    for shape in thing.shapes:
-        if isinstance(shape, coal.Box):
-            half = np.asarray(shape.halfSide)
-            # share of a box's least half size by which its edges are rounded, so that normals turn on its faces
-            half = half - 0.9 * half.min()
-            shapes.append(coal.Box(*(2.0 * half)))
-        else:
-            shapes.append(shape)
-    return thing.with_shapes(tuple(shapes))
+    """The surface with boxes and hulls smaller by the radius of their rounded edges; the normals on others stay."""
+    return thing.with_shapes(tuple(_rounded(shape) for shape in thing.shapes))
+
+
+def _rounded(shape: Any) -> Any:
+    """What is left within a piece by nine tenths of the radius of its largest ball, so that normals turn on its faces."""
+    if isinstance(shape, coal.Box):
+        half = np.asarray(shape.halfSide)
+        return coal.Box(*(2.0 * (half - 0.9 * half.min())))
+    if not isinstance(shape, coal.Convex):
+        return shape
+    from scipy.optimize import linprog
+    from scipy.spatial import ConvexHull, HalfspaceIntersection
+
+    normals, offsets = np.split(swept_points(shape).faces, [3], axis=1)
+    ball = linprog((0, 0, 0, -1), np.column_stack([normals, np.ones(len(normals))]), offsets, bounds=(None, None)).x
+    planes = np.column_stack([normals, 0.9 * ball[3] - offsets])
+    hull = ConvexHull(HalfspaceIntersection(planes, ball[:3]).intersections)
+    used, triangles = np.unique(hull.simplices, return_inverse=True)
+    return coal_convex(hull.points[used], triangles.reshape(-1, 3))
 
 
 def _by_twist(surface: Surface, thing: Surface, state: State, pieces: tuple[int, int]) -> Array:
