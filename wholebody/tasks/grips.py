@@ -213,7 +213,7 @@ def rounded(thing: Surface) -> Surface:
 
 
 def _rounded(shape: Any) -> Any:
-    """What is left within a piece by nine tenths of the radius of its largest ball, so that normals turn on its faces."""
+    """A piece smaller by nine tenths of the radius of the largest ball in it, so that normals turn on its faces."""
     if isinstance(shape, coal.Box):
         half = np.asarray(shape.halfSide)
         return coal.Box(*(2.0 * (half - 0.9 * half.min())))
