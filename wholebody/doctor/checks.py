@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Sequence
+from importlib import import_module
 from typing import NamedTuple
 
 from wholebody.base.runner import Child, EndedError
@@ -21,13 +22,6 @@ class Outcome(NamedTuple):
 
     works: bool  # whether the check succeeded
     detail: str  # the finding, or the reason of the failure, in a few words
-
-
-def import_module(name: str) -> str:
-    """Import a module; return its file."""
-    from importlib import import_module as load
-
-    return str(load(name).__file__)
 
 
 def solve_program(name: str) -> str:
@@ -86,7 +80,7 @@ def list_methods(_: str) -> str:
 
 
 CHECKS: dict[str, Callable[[str], str]] = {
-    "import": import_module,
+    "import": lambda name: str(import_module(name).__file__),
     "program": solve_program,
     "pose": pose_person,
     "methods": list_methods,

@@ -50,8 +50,7 @@ class Accommodation:
     def __repr__(self) -> str:
         parts = [("reach", self.reaches), ("fit", self.fits), *([("see", self.sees)] if self.sees is not None else [])]
         words = ", ".join(f"{np.mean(values):.0%} {name}" for name, values in parts)
-        why = self.records.from_neighbours_in_words() + self.records.first_without_answer()
-        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{why}"
+        return f"Accommodation of {len(self.records)} people: {self.share:.0%}\n  {words}{self.records.remarks()}"
 
 
 def people(count: int = 9, sexes: Sequence[str] = ("male", "female")) -> dict[str, dict[str, Any]]:

@@ -16,6 +16,7 @@ from wholebody.base.runner import packed
 from wholebody.geometry.placement import FARTHEST
 from wholebody.methods.base import Method
 from wholebody.methods.inputs import check_problem
+from wholebody.methods.qp.method import QP
 from wholebody.methods.solve import as_method
 from wholebody.problem import Problem
 from wholebody.studies.many import MOST_JOBS
@@ -98,7 +99,11 @@ def reach_map(
     inputs.find_place(problem.scene, frame, what)
     point = inputs.point(offset, f"{what}: offset")
     grid = _grid(low, high, step)
-    whole, quick = _methods(method)
+    if method is None:
+        whole: Method = QP(measures=False)
+        quick: Method = QP(measures=False, restarts=0, budget=0, iterations=30)  # from a neighbour's posture
+    else:
+        whole = quick = as_method(method)
     jobs = checks.whole(jobs, f"{what}: jobs", 1, MOST_JOBS)
     if cluster is not None:
         checks.text(cluster, f"{what}: cluster")
@@ -305,13 +310,3 @@ def _grid(low: Any, high: Any, step: Any) -> _Grid:
     index = np.stack(np.meshgrid(*(np.arange(int(n)) for n in counts), indexing="ij"), axis=-1).reshape(-1, 3)
     number = {(i, j, k): place for place, (i, j, k) in enumerate(index.tolist())}
     return _Grid((x, y, z), places, index, number)
-
-
-def _methods(given: str | Method | None) -> tuple[Method, Method]:
-    """The method of whole solves, and of those that begin at a neighbour."""
-    if given is not None:
-        method = as_method(given)
-        return method, method
-    from wholebody.methods.qp.method import QP
-
-    return QP(measures=False), QP(measures=False, restarts=0, budget=0, iterations=30)

@@ -12,8 +12,7 @@ from wholebody.base.arrays import Array, Mask
 from wholebody.figures.state import State
 from wholebody.methods.base import Method
 from wholebody.methods.contradictions import contradictions
-from wholebody.methods.simplification.pairs import held_balls
-from wholebody.methods.simplification.reach import Balls, Reach
+from wholebody.methods.simplification.reach import Balls, Reach, held_balls
 from wholebody.problem import Problem
 from wholebody.tasks import Point
 

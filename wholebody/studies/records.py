@@ -128,20 +128,16 @@ class Records(Sequence[SolveRecord]):
         missed = f"{worst.name} by {1e3 * worst.goal_error:.3g} mm" if worst else "none"
         return (
             f"{len(self)} solves: {counts}\n  {seconds:.3g} s of solving\n"
-            f"  goal missed most: {missed}{self.from_neighbours_in_words()}{self.first_without_answer()}"
+            f"  goal missed most: {missed}{self.remarks()}"
         )  # fmt: skip
 
-    def first_without_answer(self) -> str:
-        """Lines about the first that was refused and the first whose process ended, and why; "" for none."""
-        lines = ""
+    def remarks(self) -> str:
+        """Lines about those solved from a neighbour's answer, and the first that was refused or whose process ended."""
+        lines = f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
         for outcome in (REFUSED, ENDED):
             first = next((one for one in self._records if one.outcome == outcome), None)
             lines += "" if first is None else f"\n  first {outcome}: {first.name}, {first.message}"
         return lines
-
-    def from_neighbours_in_words(self) -> str:
-        """A line about how many are solved from the answers of neighbours; "" for none."""
-        return f"\n  {self.from_neighbours} solved from the answer of a neighbour" if self.from_neighbours else ""
 
     @property
     def from_neighbours(self) -> int:

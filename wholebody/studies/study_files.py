@@ -112,7 +112,7 @@ class StudyFile:
     warm_start: bool  # see `wb.study`
 
 
-_TOP = (Key("task", Text(), True), Key("method", Choice(METHODS)), Key("warm_start", Flag()))
+_TOP = (Key("task", Text(), True), Key("method", Choice(tuple(METHODS))), Key("warm_start", Flag()))
 _NAME = Key("name", Text(), True)
 _PLACES = ByName(PLACEMENT, "things that move", "table = [0.6, 0.0, 0.4]", "m")
 _TABLES = {

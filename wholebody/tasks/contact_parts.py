@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple, Protocol, TypeVar, runtime_checkable
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import coal
 import numpy as np
@@ -39,14 +39,6 @@ class Part(Protocol):
 
     def rows(self, state: State) -> tuple[Array, Array]:
         """Values (m,) and their derivative (m, nv)."""
-
-
-@runtime_checkable
-class Bounded(Part, Protocol):
-    """A part whose rows have kinks."""
-
-    def planes(self, state: State) -> SupportingPlanes:
-        """What says where the kinks are; keys are less than `MOST_PLANES` of a part."""
 
 
 class RoundEnd(NamedTuple):
@@ -279,8 +271,8 @@ class TermOfParts(Constraint):
         """Planes of the faces about every gap: past an edge there is no surface left to slide on."""
         found, row = [no_planes(state.model.nv)], 0
         for number, part in enumerate(self.parts):
-            if isinstance(part, Bounded):
-                planes = part.planes(state)
+            if hasattr(part, "planes"):  # what says where its rows have kinks; keys are less than 3 `MOST_FACES`
+                planes: SupportingPlanes = part.planes(state)
                 key, bend_row = planes.key + 3 * MOST_FACES * number, planes.bend_row + row
                 found.append(with_values(planes, key=key, bend_row=bend_row))
             row += len(part.in_radians)
