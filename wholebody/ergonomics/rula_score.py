@@ -19,8 +19,7 @@ from wholebody.ergonomics.work import Work, both_feet, seen
 from wholebody.figures.figure import Figure
 from wholebody.scene.scene import Scene
 
-NEUTRAL = radians(5.0)
-"""Up to which a wrist is neutral, a trunk upright, and a head not in extension."""
+NEUTRAL = radians(5.0)  # Up to which a wrist is neutral, a trunk upright, and a head not in extension
 ABDUCTED = radians(20.0)
 RAISED = 0.03  # m: of a shoulder
 DEVIATED = radians(10.0)  # of a wrist from its middle line

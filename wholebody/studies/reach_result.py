@@ -14,8 +14,7 @@ from wholebody.base.files import checked_target, write
 from wholebody.problem import Problem
 
 NOT_TRIED, REACHED, MISSED, EXCLUDED, BEYOND, INSIDE = range(6)
-VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")
-"""Words of the codes of a verdict."""
+VERDICTS = ("not tried", "reached", "missed", "excluded", "beyond", "inside")  # Words of the codes of a verdict
 
 
 @dataclass(frozen=True, eq=False, repr=False)

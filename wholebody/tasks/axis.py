@@ -31,11 +31,9 @@ The exact derivative is infinite at the opposite direction. The cap keeps the ro
 The gradient of the squared error stays exact, because it has no component across the error.
 """
 
-NO_ANGLE = 1e-12
-"""Sine below which the error has no direction of its own, so the first of the two is taken."""
+NO_ANGLE = 1e-12  # Sine below which the error has no direction of its own, so the first of the two is taken
 
-TOUCHING = 1e-6
-"""Distance [m] below which a point has no direction from the frame; the goal then counts as met."""
+TOUCHING = 1e-6  # Distance [m] below which a point has no direction from the frame; the goal then counts as met
 
 
 @dataclass(frozen=True, eq=False)

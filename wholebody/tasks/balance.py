@@ -22,8 +22,7 @@ STANDING_HEIGHT = 0.01
 """Height [m] above a foot's lowest point up to which its corners stand on the ground; soles are rounded by as much."""
 
 
-NEAREST = 1e-5
-"""Distance [m] below which two points count as one corner."""
+NEAREST = 1e-5  # Distance [m] below which two points count as one corner
 
 
 def standing_points(scene: Surroundings, q: Array, feet: Sequence[str]) -> Array:

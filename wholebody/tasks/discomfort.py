@@ -14,8 +14,7 @@ from wholebody.tasks import inputs
 from wholebody.tasks.base import Measure, Surroundings, filled
 from wholebody.tasks.distance import LEAST_CURVATURE
 
-STEEPNESS = 2.5
-"""Half the 5.0 in eq. 3.14: the penalty at the ratio r from a limit is cos(2.5 r)^200."""
+STEEPNESS = 2.5  # Half the 5.0 in eq. 3.14: the penalty at the ratio r from a limit is cos(2.5 r)^200
 
 POWER = 200
 """Twice the exponent in eq. 3.14: the penalty is 1 at the limit, 0.2 at 5 % of the range from it and 0.002 at 10 %."""

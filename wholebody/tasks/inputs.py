@@ -17,8 +17,7 @@ from wholebody.figures.state import State
 from wholebody.geometry.placement import PlacementLike, placement, unit_vector
 from wholebody.tasks.base import Surroundings
 
-FARTHEST = 100.0
-"""Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre."""
+FARTHEST = 100.0  # Distance [m] beyond which a position is refused as a wrong unit: 100 mm are a tenth of a metre
 
 WEIGHT = Range(1e-12, 1e12, wanted="a positive number such as 1, or leave it out")
 """Weights of terms: beyond this range the squares of weights make other terms vanish in rounding."""
@@ -31,8 +30,7 @@ class Place(NamedTuple):
     joint: int
 
 
-WORLD = Place(0, 0)
-"""The world: Pinocchio's frame and joint 0."""
+WORLD = Place(0, 0)  # The world: Pinocchio's frame and joint 0
 
 
 def find_place(scene: Surroundings, name: str, where: str) -> Place:
