@@ -176,7 +176,6 @@ def motion(arguments: argparse.Namespace) -> None:
 WORLD = {
     "throws": "Thrown at a person",
     "drops": "The same drops in three engines",
-    "long": "For minutes",
 }
 """Parts of `wholebody bench world`, and the titles of their tables."""
 
@@ -185,15 +184,13 @@ WORLD = {
     "world",
     "things that move by themselves: throws at a person, drops beside MuJoCo and Rapier",
     "Throw things at a person who stands, walks or is dragged; drop, slide and stack the same things in wholebody, "
-    "MuJoCo and Rapier; let dominoes, stacks and balls move for minutes. The whole takes about 15 minutes of one "
-    "processor.",
-    listed("--parts", "throws, drops, long (default: all)", "PART"),
+    "MuJoCo and Rapier. The whole takes about ten minutes of one processor.",
+    listed("--parts", "throws, drops (default: all)", "PART"),
     listed("--only", "names of drops (default: all)", "DROP"),
     listed("--engines", "wholebody, mujoco, rapier (default: installed)"),
-    option("--minutes", type=float, default=10.0, metavar="N", help="simulated minutes of the long run (default: 10)"),
 )
 def world(arguments: argparse.Namespace) -> int:
-    """Measure; --quick takes three drops for half a second, one throw of each kind, three seconds of the long run."""
+    """Measure; --quick takes three drops for half a second, and one throw of each kind."""
     from wholebody.bench.measure.throws import throw_summary
 
     found: dict[str, list[Row]] = {part: [] for part in chosen(arguments.parts, WORLD, "--parts")}
@@ -229,10 +226,8 @@ def _world(arguments: argparse.Namespace) -> dict[str, Iterable[Row]]:
     known = {drop.name: drop for drop in drops.drops()}
     names = chosen(arguments.only, known, "--only")[: 3 if quick else None]
     tools = drops.installed(chosen(arguments.engines, drops.ENGINES, "--engines"))
-    minutes = 0.05 if quick else checks.number(arguments.minutes, "--minutes", 0.01, 1000.0, "minutes")
     frames = 30 if quick else None
     return {
         "throws": throws.all_throws(1 if quick else 3, quick),
         "drops": (drops.measure(known[name], tool, frames) for name, tool in product(names, tools)),
-        "long": (throws.long_run(each) for each in (minutes,)),
     }
