@@ -72,26 +72,23 @@ def step(arguments: argparse.Namespace) -> None:
 @measuring(
     "solve",
     "whole solves of a task, and their memory",
-    "Solve the shelf, or a task of your own, with new and with used workspaces, and measure the memory of "
+    "Solve the shelf, or a task of your own, in new processes and in used ones, and measure the memory of "
     "`wholebody pose`. `wholebody bench compare` solves the problem sets.",
     option("--task", type=Path, metavar="TASK.toml", help="(default: the shelf)"),
-    count("--count", 30, "solves"),
     listed("--methods", "such as qp, newton (default: qp qp/osqp)"),
 )
 def solve(arguments: argparse.Namespace) -> None:
-    """Whole solves of a task with new and with used workspaces, and the memory of `wholebody pose`."""
-    from wholebody.bench.measure import solve
+    """Measure; --quick takes one method."""
+    from wholebody.bench.measure.solve import memory
     from wholebody.bench.suite.adapters.registry import adapters
+    from wholebody.bench.suite.compare import own_task
     from wholebody.cli.demo import packaged_tasks
 
-    task, facts, rows = arguments.task or packaged_tasks()["shelf"], machine(), []
-    methods, many = adapters(arguments.methods or ["qp", "qp/osqp"]), 3 if arguments.quick else arguments.count
-    for row in solve.task_rows(task, methods, many):
-        rows.append(row)
-        print(f"{row.case}, {row.tool}, {row['problem and method']}: {row['median ms']:.1f} ms, {row['status']}")
-    peak = solve.memory(task)
-    about = "A task, solved with a new problem and a new method each time, and with the same ones again."
-    text = report(about, {"Solves": rows, "Memory": [peak]}, facts)
+    task, facts = arguments.task or packaged_tasks()["shelf"], machine()
+    methods = adapters(arguments.methods or ["qp", "qp/osqp"][: 1 if arguments.quick else None])
+    rows = [Row(task.stem, row.tool, row.figures) for row in own_task.compared(task, methods, tell=print)]
+    peak = memory(task)
+    text = report(own_task.about(), {"Solves": rows, "Memory": [peak]}, facts)
     publish("solve", text, arguments, facts=facts, tables={"solve": rows, "memory": [peak]})
 
 
