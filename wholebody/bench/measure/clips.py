@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pinocchio as pin
 
-from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError
 from wholebody.base.files import parsed_toml
@@ -73,8 +71,3 @@ def recordings(folder: Path | None) -> tuple[Path, ...]:
 
 EQUIPMENT = (NOTHING, *READY)
 """What a person wears."""
-
-
-def chosen(wanted: Sequence[str] | None, known: Sequence[str], option: str) -> tuple[str, ...]:
-    """The names that an option chooses, all of them where it is left out; UnknownNameError for others."""
-    return tuple(known) if wanted is None else tuple(checks.known(name, known, "name", option) for name in wanted)
