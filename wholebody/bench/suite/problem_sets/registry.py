@@ -38,6 +38,7 @@ NAMED = _sets(
         "uniform_witnesses": reaching.uniform,
         "other_people": reaching.people,
         "other_clutter": reaching.clutter,
+        "arms_among_things": robots.among,
         "robots": robots.described,
         "drivers": drivers.posed,
     }
