@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Iterable, Sequence
 from dataclasses import fields, is_dataclass
 from operator import is_
 from typing import Any, TypeVar
@@ -16,10 +15,11 @@ from wholebody.base import checks
 from wholebody.base.arrays import Array
 from wholebody.base.errors import InputError, TermError
 from wholebody.base.fields import Range
+from wholebody.base.pool import Loan
 from wholebody.figures.state import UNIT_TOLERANCE, State
 from wholebody.geometry.placement import FARTHEST
 from wholebody.scene.scene import Scene
-from wholebody.scene.workspace import Workspace
+from wholebody.scene.workspace import Workspace, borrowed
 from wholebody.tasks.answers import in_words, is_own
 from wholebody.tasks.base import Bound, Constraint, Goal, Measure
 from wholebody.tasks.checks import check_measure, check_rows
@@ -122,10 +122,9 @@ class Problem(checks.FixedAttributes):
         )
         pairs = checks.listed(touching, "touching", "[('right_hand', 'table')]")
         self.touching = tuple(_owner_pair(scene, pair) for pair in pairs)
-        self.clearances = np.zeros(len(scene.built.table.pairs))
         self._plan: tuple[_Planned, TermPlan] | None = None
         """The terms as arrays, and the terms that they were made of; every solve begins with it."""
-        with self.borrow() as workspace:
+        with scene.borrow() as workspace:
             state = workspace.state.update(self.start)
             self.measures: tuple[Measure, ...] = (
                 self._usual_measures() if measured is None else tuple(m.resolve(scene, self.start) for m in measured)
@@ -139,6 +138,8 @@ class Problem(checks.FixedAttributes):
 
     def _usual_measures(self) -> tuple[Measure, ...]:
         scene, start, ranges = self.scene, self.start, self.range_of_motion
+        if not (ranges and scene.figure.ranges):
+            return default_measures(scene, start, ranges=False)
         key = "measures", ranges, start.tobytes()
         return scene.built.known(key, lambda: default_measures(scene, start, ranges=ranges))
 
@@ -146,6 +147,8 @@ class Problem(checks.FixedAttributes):
         scene, start, ranges, known = self.scene, self.start, self.range_of_motion, frozenset(map(type, stated))
         required = self.balance is True
         balance = stands(scene, state, stated, self.bounds, self.goals) if self.balance is None else required
+        if not (balance or (ranges and scene.figure.ranges)):
+            return (), ""
         moves = scene.built.moves if balance else 0  # shoes carry too
         return scene.built.known(
             ("constraints", ranges, balance, required, known, moves, start.tobytes()),
@@ -190,6 +193,8 @@ class Problem(checks.FixedAttributes):
         A default of a person, which stood nowhere, is called by its class alone. Constraints that were set afterwards
         are counted as they were set.
         """
+        if not self.constraints:
+            return ()
         defaults = {id(term) for term in self.defaults}
         count = sum(id(term) not in defaults for term in self.constraints)
         places = iter(self._places if len(self._places) == count else range(count))
@@ -238,16 +243,17 @@ class Problem(checks.FixedAttributes):
         self.scene.figure.warn_of_angles(result.start, "with_start: q")
         return result
 
-    @contextmanager
-    def borrow(self) -> Iterator[Workspace]:
+    def borrow(self) -> Loan[Workspace]:
         """Borrow a workspace on this problem's scene for one run; see `Scene.borrow`.
 
         Raises:
             InputError: objects were added to or removed from the scene after the problem was made.
         """
-        with self.scene.borrow() as workspace:
-            self.check_fresh()  # after borrowing: later changes of the scene do not change the workspace
-            yield workspace
+        return borrowed(self.scene.built, self._begin)
+
+    def _begin(self, workspace: Workspace) -> None:
+        workspace.begin()
+        self.check_fresh()  # after borrowing: later changes of the scene do not change the workspace
 
     def workspace(self) -> Workspace:
         """A new workspace for a long-lived object; see `Scene.workspace`.
@@ -333,7 +339,9 @@ class Problem(checks.FixedAttributes):
         if allowed:
             named = [(owners[a], owners[b]) in allowed for a, b in pairs]
             asked[np.array(named, dtype=bool)] = 0.0
-        near = workspace.near(self.start, self.clearance + 1e-9)
+        near = workspace.near_views(self.start, self.clearance + 1e-9)
+        if not len(near.number):
+            return asked
         kept = np.maximum(near.distance, 0.0)
         resting = near.distance >= -1e-6
         asked[near.number[resting]] = np.minimum(asked[near.number[resting]], kept[resting])
@@ -355,12 +363,11 @@ def _start(scene: Scene, start: Array | str | None) -> Array:
         return np.array(figure.posture(start), dtype=float)
     q = checks.posture(start, scene.model.nq, "start")
     figure.warn_of_angles(q, "start")
-    if np.abs(q).max(initial=0.0) > FARTHEST:
+    if q.dot(q) > FARTHEST**2 and np.abs(q).max() > FARTHEST:
         raise InputError(f"start has a value of {np.abs(q).max():.3g}; give metres and radians")
-    normal = pin.normalize(scene.model, q)
-    if np.abs(normal - q).max(initial=0.0) > UNIT_TOLERANCE:
+    if not pin.isNormalized(scene.model, q, UNIT_TOLERANCE):
         raise InputError("the start's quaternion is not of unit length; normalise it with pin.normalize(model, q)")
-    return np.array(normal)
+    return np.array(pin.normalize(scene.model, q))
 
 
 def _clearance(value: float) -> float:

@@ -40,6 +40,11 @@ class StandInFigure:
             raise UnknownNameError("frame", name, [frame.name for frame in self.model.frames])
         return int(self.model.getFrameId(name))
 
+    def placement(self, q: Any, name: str) -> Any:
+        data = self.model.createData()
+        pin.forwardKinematics(self.model, data, q)
+        return pin.updateFramePlacement(self.model, data, self.frame_id(name)).copy()
+
     def posture(self, name: str) -> Any:
         if name != "standing":
             raise UnknownNameError("posture", name, ["standing"])

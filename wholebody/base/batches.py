@@ -76,10 +76,7 @@ def spread(
 
 @contextmanager
 def _interrupt_ignored() -> Iterator[None]:
-    """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good, and print no traceback while they begin.
-
-    The one who began them ends them. Only the main thread hears Ctrl-C.
-    """
+    """Ignore Ctrl-C meanwhile: processes that begin now ignore it for good, and print no traceback; we end them."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -119,12 +116,7 @@ def _in_own_child(sent: _Sent) -> tuple[int, Any, tuple[int, str] | None]:
 
 
 def threads(cluster: str) -> int:
-    """How many jobs a cluster does at a time.
-
-    Raises:
-        MissingPackageError: dask is not installed.
-        WholebodyError: the cluster does not answer, or has no workers.
-    """
+    """How many jobs a cluster does at a time; raises as `run_batch`, also where the cluster has no workers."""
     with _client(cluster) as client:
         found = sum(client.nthreads().values())
     if not found:

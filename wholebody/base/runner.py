@@ -52,7 +52,6 @@ class EndedError(WholebodyError):
     """
 
     def __init__(self, code: int, said: str = "") -> None:
-        """Build the message from the exit code and the last line."""
         self.overtime, self.code, self.said = -code in (signal.SIGALRM, signal.SIGPROF), code, said
         message = "it took too long" if self.overtime else f"the process ended with {self.how}"
         super().__init__(message + (f": {said}" if said and not self.overtime else ""))
@@ -68,7 +67,7 @@ class Job(NamedTuple):
 
     Attributes:
         name: any value by which the caller identifies the job; it is not sent to the process.
-        function: called in the process.
+        function: called in the process with the arguments.
         arguments: of the function.
         seconds: time to the deadline, unless the job moves it; 0 for none.
     """
@@ -80,13 +79,9 @@ class Job(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """The outcome of a job.
+    """The outcome of a job: the notes that it sent before its answer, and what the function returned.
 
-    Attributes:
-        job: the job.
-        notes: the notes that it sent before its answer.
-        answer: the return value of the function; None if the process ended.
-        error: how the process ended; None if there is an answer.
+    Where the process ended, there is no answer, and `error` says how.
     """
 
     job: Job
@@ -96,13 +91,7 @@ class Outcome(NamedTuple):
 
 
 class Started(NamedTuple):
-    """A process that reads jobs.
-
-    Attributes:
-        process: it.
-        connection: over which it gets jobs and answers.
-        output: what it writes.
-    """
+    """A process that reads jobs, the connection over which it gets them and answers, and what it writes."""
 
     process: subprocess.Popen[bytes] | BaseProcess
     connection: Connection
@@ -139,11 +128,7 @@ class Child:
         return self._connection
 
     def call(self, function: Callable[..., Any], *arguments: Any, seconds: float) -> Any:
-        """Do a job, and wait for its answer.
-
-        Raises:
-            EndedError: the process ended during the job; the next call starts another process.
-        """
+        """Do a job, and wait for its answer; an `EndedError` if the process ended: the next call starts another."""
         self.begin(Job(None, function, arguments, seconds))
         while (outcome := self.listen()) is None:
             pass
@@ -233,11 +218,9 @@ def start_process(environment: Mapping[str, str]) -> Started:
 
 
 def run_jobs(next_job: Callable[[], Job | None], children: Sequence[Child]) -> Iterator[Outcome]:
-    """Run jobs in parallel, and yield their outcomes as they end; the children are closed at the end.
+    """Run jobs in parallel, each in one of the children, and yield their outcomes as they end; then close these.
 
-    Args:
-        next_job: called for a job whenever a process is free; returns None if there is none (now, or any more).
-        children: the processes, each of which does one job at a time.
+    `next_job` is called for a job whenever a process is free; it returns None if there is none (now, or any more).
     """
     free, busy = list(children), list[Child]()
     try:
@@ -298,8 +281,7 @@ def tell(note: Any) -> None:
 def end_with(parent: int) -> None:
     """End this process when its parent has ended, also in the middle of a job, and where it had ended before this call.
 
-    Args:
-        parent: process id; whoever began this process says it, for an orphan's parent is another process.
+    Whoever began this process says the parent's id, for an orphan's parent is another process.
     """
     threading.Thread(target=_end_after, args=(parent,), daemon=True).start()
 

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from wholebody.cli.arguments import JOINED
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 
 @command(
@@ -27,7 +27,7 @@ goals, and write into a folder:
     option("--step", default="0.1", metavar="M", help="metres between places, or X,Y,Z (default: 0.1)"),
     option("--jobs", type=int, default=1, metavar="N", help="processes (default: 1)"),
     option("--cluster", metavar="ADDRESS", help="dask scheduler that runs the searches"),
-    option("--goals", action="store_true", help="meet the task's goals too at every place"),
+    flag("--goals", "meet the task's goals too at every place"),
     option("--out", type=Path, metavar="DIR", help="folder to write to (default: out/NAME-OF-TASK)"),
     epilog="""\
 examples:
@@ -54,25 +54,14 @@ def run(arguments: argparse.Namespace) -> int:
             task.problem, arguments.frame, low, high, step, jobs=arguments.jobs, cluster=arguments.cluster,
             progress=lambda done, total: status.update(f"{done} of {total} places"),
         )  # fmt: skip
-    console = Console()
-    console.print(str(found), highlight=False)
-    console.print(f"  {found.share:.1%} reached; reach volume {found.volume:.4g}", highlight=False)
-    for file in (
-        found.picture(out / "reach.png"),
-        found.html(out / "reach.html"),
-        found.save(out / "reach.npz"),
-        found.to_vtk(out / "reach.vtk"),
-    ):
-        console.print(f"wrote {file}", highlight=False, soft_wrap=True)
+    print(f"{found}\n  {found.share:.1%} reached; reach volume {found.volume:.4g}")
+    for write, name in ((found.picture, "png"), (found.html, "html"), (found.save, "npz"), (found.to_vtk, "vtk")):
+        print(f"wrote {write(out / f'reach.{name}')}")
     return 0 if found.reached.any() else 1
 
 
 def _numbers(text: str, what: str, count: int = 3) -> list[float]:
-    """Numbers separated by commas.
-
-    Raises:
-        InputError: they are something else.
-    """
+    """Numbers separated by commas; raises InputError where they are something else."""
     from wholebody.base.checks import shown
     from wholebody.base.errors import InputError
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, TypeAlias
 
+import coal
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
 from wholebody.base.arrays import Array
-from wholebody.geometry.proximity import COAL_ACCURACY
-from wholebody.geometry.swept_points import SweptPoints, swept_points
+from wholebody.geometry.pieces import COAL_ACCURACY, SweptPoints, normal_across, swept_points
 
 Placed: TypeAlias = tuple[Any, pin.SE3]
 """A coal geometry and its placement in the world."""
@@ -72,8 +72,6 @@ class ObjectPair:
         self, pieces_a: Sequence[Placed], pieces_b: Sequence[Placed], allowed: NDArray[np.bool_] | None = None
     ) -> None:
         """Read the pieces once; `allowed` (n, m) selects the pairs that count."""
-        import coal
-
         self.a, self.b = [_Body(p) for p in pieces_a], [_Body(p) for p in pieces_b]
         self._centers = np.array([x.center for x in self.a])[:, None] - np.array([x.center for x in self.b])
         self._reach = np.array([x.swept.reach for x in self.a])[:, None] + np.array([x.swept.reach for x in self.b])
@@ -101,8 +99,6 @@ class ObjectPair:
 
     def measure(self, i: int, j: int, translation: Array) -> tuple[float, Array]:
         """Depth (negative: gap) of piece i of A, moved, in piece j of B, and the unit normal out of B into A."""
-        import coal
-
         a, b = self.a[i], self.b[j]
         self._at_a[i].setTranslation(a.center + translation)
         self._result.clear()
@@ -111,11 +107,7 @@ class ObjectPair:
         if (
             not normal @ normal > 0.25
         ):  # swept points that coincide exactly (capsule axes, concentric spheres): coal has no normal
-            normal = np.cross(a.axis, b.axis)
-            if np.linalg.norm(normal) < 1e-9:
-                along = a.axis if a.axis.any() else b.axis if b.axis.any() else np.array([1.0, 0.0, 0.0])
-                normal = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
-            normal /= np.linalg.norm(normal)
+            normal = normal_across(a.axis, b.axis)
         return -float(distance), normal
 
     def between(self, translation: Array) -> Sides | None:
@@ -176,8 +168,6 @@ class ObjectPair:
 
 
 def _transform(placement: pin.SE3) -> Any:
-    import coal
-
     return coal.Transform3s(placement.rotation, placement.translation)
 
 

@@ -15,8 +15,8 @@ from wholebody.base.arrays import Indices
 from wholebody.base.pool import Pool
 from wholebody.geometry.contact_rows import ContactRowBuilder
 from wholebody.geometry.continuous.moved_pairs import compiled_kernel
-from wholebody.geometry.large_models import geometry_model
-from wholebody.geometry.proximity import Joints, PairTable, Proximity
+from wholebody.geometry.large_models import geometry_model, pairs_of
+from wholebody.geometry.proximity import PairTable, Proximity
 from wholebody.scene.matter.materials import DEFAULT, Material
 
 if TYPE_CHECKING:
@@ -29,12 +29,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Motion:
-    """How a thing came to where it is.
-
-    Attributes:
-        start: where it was before, in the world, or in the segment's frame for a carried thing.
-        seconds: how long it took.
-    """
+    """How a thing came to where it is: where it was, in the world or in the frame of its segment, and the seconds."""
 
     start: pin.SE3
     seconds: float
@@ -109,13 +104,7 @@ class SceneGeometry:
         self._known: dict[Any, Any] = {}
 
     def place(self, name: str, base: pin.SE3, *, moving: bool = False) -> None:
-        """Place the pieces of an object whose placement in its joint's frame is `base`.
-
-        Args:
-            name: of the object.
-            base: its placement.
-            moving: whether it moves there, along the way in between; otherwise it was put there.
-        """
+        """Put the pieces of an object to its placement in its joint's frame, or move them there along the way."""
         with self.lock:
             self.moves += 1
             if not moving:
@@ -129,10 +118,7 @@ class SceneGeometry:
     ) -> int:
         """Update the placements of the pieces that moved since `seen`; returns the present number of moves.
 
-        Args:
-            proximity: of a run.
-            seen: number of moves that it has seen.
-            moved: takes the objects that moved, with their placements before and after; of those put, after as both.
+        `moved` takes the objects that moved, with their placements before and after; of those put, after as both.
         """
         if seen == self.moves:
             return seen
@@ -226,19 +212,13 @@ def assemble(figure: Figure, objects: Iterable[SceneObject], excluded: dict[tupl
 
     joints = np.array([piece.parentJoint for piece in pieces], dtype=int)
     carried = {thing.name: thing for thing in things if thing.segment is not None}
-    excluded.update(_leaning(figure, pieces, body, joints, owners, carried))
+    excluded.update(_leaning(figure, pieces, owners, carried))
     met = _pairs_of_things(body, joints, owners, excluded)
     if body > own:
         outer, standing = (met[:, 0] >= own) & (met[:, 0] < body), joints[met[:, 1]] == 0
         met = met[(met[:, 0] >= body) | (outer == standing)]
-    pairs = np.concatenate([_own_pairs(figure), met])
+    pairs = np.concatenate([pairs_of(figure.geometry), met])
     return SceneGeometry(model, geometry_model(pieces, pairs), tuple(owners), pieces_of, pairs)
-
-
-def _own_pairs(figure: Figure) -> Indices:
-    """(k, 2) the figure's own pairs."""
-    listed = [[pair.first, pair.second] for pair in figure.geometry.collisionPairs]
-    return np.array(listed, dtype=np.intp).reshape(-1, 2)
 
 
 def _pairs_of_things(
@@ -263,12 +243,7 @@ def _pairs_of_things(
 
 
 def _leaning(
-    figure: Figure,
-    pieces: list[pin.GeometryObject],
-    body: int,
-    joints: NDArray[np.int_],
-    owners: list[str],
-    carried: Mapping[str, SceneObject],
+    figure: Figure, pieces: list[pin.GeometryObject], owners: list[str], carried: Mapping[str, SceneObject]
 ) -> dict[tuple[str, str], str]:
     """Pairs (segment, carried thing) that are not tested, with the reason."""
     if not carried:
@@ -276,8 +251,8 @@ def _leaning(
     count = len(figure.geometry.geometryObjects)
     segments = [figure.model.frames[piece.parentFrame].name for piece in figure.geometry.geometryObjects]
     tested = {frozenset((segments[pair.first], segments[pair.second])) for pair in figure.geometry.collisionPairs}
-    joint_of = dict(zip(segments, joints[:count], strict=True))
-    touching = _touching_at_rest(figure, pieces, body, joints, owners, carried)
+    joint_of = dict(zip(segments, (piece.parentJoint for piece in pieces[:count]), strict=True))
+    touching = _touching_at_rest(figure, pieces, owners, carried)
     found: dict[tuple[str, str], str] = {}
     for name, thing in carried.items():
         # A thing rests on things that were attached before it, whose pieces come first.
@@ -293,22 +268,17 @@ def _leaning(
 
 
 def _touching_at_rest(
-    figure: Figure,
-    pieces: list[pin.GeometryObject],
-    body: int,
-    joints: NDArray[np.int_],
-    owners: list[str],
-    carried: Mapping[str, SceneObject],
+    figure: Figure, pieces: list[pin.GeometryObject], owners: list[str], carried: Mapping[str, SceneObject]
 ) -> set[tuple[str, str]]:
     """Pairs (segment, carried thing) that touch in the figure's first posture."""
-    held = [k for k in range(body, len(pieces)) if owners[k] in carried]  # before what stands in the world
+    held = [k for k, owner in enumerate(owners) if owner in carried]  # before what stands in the world
     probe = geometry_model(pieces[: held[-1] + 1])
     for second in held:
         for first in range(len(figure.geometry.geometryObjects)):
-            if joints[first] != joints[second]:
+            if pieces[first].parentJoint != pieces[second].parentJoint:
                 probe.addCollisionPair(pin.CollisionPair(first, second))
     rest = figure.posture(figure.postures[0])
     data = figure.model.createData()
     pin.forwardKinematics(figure.model, data, rest)
     # m: a carried thing nearer than this to a segment in the first posture rests on it
-    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(Joints(data), 1e-3).pair}
+    return {(owners[a], owners[b]) for a, b in Proximity(PairTable(figure.model, probe)).query(data, 1e-3).pair}

@@ -10,7 +10,6 @@ a problem then cost one matrix product.
 
 from __future__ import annotations
 
-import copy
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Protocol, TypeVar
@@ -53,9 +52,8 @@ class Surroundings(Protocol):
 
 def filled(term: _T, **values: object) -> _T:
     """Copy of an immutable term with some of its fields set."""
-    result = copy.copy(term)
-    for name, value in values.items():
-        object.__setattr__(result, name, value)
+    result: _T = object.__new__(type(term))
+    vars(result).update(vars(term), **values)
     return result
 
 

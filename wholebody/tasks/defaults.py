@@ -32,6 +32,9 @@ came 20 to 59 % less far from the middle of the stance than the edges are (Forth
 33: 715, its abstract); here it is 30 %."""
 
 
+_effort = Effort()
+
+
 def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tuple[Measure, ...]:
     """`Effort`, and for a person `Rhythm` beside it, resolved.
 
@@ -41,7 +44,7 @@ def default_measures(scene: Surroundings, start: Array, *, ranges: bool) -> tupl
         ranges: whether a person moves as people do; without it `Effort` is alone.
     """
     person = ranges and bool(scene.figure.ranges) and bool(girdles_of(scene.figure))
-    effort = Effort().resolve(scene, start)
+    effort = _effort.resolve(scene, start)
     return (effort, Rhythm().resolve(scene, start)) if person else (effort,)
 
 

@@ -25,23 +25,18 @@ class SquaredDistance(NamedTuple):
         reference: (nq,) posture that has distance zero.
         weights: (nv,) not negative.
         curvature: (nv,) positive diagonal of the second derivative.
-        straight: whether the Jacobian of d is the identity.
     """
 
     reference: Array
     weights: Array
     curvature: Array
-    straight: bool
 
     @classmethod
-    def build(cls, model: Any, reference: Array, weights: Array) -> SquaredDistance:
-        """Distance of postures of `model` from `reference`."""
+    def build(cls, reference: Array, weights: Array) -> SquaredDistance:
+        """Distance of postures from `reference`."""
         weights = np.array(weights, dtype=float)
         curvature = np.maximum(2.0 * weights, LEAST_CURVATURE)
-        # A free-flyer without weight has no part in the distance, so its curved tangent space has none either.
-        sizes = zip(model.nqs.tolist(), model.nvs.tolist(), model.idx_vs.tolist(), strict=True)
-        straight = not any(nq != nv and weights[first : first + nv].any() for nq, nv, first in sizes)
-        return cls(np.array(reference, dtype=float), weights, curvature, straight)
+        return cls(np.array(reference, dtype=float), weights, curvature)
 
     def value(self, state: State) -> float:
         """The distance."""
@@ -51,21 +46,20 @@ class SquaredDistance(NamedTuple):
     def gradient(self, state: State) -> Array:
         """(nv,) its derivative."""
         force = 2.0 * self.weights * pin.difference(state.model, self.reference, state.q)
-        if self.straight:
-            return np.asarray(force)
-        return np.asarray(force @ pin.dDifference(state.model, self.reference, state.q, pin.ARG1))
+        return np.asarray(force @ self._derivative(state))
 
     def squares(self, state: State) -> tuple[Array, Array]:
         """Residuals (k,) whose squares the distance is the sum of, and their derivatives (k, nv)."""
         counts = np.flatnonzero(self.weights)
         roots = np.sqrt(self.weights[counts])
         difference = pin.difference(state.model, self.reference, state.q)
-        rows = (
-            np.eye(len(self.weights))
-            if self.straight
-            else pin.dDifference(state.model, self.reference, state.q, pin.ARG1)
-        )
-        return roots * difference[counts], roots[:, None] * rows[counts]
+        return roots * difference[counts], roots[:, None] * self._derivative(state)[counts]
+
+    def _derivative(self, state: State) -> Array:
+        """(nv, nv) derivative of d."""
+        if state.model.nq == state.model.nv:
+            return np.eye(state.model.nv)
+        return np.asarray(pin.dDifference(state.model, self.reference, state.q, pin.ARG1))
 
 
 class DistanceMeasure(Measure):
@@ -111,7 +105,7 @@ class Effort(DistanceMeasure):
 
     def resolve(self, scene: Surroundings, start: Array) -> Effort:
         """Store the start."""
-        return filled(self, distance=SquaredDistance.build(scene.model, start, scene.figure.effort_weights))
+        return filled(self, distance=SquaredDistance.build(start, scene.figure.effort_weights))
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +126,7 @@ class Displacement(DistanceMeasure):
     def resolve(self, scene: Surroundings, start: Array) -> Displacement:
         """Read the neutral posture and the weights of the figure."""
         figure = scene.figure
-        return filled(self, distance=SquaredDistance.build(scene.model, figure.neutral, figure.neutral_weights))
+        return filled(self, distance=SquaredDistance.build(figure.neutral, figure.neutral_weights))
 
 
 SAME = 1e-9
@@ -203,7 +197,7 @@ class RotationEffort(Measure):
         balls = ball_joints(scene.model, start, weights)
         for ball in balls:
             weights[list(ball.idx_v)] = 0.0
-        return filled(self, balls=balls, others=SquaredDistance.build(scene.model, start, weights))
+        return filled(self, balls=balls, others=SquaredDistance.build(start, weights))
 
     def value(self, state: State) -> float:
         """The measure."""

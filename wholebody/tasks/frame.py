@@ -134,5 +134,6 @@ class Relative(PlacementGoal):
         """Find the frames, and their relative placement at the start."""
         place = inputs.find_place(scene, self.frame, "Relative")
         base = inputs.find_base(scene, self.to, self.frame, "Relative")
-        target = placement_between(scene, start, place, base) if self.placement is None else self.resolved_placement
+        given = self.placement is not None
+        target = self.resolved_placement if given else placement_between(scene, start, self.frame, self.to)
         return filled(self, residual=PlacementResidual.build(place, target, base, orientation=self.orientation))

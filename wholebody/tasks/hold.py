@@ -45,7 +45,7 @@ class Hold(Constraint):
         """Find the frames, and their placements at the start."""
         place = inputs.find_place(scene, self.frame, "Hold")
         base = inputs.find_base(scene, self.relative_to, self.frame, "Hold")
-        at = placement_between(scene, start, place, base) if self.at is None else self.resolved_at
+        at = placement_between(scene, start, self.frame, self.relative_to) if self.at is None else self.resolved_at
         return filled(self, residual=PlacementResidual.build(place, at, base, orientation=self.orientation))
 
     @property

@@ -122,7 +122,7 @@ class PlacementResidual(NamedTuple):
         return np.concatenate(blocks)
 
 
-def placement_between(scene: Surroundings, q: Array, place: Place, base: Place) -> Any:
-    """Placement (pin.SE3) of one frame in another at the posture q (nq,)."""
-    state = State(scene.model).update(q)
-    return state.frame(base.frame).actInv(state.frame(place.frame))
+def placement_between(scene: Surroundings, q: Array, frame: str, base: str | None) -> Any:
+    """Placement (pin.SE3) of one frame in another, or in the world, at the posture q (nq,)."""
+    place = scene.figure.placement(q, frame)
+    return place if base is None else scene.figure.placement(q, base).actInv(place)

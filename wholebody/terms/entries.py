@@ -1,4 +1,4 @@
-"""Built-in goals and constraints as rows of tables: what `term_plan` puts together and `term_kernel` evaluates."""
+"""Built-in goals and constraints as rows of tables: what `plan` puts together and `kernel` evaluates."""
 
 from __future__ import annotations
 
@@ -53,14 +53,9 @@ _NO_EDGES: Array = np.zeros((0, 15))
 
 
 class Entry(NamedTuple):
-    """One row of a table of goals or constraints.
+    """One row of a table of goals or constraints: which table, its integers without the first, and its floats.
 
-    Attributes:
-        table: which.
-        integers: its integers without the first.
-        floats: its floats.
-        rows: how many rows of the Jacobian it makes.
-        edges: (k, 15) planes of the edges of a reach cone, see `ReachCone.planes`; each edge is a row.
+    It makes `rows` rows of the Jacobian. `edges` (k, 15) are planes of the edges of a reach cone: `ReachCone.planes`.
     """
 
     table: int
@@ -87,16 +82,20 @@ def _in_joint(place: Place, model: pin.Model) -> pin.SE3:
 
 def _residual(residual: PlacementResidual, model: pin.Model) -> list[Entry]:
     based = residual.base.frame != WORLD.frame
-    base = _in_joint(residual.base, model) if based else pin.SE3.Identity()
-    floats = np.concatenate(
-        [
-            placement_floats(_in_joint(residual.place, model)), placement_floats(base), residual.target,
-            residual.undo.rotation.T.ravel(),
-        ]
-    )  # fmt: skip
-    integers = (residual.place.joint, residual.base.joint, residual.position, residual.orientation, based)
-    rows = 3 * (residual.position + residual.orientation)
-    return [Entry(RESIDUAL, tuple(map(int, integers)), floats, rows)]
+    floats = np.zeros(36)
+    floats[:12] = placement_floats(_in_joint(residual.place, model))
+    if based:
+        floats[12:24] = placement_floats(_in_joint(residual.base, model))
+    floats[24:27] = residual.target
+    floats[27:].reshape(3, 3)[:] = residual.undo.rotation.T
+    integers = (
+        residual.place.joint,
+        residual.base.joint,
+        int(residual.position),
+        int(residual.orientation),
+        int(based),
+    )
+    return [Entry(RESIDUAL, integers, floats, 3 * (integers[2] + integers[3]))]
 
 
 def _point(term: tasks.Point, model: pin.Model) -> list[Entry]:

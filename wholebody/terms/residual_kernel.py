@@ -1,4 +1,4 @@
-"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `term_plan`.
+"""Errors of frames, planes, axes, reach cones and twists with their wrenches, as compiled loops: see `plan`.
 
 Each function fills the rows of its table in `wrench` (rows, 6) and `value` (rows,), which are zero before.
 """
@@ -20,12 +20,8 @@ SMALL = 1e-4
 
 
 @compiled(inner=True)
-def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
-    """Rotation (3, 3) and origin (3,) in the world of a frame with the place `part` (12,) in a joint (4, 3)."""
-    for i in range(3):
-        place[i] = joint[3, i]
-        for k in range(3):
-            place[i] += joint[k, i] * part[9 + k]
+def _turned(joint: Array, part: Array, turn: Array) -> None:
+    """Rotation (3, 3) in the world of a frame with the rotation `part` (9 or more,) in a joint (4, 3)."""
     for i in range(3):
         for j in range(3):
             turn[i, j] = 0.0
@@ -33,55 +29,60 @@ def _placed(joint: Array, part: Array, turn: Array, place: Array) -> None:
                 turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
+@compiled(inner=True)
+def _placed(joints: Array, joint: int, tables: Array, e: int, first: int, place: Array) -> None:
+    """Rotation and origin (4, 3) in the world of a frame; its place in a joint (12,) begins at `first` in a row."""
+    for i in range(3):
+        x, y, z = joints[joint, 0, i], joints[joint, 1, i], joints[joint, 2, i]
+        for j in range(4):
+            k = first + 3 * j
+            place[j, i] = x * tables[e, k] + y * tables[e, k + 1] + z * tables[e, k + 2]
+        place[3, i] += joints[joint, 3, i]
+
+
 @compiled(inner=True, error_model="numpy")
 def residuals(tables: Array, entries: Integers, joints: Array, wrench: Array, value: Array) -> None:
     """See `tasks.residuals.PlacementResidual`."""
     if not len(tables):
         return
-    turn, base_turn, relative, change = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    place, base_place, way, angle = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    left = np.empty((3, 3))
+    room = np.empty((5, 4, 3))
+    frame, base, change, left, angle = room[0], room[1], room[2, :3], room[3, :3], room[4, 0]
     for e in range(len(tables)):
-        row, position, orientation, based = entries[e, 0], entries[e, 3], entries[e, 4], entries[e, 5]
-        _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
-        if based:
-            _placed(joints[entries[e, 2]], tables[e, 12:24], base_turn, base_place)
+        row, position, orientation = entries[e, 0], entries[e, 3], entries[e, 4]
+        _placed(joints, entries[e, 1], tables, e, 0, frame)
+        if entries[e, 5]:
+            _placed(joints, entries[e, 2], tables, e, 12, base)
         else:
-            for i in range(3):
-                base_place[i] = 0.0
-                for j in range(3):
-                    base_turn[i, j] = 1.0 if i == j else 0.0
+            base[:] = 0.0
+            base[0, 0] = base[1, 1] = base[2, 2] = 1.0
         if position:
             for i in range(3):
-                way[i] = place[i] - base_place[i]
-            for i in range(3):
-                value[row + i] = -tables[e, 24 + i]
-                for k in range(3):
-                    value[row + i] += base_turn[k, i] * way[k]
-                x, y, z = base_turn[0, i], base_turn[1, i], base_turn[2, i]  # axis i of the base, in the world
+                x, y, z = base[i, 0], base[i, 1], base[i, 2]  # axis i of the base, in the world
+                value[row + i] = (
+                    x * (frame[3, 0] - base[3, 0]) + y * (frame[3, 1] - base[3, 1]) + z * (frame[3, 2] - base[3, 2])
+                    - tables[e, 24 + i]
+                )  # fmt: skip
                 wrench[row + i, 0], wrench[row + i, 1], wrench[row + i, 2] = x, y, z
-                wrench[row + i, 3] = place[1] * z - place[2] * y
-                wrench[row + i, 4] = place[2] * x - place[0] * z
-                wrench[row + i, 5] = place[0] * y - place[1] * x
+                wrench[row + i, 3] = frame[3, 1] * z - frame[3, 2] * y
+                wrench[row + i, 4] = frame[3, 2] * x - frame[3, 0] * z
+                wrench[row + i, 5] = frame[3, 0] * y - frame[3, 1] * x
             row += 3
         if orientation:
             for i in range(3):
+                x, y, z = base[i, 0], base[i, 1], base[i, 2]
+                a = x * frame[0, 0] + y * frame[0, 1] + z * frame[0, 2]
+                b = x * frame[1, 0] + y * frame[1, 1] + z * frame[1, 2]
+                c = x * frame[2, 0] + y * frame[2, 1] + z * frame[2, 2]
                 for j in range(3):
-                    relative[i, j] = 0.0
-                    for k in range(3):
-                        relative[i, j] += base_turn[k, i] * turn[k, j]
-            for i in range(3):
-                for j in range(3):
-                    change[i, j] = 0.0
-                    for k in range(3):
-                        change[i, j] += relative[i, k] * tables[e, 27 + 3 * j + k]
+                    k = 27 + 3 * j
+                    change[i, j] = a * tables[e, k] + b * tables[e, k + 1] + c * tables[e, k + 2]
             rotation_vector(change, angle)
             inverse_left(angle, left)
             for i in range(3):
                 value[row + i] = angle[i]
                 for j in range(3):
-                    for k in range(3):
-                        wrench[row + i, 3 + j] += left[i, k] * base_turn[j, k]
+                    wrench[row + i, j] = 0.0
+                    wrench[row + i, 3 + j] = left[i, 0] * base[0, j] + left[i, 1] * base[1, j] + left[i, 2] * base[2, j]
 
 
 @compiled(inner=True, error_model="numpy")
@@ -162,11 +163,12 @@ def axis_errors(tables: Array, entries: Integers, joints: Array, wrench: Array, 
     """See `tasks.Axis`."""
     if not len(tables):
         return
-    turn, axes, place, direction = np.empty((3, 3)), np.empty((3, 3)), np.empty(3), np.empty(3)
+    frame, axes, direction = np.empty((4, 3)), np.empty((3, 3)), np.empty(3)
+    turn, place = frame[:3].T, frame[3]
     change, move = np.empty((2, 3)), np.empty((2, 3))
     for e in range(len(tables)):
         row = entries[e, 0]
-        _placed(joints[entries[e, 1]], tables[e, :12], turn, place)
+        _placed(joints, entries[e, 1], tables, e, 0, frame)
         distance = np.inf
         for i in range(3):
             direction[i] = tables[e, 21 + i]
@@ -227,10 +229,7 @@ def cones(tables: Array, entries: Integers, edges: Array, joints: Array, wrench:
         row, limb, reference = entries[e, 0], joints[entries[e, 1]], joints[entries[e, 2]]
         for i in range(3):
             world[i] = limb[0, i] * tables[e, 0] + limb[1, i] * tables[e, 1] + limb[2, i] * tables[e, 2]
-            for j in range(3):
-                turn[i, j] = 0.0
-                for k in range(3):
-                    turn[i, j] += reference[k, i] * tables[e, 3 + 3 * j + k]
+        _turned(reference, tables[e, 3:12], turn)
         for j in range(3):
             local[j] = turn[0, j] * world[0] + turn[1, j] * world[1] + turn[2, j] * world[2]
         value[row] = signed_angle(edges[entries[e, 4] : entries[e, 4] + entries[e, 3]], local, outward)
@@ -268,16 +267,6 @@ def twists(tables: Array, entries: Integers, joints: Array, wrench: Array, value
         along[2] -= sign
         for i in range(3):
             wrench[row, 3 + i] = base[i, 0] * along[0] + base[i, 1] * along[1] + base[i, 2] * along[2]
-
-
-@compiled(inner=True)
-def _turned(joint: Array, part: Array, turn: Array) -> None:
-    """Rotation (3, 3) in the world of a frame with the rotation `part` (9,) in a joint (4, 3)."""
-    for i in range(3):
-        for j in range(3):
-            turn[i, j] = 0.0
-            for k in range(3):
-                turn[i, j] += joint[k, i] * part[3 * j + k]
 
 
 @compiled(inner=True)

@@ -18,19 +18,14 @@ from wholebody.tracking.frame import Resolution
 
 
 class CCDStrategy:
-    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`)."""
+    """Follows tracked postures by the loop of Schmidl and Lin (`wholebody.methods.ccd.resolver`), from a shown posture.
+
+    Frames take `dt` seconds; the seed is that of the order of the chains.
+    """
 
     sweep_tolerance = 8e-4
 
     def __init__(self, scene: Scene, shown: Array, dt: float, seed: int) -> None:
-        """Prepare for frames of `dt` seconds.
-
-        Args:
-            scene: the figure among things.
-            shown: (nq,) the present posture.
-            dt: seconds from frame to frame.
-            seed: of the order of the chains.
-        """
         self.scene = scene
         # largest velocity, rad/s, with which a joint moves away from the tracked one or returns to it: fast
         # enough to return from 2 rad in half a second, and slow enough not to look like a jump
@@ -65,17 +60,12 @@ class RigidTranslation:
     Schmidl and Lin find that "even a complicated object, such as an articulated hand, can be handled in this way": the
     fingers follow the glove, and the hand with its present fingers is displaced by pure translation. PD_g is the sum of
     pd_i^2 n_i over the sum of pd_i (their equation 1), with n_i out of the obstacle; it is computed again until nothing
-    overlaps.
+    overlaps. Raises InputError for a figure that is fixed to the world.
     """
 
     sweep_tolerance = 2e-4
 
     def __init__(self, scene: Scene) -> None:
-        """Prepare the strategy.
-
-        Raises:
-            InputError: the figure is fixed to the world.
-        """
         if scene.figure.root != "free":
             raise InputError(f"{scene.figure.name} is fixed to the world and cannot be displaced; leave rigid out")
         self.scene, self.model, self._workspace = scene, scene.model, scene.workspace()
@@ -90,7 +80,7 @@ class RigidTranslation:
         began, queried = time.perf_counter(), self._workspace.proximity.seconds
         self._displacements, self._pairs = 0, 0
         self._out: list[Array] = []
-        note, q = "", self._with_fingers(shown, tracked)
+        note, q = "", self._displaced(np.concatenate([shown[:7], tracked[7:]]))
         if q is None:
             q, note = shown, "the fingers would be inside each other or have no room; they stay"
         for _ in range(6):  # most steps a frame: 3.6 m/s at 60 frames a second
@@ -102,10 +92,6 @@ class RigidTranslation:
         queried = self._workspace.proximity.seconds - queried
         spent = time.perf_counter() - began - queried
         return Resolution((q,), queried, spent, self._displacements, 0, self._pairs, note)
-
-    def _with_fingers(self, shown: Array, tracked: Array) -> Array | None:
-        """The shown hand with the tracked fingers, displaced out of overlap; None if that fails."""
-        return self._displaced(np.concatenate([shown[:7], tracked[7:]]))
 
     def _toward(self, q: Array, tracked: Array) -> Array:
         """A step of the root towards the tracked one, tangential to the obstacles of this frame, so that it slides."""

@@ -42,15 +42,6 @@ SHARES = (0.5, 0.25)
 """Shares of the motion that are tried if the whole is not free: an arc leaves a surface by the square of the share."""
 
 
-def check_scene(scene: object, what: str) -> None:
-    """Check that the argument is a scene.
-
-    Raises:
-        InputError: it is not.
-    """
-    instance(scene, Scene, f"{what}: scene", "make one with wb.Scene(figure)")
-
-
 class FrameLoop(NotCopyable):
     """Computes the posture of a figure that follows a tracker, frame by frame, without penetration.
 
@@ -92,7 +83,7 @@ class FrameLoop(NotCopyable):
             UnknownNameError: another overlap, or no such thing.
             InputError: the start has the wrong shape, is not finite, or no posture near it is free of overlap.
         """
-        check_scene(scene, "FrameLoop")
+        instance(scene, Scene, "FrameLoop: scene", "make one with wb.Scene(figure)")
         known(overlap, OVERLAPS, "way to remove overlap", "overlap")
         dt = time_step(dt, "dt")
         SEED(seed, "seed")
@@ -112,13 +103,9 @@ class FrameLoop(NotCopyable):
         self._kept_from_passing(self._strategy.resolve(self.shown, self.shown))  # one-time set-up
 
     def frame(self, tracked: ArrayLike) -> Frame:
-        """Show one frame.
+        """Show one frame towards a tracked posture (nq,).
 
-        If the tracked posture is invalid (a sensor that failed), the figure keeps its posture, and the note of the
-        frame reports it.
-
-        Args:
-            tracked: (nq,) the tracked posture.
+        If that is invalid (a sensor that failed), the figure keeps its posture, and the note of the frame reports it.
         """
         began = _clocks()
         goal = array(tracked, "tracked", f"{self.scene.model.nq} numbers")
@@ -129,7 +116,8 @@ class FrameLoop(NotCopyable):
             resolution = Resolution((self.shown,), 0.0, 0.0, 0, 0, 0, f"{reason}; the figure stays", swept=True)
         else:
             self._said = self._said or self.scene.figure.warn_of_angles(goal, "tracked")  # once for all frames
-            resolution = self._strategy.resolve(self.shown, self._within_limits(goal))
+            within = self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
+            resolution = self._strategy.resolve(self.shown, within)
         if motion is None:
             return self._shown(self._kept_from_passing(resolution), began=began)
         if not motion.still:
@@ -163,16 +151,11 @@ class FrameLoop(NotCopyable):
             collisions, path,
         )  # fmt: skip
 
-    def _within_limits(self, goal: Array) -> Array:
-        """The tracked posture within limits and with a quaternion of unit length."""
-        return self.scene.figure.clamp(pin.normalize(self.scene.model, goal))
-
     def _kept_from_passing(self, resolution: Resolution) -> Resolution:
         """The first posture to which the motion is free; otherwise a share of the motion, or the posture shown.
 
-        A motion that the resolution swept is not swept again. This is the interpolation with the last posture without
-        overlap of algorithm 1, step 4. Only a share whose whole motion is free is taken. Motions up to a contact are
-        not taken, because they would creep into it.
+        This is the interpolation with the last posture without overlap of algorithm 1, step 4. Motions up to a contact
+        are not taken, because they would creep into it.
         """
         if resolution.swept:
             return resolution
@@ -197,8 +180,7 @@ class FrameLoop(NotCopyable):
     ) -> tuple[Resolution, tuple[Collision, ...]]:
         """The first posture to which the motion is free of things that move meanwhile, or else the least deep.
 
-        Returns:
-            The resolution with this posture, and what could not be avoided, which its note names.
+        Returns the resolution with this posture, and what could not be avoided, which its note names.
         """
         began, start = time.perf_counter(), (0.0, self.shown)
         nearest = resolution.candidates[-1]
@@ -247,11 +229,9 @@ def _clocks() -> tuple[float, float]:
 def frame_placements(
     scene: Scene, moves: Mapping[str, Sequence[PlacementLike]] | None, count: int, what: str
 ) -> dict[str, tuple[pin.SE3, ...]]:
-    """Placements of things at the ends of `count` frames, checked.
+    """Placements of things at the ends of `count` frames.
 
-    Raises:
-        InputError: not a mapping, not as many placements as frames, or one that cannot be read.
-        UnknownNameError: there is no such thing.
+    Raises InputError for what has none for each frame, UnknownNameError where there is no such thing.
     """
     if moves is None:
         return {}
@@ -269,14 +249,13 @@ def frame_placements(
 def free_start(scene: Scene, q: Array, rigid: bool) -> tuple[Array, str]:
     """The posture q, or the nearest one without overlap, with a note of the change.
 
-    Raises:
-        InputError: no posture near it is free of overlap.
+    Raises InputError where no posture near it is free of overlap.
     """
     q = scene.figure.clamp(pin.normalize(scene.model, q))
     deepest = deepest_overlap(scene, q)
     if not deepest:
         return q, ""
-    attraction = Attraction(scene.model, q, weights(scene, rigid))
+    attraction = Attraction(q, weights(scene, rigid))
     cones = [ReachCones()] if scene.figure.cones else []
     solution = QP().solve(Problem(scene, q, constraints=cones, measures=[attraction], clearance=CLEARANCE))
     if deepest_overlap(scene, solution.q):
@@ -321,7 +300,7 @@ def follow(
         UnknownNameError, InputError: the track does not fit the figure, or no posture near its start is free; frame
             and place are named, before anything is computed.
     """
-    check_scene(scene, "follow")
+    instance(scene, Scene, "follow: scene", "make one with wb.Scene(figure)")
     instance(track, Track, "follow: track", "make one with Track.of(figure, q, dt)")
     function(progress, "progress")
     track.check(scene.figure)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from wholebody.base.errors import InputError
 from wholebody.bench.tables import machine, write_rows, write_text
 from wholebody.cli.bench.command import folders, listed, quick, seed
-from wholebody.cli.command import command, count, option
+from wholebody.cli.command import command, count, flag, option
 
 if TYPE_CHECKING:
     from wholebody.bench.suite.compare.settings import Settings
@@ -41,31 +41,16 @@ differs. --jobs works on cases beside each other through joblib; --cluster does 
     seed("of all problems"),
     count("--jobs", None, "cases beside each other (default: 1, or all of the cluster)"),
     option("--cluster", metavar="ADDRESS", help="of a dask scheduler, such as tcp://10.0.0.1:8786"),
-    option(
-        "--held-out",
-        action="store_true",
-        help="pose problems of distributions that no constant was tuned on",
-    ),
-    option(
-        "--again",
-        type=Path,
-        metavar="LOCK.json",
-        help="repeat the comparison that left this file",
-    ),
+    flag("--held-out", "pose problems of distributions that no constant was tuned on"),
+    option("--again", type=Path, metavar="LOCK.json", help="repeat the comparison that left this file"),
     *folders("out/compare"),
 )
 def compare(arguments: argparse.Namespace) -> int:
-    """Compare methods; 1 where a comparison that is repeated solves other problems.
-
-    Raises:
-        InputError: options that exclude each other.
-    """
+    """Compare methods; 1 where a comparison that is repeated solves other problems."""
     if arguments.task is not None:
         return _compare_on_task(arguments)
     if arguments.again is not None:
         return _again(arguments)
-    from rich.console import Console
-
     from wholebody.base.batches import threads
     from wholebody.bench.suite.adapters.registry import missing
     from wholebody.bench.suite.compare import run as comparison
@@ -75,7 +60,6 @@ def compare(arguments: argparse.Namespace) -> int:
 
     jobs = arguments.jobs or (threads(arguments.cluster) if arguments.cluster else 1)
     settings = _settings(arguments)
-    console = Console()
     with progress_bar(counted=False) as bar:
         task = bar.add_task("starting", total=60.0 * settings.minutes * jobs)
 
@@ -91,8 +75,8 @@ def compare(arguments: argparse.Namespace) -> int:
     if arguments.update_docs is not None:
         to_docs(given, arguments.out, arguments.update_docs, "held-out" if arguments.held_out else "compare")
     for sentence in advice(given.results, given.rows):
-        console.print("- " + sentence.replace("**", "").replace("`", ""), highlight=False, markup=False)
-    console.print(f"wrote {arguments.out / PAGE}", highlight=False, soft_wrap=True)
+        print("- " + sentence.replace("**", "").replace("`", ""))
+    print(f"wrote {arguments.out / PAGE}")
     return 0
 
 
@@ -141,9 +125,9 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     from wholebody.taskfile import read_task
 
     _alone(arguments, "task", OF_SETS)
-    console, title = Console(), read_task(arguments.task).title
+    title = read_task(arguments.task).title
     chosen = adapters(arguments.methods, starts=True)
-    with console.status("solving") as status:
+    with Console().status("solving") as status:
         rows = own_task.compared(arguments.task, chosen, tell=lambda name: status.update(f"solving by {name}"))
     facts, out = machine(), arguments.out
     write_rows(out / "task.csv", facts, rows)
@@ -151,7 +135,7 @@ def _compare_on_task(arguments: argparse.Namespace) -> int:
     _, png = chart(own_task.panels(rows, title), out / "task")
     print_rows(rows)
     for path in (out / "task.md", out / "task.csv", png):
-        console.print(f"wrote {path}", highlight=False, soft_wrap=True)
+        print(f"wrote {path}")
     return 0
 
 

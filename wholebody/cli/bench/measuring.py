@@ -17,11 +17,7 @@ from wholebody.cli.command import count, option
 
 
 def chosen(wanted: Sequence[str] | None, known: Iterable[str], flag: str) -> tuple[str, ...]:
-    """The names that an option chooses; all of them where it is left out.
-
-    Raises:
-        UnknownNameError: one is not known.
-    """
+    """The names that an option chooses, or all; raises UnknownNameError."""
     names = tuple(known)
     return names if wanted is None else tuple(checks.known(name, names, "name", flag) for name in wanted)
 
@@ -170,10 +166,7 @@ def motion(arguments: argparse.Namespace) -> None:
     publish("motion", motion.motion_report(rows, facts), arguments, charts=charts)
 
 
-WORLD = {
-    "throws": "Thrown at a person",
-    "drops": "The same drops in three engines",
-}
+WORLD = {"throws": "Thrown at a person", "drops": "The same drops in three engines"}
 """Parts of `wholebody bench world`, and the titles of their tables."""
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from wholebody.cli.clip.arguments import EQUIPMENT, JOBS, MOTIONS, bar, figure_of, jobs_of
-from wholebody.cli.command import command, option
+from wholebody.cli.command import command, flag, option
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -32,7 +33,7 @@ carries and with the things around it are told apart. Several motions, or pieces
     *JOBS,
     option("--scene", type=Path, metavar="TASK.toml", help="task file with the figure and its things"),
     option("--depth", type=float, metavar="MM", help="deepest overlap that is no contact (default: 0.1)"),
-    option("--json", action="store_true", help="print everything as JSON instead of tables"),
+    flag("--json", "print everything as JSON instead of tables"),
     option("--html", type=Path, metavar="FILE", help="write a timeline to look at; opens without a network"),
     epilog="""\
 examples:
@@ -68,13 +69,12 @@ def run(arguments: argparse.Namespace) -> int:
         print(json.dumps(found.as_dict(), indent=1))
     else:
         show(Console(width=max(WIDE, Console().width)), found)
-    notes = Console(stderr=arguments.json)
     if arguments.html is not None:
         from wholebody.view.timeline import timeline
 
         with Console(stderr=True).status("drawing"):
             page = timeline(found, scene)
-        notes.print(f"wrote {write(arguments.html, page)}", highlight=False, soft_wrap=True, markup=False)
+        print(f"wrote {write(arguments.html, page)}", file=sys.stderr if arguments.json else sys.stdout)
     return 0 if found.free and not found.limits else 1
 
 

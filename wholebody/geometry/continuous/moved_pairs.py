@@ -9,9 +9,7 @@ import numpy as np
 
 from wholebody.base.arrays import Array, Indices, Mask
 from wholebody.base.errors import InputError
-from wholebody.geometry.proximity import ENDLESS, Contacts, PairTable
-
-ARC = 1.1  # largest ratio of an arc to its chord, for the rotations of one step
+from wholebody.geometry.proximity import Contacts, PairTable
 
 
 class QueryResult(NamedTuple):
@@ -27,41 +25,30 @@ class QueryResult(NamedTuple):
 
 
 def far_moved(table: PairTable, before: QueryResult, after: QueryResult) -> Indices:
-    """Pairs that moved against each other by more than their distance.
-
-    Raises:
-        InputError: the placements are of other pieces.
-    """
+    """Pairs that moved against each other by more than their distance; an InputError for placements of other pieces."""
     count = len(table.joint)
     if len(before.placements) != count or len(after.placements) != count:
         raise InputError(
             f"placements of {len(before.placements)} and {len(after.placements)} pieces; give {count} each"
         )
+    one, other = before.contacts, after.contacts
+    near = one.number, one.distance, float(before.within), other.number, other.distance, float(after.within)
     found: Indices = compiled_kernel().far_moved(
-        before.placements, after.placements, table.pairs, table.widths, table.reach,
-        before.contacts.number, np.ascontiguousarray(before.contacts.distance), float(before.within),
-        after.contacts.number, np.ascontiguousarray(after.contacts.distance), float(after.within), ARC, ENDLESS,
-    )  # fmt: skip
+        before.placements, after.placements, (table.pairs, table.widths, table.reach), near
+    )
     return found
 
 
 def separated(table: PairTable, before: QueryResult, after: QueryResult, pairs: Indices, overlap: float) -> Mask:
     """Which pairs (k,) the plane between their pieces before a motion, fixed to either, still separates after it.
 
-    The heights of the arcs that points describe are allowed for; a pair that was not near before is not separated.
-
-    Args:
-        table: the pieces and pairs.
-        before: near pairs before the motion.
-        after: near pairs after it.
-        pairs: (k,) places among the collision pairs.
-        overlap: metres by which a piece may be beyond the plane.
+    The heights of the arcs that points describe are allowed for; a piece may be beyond the plane by `overlap` metres. A
+    pair that was not near before is not separated.
     """
     known = before.contacts
-    found: Mask = compiled_kernel().separated(
-        pairs, before.placements, after.placements, known.number, known.pair, known.normal, known.point_a,
-        known.point_b, table.points, table.first_point, table.radius, table.reach, overlap,
-    )  # fmt: skip
+    near = known.number, known.pair, known.normal, known.point_a, known.point_b
+    outline = table.points, table.first_point, table.radius, table.reach
+    found: Mask = compiled_kernel().separated(pairs, before.placements, after.placements, near, outline, overlap)
     return found
 
 
@@ -71,15 +58,12 @@ def compiled_kernel() -> Any:
     from wholebody.geometry.continuous import moved_pairs_kernel
 
     none, places, pairs = np.zeros(0), np.zeros(0, dtype=np.intp), np.zeros((0, 2), dtype=np.intp)
-    placements = np.zeros((0, 4, 3))
-    moved_pairs_kernel.far_moved(
-        placements, placements, pairs, none, none, places, none, 0.0, places, none, 0.0, ARC, ENDLESS
-    )
-    lines = np.zeros((0, 3))
+    placements, lines, one = np.zeros((0, 4, 3)), np.zeros((0, 3)), np.zeros(1, dtype=np.intp)
+    near = places, none, 0.0, places, none, 0.0
+    moved_pairs_kernel.far_moved(placements, placements, (pairs, none, none), near)
     moved_pairs_kernel.separated(
-        places, placements, placements, places, pairs, lines, lines, lines, lines, np.zeros(1, dtype=np.intp), none,
-        none, 0.0,
-    )  # fmt: skip
+        places, placements, placements, (places, pairs, lines, lines, lines), (lines, one, none, none), 0.0
+    )
     return moved_pairs_kernel
 
 

@@ -31,33 +31,24 @@ ALLOWED_DEPTH = 4e-4  # m: allowed depth of the direct motion from one shown pos
 
 @dataclass(frozen=True)
 class OverlapResult:
-    """A posture without overlap, and the work to find it.
-
-    Attributes:
-        q: (nq,) the posture to show.
-        iterations: number of goals of cyclic coordinate descent.
-        joints: number of joints that moved, counted once for each goal.
-        pairs: number of different pairs of pieces that overlapped during the search.
-        contact_seconds: time of contact queries.
-        ik_seconds: time of cyclic coordinate descent.
-        deepest: deepest remaining overlap, metres.
-        swept: whether the direct motion from the posture shown before was swept and is free.
-    """
+    """A posture (nq,) without overlap, and the work to find it."""
 
     q: Array
-    iterations: int
-    joints: int
-    pairs: int
-    contact_seconds: float
+    iterations: int  # number of goals of cyclic coordinate descent
+    joints: int  # number of joints that moved, counted once for each goal
+    pairs: int  # number of different pairs of pieces that overlapped during the search
+    contact_seconds: float  # time of contact queries, and of cyclic coordinate descent
     ik_seconds: float
-    deepest: float
-    swept: bool
+    deepest: float  # deepest remaining overlap, metres
+    swept: bool  # whether the direct motion from the posture shown before was swept and is free
 
 
 def resolve_overlap(
     scene: Scene, q_free: Array, q_wanted: Array, rng: np.random.Generator, largest_motion: Array | None = None
 ) -> OverlapResult:
-    """The posture nearest to the wanted one that this frame can reach without overlap.
+    """The posture nearest to the wanted one that this frame can reach without overlap, and the work to find it.
+
+    It is within limits and reach cones and never NaN. If things were moved into `q_free`, leaving them comes first.
 
     Args:
         scene: figure and things. Prepared data of the scene are cached between calls.
@@ -65,11 +56,7 @@ def resolve_overlap(
         q_wanted: (nq,) the tracked posture. It may overlap; it is clamped to limits and cones.
         rng: of the order of the chains; the same seed gives the same answer.
         largest_motion: (nv,) of each degree of freedom, radians and metres; None for no limit. The remainder is left
-            to the next frame. If things were moved into `q_free`, leaving them comes first.
-
-    Returns:
-        The posture, within limits and reach cones and never NaN. If things were moved into `q_free`, that overlap is
-        removed first; `deepest` is the remaining overlap.
+            to the next frame.
 
     Raises:
         InputError: a posture of the wrong shape, or a value that is not finite.
@@ -82,9 +69,6 @@ def resolve_overlap(
 class Attraction:
     """Moves parts of a figure towards the tracked posture: its chains, and root and trunk as one more part.
 
-    Displaced joints are attracted back in every frame, in short steps or joint by joint, as far as contact allows (the
-    coach and trainee of Boulic and others 1997).
-
     Attributes:
         parts: degrees of freedom (k,) of each part, and for each the greatest distance of a point of the part, (k,).
         step_length: largest motion of a part's tip in one step, m.
@@ -94,7 +78,7 @@ class Attraction:
 
     def __init__(self, scene: Scene, resolver: OverlapResolver) -> None:
         """Find the degrees of freedom of each chain."""
-        self._model, self._resolver = scene.model, resolver
+        self._model, self._resolver, self._data = scene.model, resolver, scene.model.createData()
         self.step_length, self.limit, self.free = 0.0, 0, False
         self.parts: list[tuple[NDArray[np.intp], Array]] = []
         rest = np.ones(scene.model.nv, dtype=bool)
@@ -113,11 +97,7 @@ class Attraction:
         self.parts.append((others, reach))
 
     def step(self, q: Array, wanted: Array, settled: list[bool]) -> tuple[Array, Array] | None:
-        """Move every part that is not settled a step towards the wanted posture; None if no part can move.
-
-        Returns:
-            The new posture, (nq,), and the share of its motion that each part made, (parts,).
-        """
+        """Move all parts that are not settled a step to the wanted posture; (nq,) and shares (parts,), or None."""
         way = np.asarray(pin.difference(self._model, q, wanted))
         shares = np.zeros(len(self.parts))
         for k, (dofs, reach) in enumerate(self.parts):
@@ -138,11 +118,12 @@ class Attraction:
         """
         before = np.asarray(pin.difference(self._model, q, wanted))
         after = np.asarray(pin.difference(self._model, trial, wanted))
+        turned = self._turned_back(q, trial)
         back = np.zeros(self._model.nv, dtype=bool)
         slow = []
         for k, (dofs, _) in enumerate(self.parts):
             old, new = float(before[dofs] @ before[dofs]), float(after[dofs] @ after[dofs])
-            if shares[k] and old - new < LEAST_GAIN and not self.free:
+            if shares[k] and old - new < LEAST_GAIN and not self.free and not turned[k]:
                 back[dofs] = True
             if shares[k] and old - new < 0.4 * shares[k] * old:  # blocked: without contact it gains 2 shares
                 slow.append(k)
@@ -157,6 +138,19 @@ class Attraction:
         if len(slow) or back.any():
             self._resolver.query(trial)
         return trial
+
+    def _turned_back(self, q: Array, trial: Array) -> list[bool]:
+        """Whether each part has a link, moved out by translation, that is nearer to its tracked direction than at q."""
+        found = [False] * len(self.parts)
+        for k, chain in enumerate(self._resolver.chains.values()):
+            if chain.translated:
+                link, turns = max(chain.translated), []
+                for posture in (q, trial):
+                    pin.forwardKinematics(self._model, self._data, posture)
+                    wanted = self._resolver.tracked.oMi[link].rotation
+                    turns.append(np.abs(self._data.oMi[link].rotation - wanted).max())
+                found[k] = turns[1] < turns[0] - 1e-3  # rad
+        return found
 
     def _attract_joints(self, q: Array, wanted: Array, part: int) -> tuple[Array, bool]:
         """Move one joint after the other, from the root outwards, if its motion is free; returns whether any moved."""
@@ -195,8 +189,10 @@ class FrameResolver:
         self._workspace.begin()
         self._largest_motion = np.full(self._model.nv, np.inf) if largest_motion is None else largest_motion
         resolver = self._resolver
-        resolver.counts, resolver.margin, resolver.tracked = Counts(), MARGIN, None
+        resolver.counts, resolver.margin = Counts(), MARGIN
         wanted = resolver.into_cones(self._figure.clamp(q_wanted))
+        pin.forwardKinematics(self._model, self._tracked, wanted)
+        resolver.tracked = self._tracked
         self._swept = False
         q, free = self._freed(q_free, rng)
         if not free:
@@ -220,8 +216,6 @@ class FrameResolver:
         """The posture of this frame, from a free posture q towards the wanted one; None if no motion is free."""
         resolver, attraction = self._resolver, self._attraction
         before = resolver.placed
-        pin.forwardKinematics(self._model, self._tracked, wanted)
-        resolver.tracked = self._tracked
         attraction.free = not resolver.query(wanted)
         resolver.margin = (
             5e-3 if attraction.free else MARGIN
@@ -274,8 +268,7 @@ class FrameResolver:
     def _toward(self, q0: Array, q1: Array) -> Array | None:
         """The direct motion from q0 towards q1, as far as a frame may move; None if that is not free.
 
-        If the motion is too long, each part makes its own share of it, or, if that is not free, all make the least
-        share.
+        Each part makes its own share of a motion that is too long, or, if that is not free, all make the least.
         """
         way = np.asarray(pin.difference(self._model, q0, q1))
         shares = np.minimum(1.0, self._largest_motion / np.maximum(np.abs(way), 1e-12))

@@ -14,7 +14,6 @@ import pinocchio as pin
 from wholebody.base.arrays import Array
 from wholebody.figures.figure import Figure
 from wholebody.geometry.continuous.moved_pairs import QueryResult
-from wholebody.geometry.proximity import Joints
 from wholebody.methods.ccd.chain import MARGIN, ChainResolver
 from wholebody.methods.ccd.guards import NOTHING_FIXED, Kept
 from wholebody.methods.ccd.limbs import movable
@@ -51,7 +50,6 @@ class OverlapResolver:
     """Removes overlap from postures of one scene; one object serves many postures.
 
     Attributes:
-        workspace: of the run.
         placed: the pieces and pairs at the last query.
         counts: the work since it was last set.
         deepest: largest shortfall of a pair from its clearance in the last query, metres.
@@ -60,14 +58,7 @@ class OverlapResolver:
     """
 
     def __init__(self, scene: Scene, workspace: Workspace, kept: Kept = NOTHING_FIXED, *, exact: bool = True) -> None:
-        """Prepare for clearances of zero; `begin` takes others.
-
-        Args:
-            scene: figure and things.
-            workspace: of the run, for as long as this is used.
-            kept: joints that must not move, cones and ranges.
-            exact: whether to compute the least translation that separates if PD_g cancels, which takes up to 0.1 s.
-        """
+        """Prepare for clearances of zero; `begin` takes others, and `exact` is as in `LinkFinder`: up to 0.1 s."""
         self.exact, self.margin = exact, MARGIN
         self.tracked: Any = None
         self.scene, self.workspace, self._kept = scene, workspace, kept
@@ -77,13 +68,7 @@ class OverlapResolver:
         self.deepest = 0.0
 
     def begin(self, clearances: Array | None, tolerance: float, control: Control) -> None:
-        """Begin a run.
-
-        Args:
-            clearances: (pairs,) clearance of every collision pair, metres; None for zero.
-            tolerance: largest overlap that is ignored, metres.
-            control: may end the run early.
-        """
+        """Begin a run for clearances (pairs,), None for zero, and a largest overlap that is ignored, metres."""
         self.clearances, self.tolerance, self.control = clearances, tolerance, control
         self._query_distance = 0.0 if clearances is None else float(clearances.max(initial=0.0))
         self.counts = Counts()
@@ -109,7 +94,7 @@ class OverlapResolver:
         began = time.perf_counter()
         self.counts.queries += 1
         pin.forwardKinematics(self.scene.model, self._data, q)
-        near = self.workspace.proximity.query(Joints(self._data), self._query_distance)
+        near = self.workspace.proximity.query(self._data, self._query_distance)
         self.placed = QueryResult(near, self._query_distance)
         depth = -near.distance if self.clearances is None else self.clearances[near.number] - near.distance
         self.deepest = float(depth.max(initial=0.0))
@@ -133,16 +118,7 @@ class OverlapResolver:
         return found
 
     def resolve(self, q: Array, rng: np.random.Generator, most_work: float = np.inf) -> tuple[Array, list[Overlap]]:
-        """Move links out until nothing overlaps or no step gains.
-
-        Args:
-            q: (nq,) posture.
-            rng: of the order of the chains.
-            most_work: work after which no further chain is processed.
-
-        Returns:
-            The posture, and its remaining overlaps.
-        """
+        """Move links out until nothing overlaps, no step gains, or `most_work` is done; the rest overlaps."""
         q = q.copy()
         overlaps = self.query(q)
         names = list(self.chains)

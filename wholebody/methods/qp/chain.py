@@ -8,6 +8,7 @@ kinematics", Humanoids 2015). An end that keeps every clearance is an answer; th
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -44,6 +45,11 @@ class Met(NamedTuple):
     stationary: bool
     blocked: Array | None = None
 
+    @property
+    def complete(self) -> bool:
+        """Whether no descent from here can lead to less."""
+        return self.stationary and self.blocked is None
+
 
 class PlainChain:
     """The joints of a model that carry some frames, as arrays, with room for one descent.
@@ -61,7 +67,7 @@ class PlainChain:
         placements = [model.jointPlacements[joint] for joint in joints]
         self._number = number
         self._idx_q = np.array([kind.idx_q for kind in kinds], dtype=np.intp)
-        self._round = np.array([kind.nq == 2 for kind in kinds])
+        self._round = np.flatnonzero([kind.nq == 2 for kind in kinds])
         self.idx_v = np.array([kind.idx_v for kind in kinds], dtype=np.intp)
         lower, upper = np.full(model.nv, -np.inf), np.full(model.nv, np.inf)
         lower[limits.idx_v], upper[limits.idx_v] = limits.lower, limits.upper
@@ -74,22 +80,24 @@ class PlainChain:
             lower=lower[self.idx_v],
             upper=upper[self.idx_v],
         )
-        self._joints = np.zeros((len(joints) + 1, 4, 3))
-        self._joints[0, :3] = np.eye(3)
+        limited = np.isfinite(self.chain.upper - self.chain.lower)
+        self._far = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
+        self._rooms: dict[int, Room] = {}
 
     def angles(self, q: Array) -> Array:
         """Values (n,) of the joints at a posture (nq,)."""
-        turned, values = self._round, np.empty(len(self._idx_q))
-        values[:] = q[self._idx_q]
-        values[turned] = np.arctan2(q[self._idx_q[turned] + 1], values[turned])
+        values: Array = q[self._idx_q]
+        if len(self._round):
+            values[self._round] = np.arctan2(q[self._idx_q[self._round] + 1], values[self._round])
         return values
 
     def posture(self, values: Array, at: Array) -> Array:
         """A posture (nq,) with values (n,) of the joints."""
         q: Array = at.copy()
-        turned = self._round
-        q[self._idx_q] = np.where(turned, np.cos(values), values)
-        q[self._idx_q[turned] + 1] = np.sin(values[turned])
+        q[self._idx_q] = values
+        if len(self._round):
+            turned = values[self._round]
+            q[self._idx_q[self._round]], q[self._idx_q[self._round] + 1] = np.cos(turned), np.sin(turned)
         return q
 
     def goals(self, entries: list[Entry]) -> Goals:
@@ -102,23 +110,30 @@ class PlainChain:
         return Goals(np.array([entry.floats for entry in entries]), np.array(integers, dtype=np.int64))
 
     def room(self, rows: int) -> Room:
-        """Room for a descent with so many rows."""
-        size = len(self.idx_v)
-        return Room(
-            self._joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
-            np.empty(size, dtype=np.bool_),
-        )  # fmt: skip
+        """Room for descents with so many rows: the same for the same number."""
+        if rows not in self._rooms:
+            size = len(self.idx_v)
+            joints = np.zeros((size + 1, 4, 3))
+            joints[0, :3] = np.eye(3)
+            self._rooms[rows] = Room(
+                joints, np.empty((size, 6)), np.empty((rows, 6)), np.empty(rows), np.empty((rows, size)),
+                np.empty(size, dtype=np.bool_),
+            )  # fmt: skip
+        return self._rooms[rows]
 
-    def seeds(self, start: Array, rng: np.random.Generator, count: int) -> Array:
-        """Values (count, n) all over the limits, but not farther from a start (n,) than half a turn.
+    def seeds(self, start: Array, seed: int, count: int) -> Iterator[Array]:
+        """Batches (count, n) of values all over the limits, but not farther from a start (n,) than half a turn.
 
-        Joints that slide without limits begin within a metre of it.
+        The first batch has the start, and values half as far from it, where ends of little effort are. Joints that
+        slide without limits begin within a metre.
         """
-        limited = np.isfinite(self.chain.upper - self.chain.lower)
-        half = np.where(self.chain.turns.any(axis=1), np.pi, np.where(limited, np.inf, 1.0))
-        lower, upper = np.maximum(self.chain.lower, start - half), np.minimum(self.chain.upper, start + half)
-        values: Array = rng.uniform(lower, upper, (count, len(start)))
-        return values
+        lower, upper = np.maximum(self.chain.lower - start, -self._far), np.minimum(self.chain.upper - start, self._far)
+        for batch in range(SEEDS.batches):
+            directions = _directions(seed, batch, count, len(start))
+            values = start + (0.5 if batch == 0 else 1.0) * np.where(directions < 0.0, -lower, upper) * directions
+            if batch == 0:
+                values[0] = start
+            yield values
 
 
 class Chains:
@@ -126,16 +141,16 @@ class Chains:
 
     def __init__(self, model: pin.Model, limits: Limits) -> None:
         self._model, self._limits = model, limits
-        self._chains: dict[tuple[int, ...], PlainChain | None] = {}
+        self._chains: dict[frozenset[int], PlainChain | None] = {}
 
     def of(self, joints: frozenset[int]) -> PlainChain | None:
         """The chain that carries joints; None where one of it has several degrees of freedom or follows another."""
-        model = self._model
-        path = tuple(sorted({above for joint in joints for above in list(model.supports[joint])} - {0}))
-        if path not in self._chains:
+        if joints not in self._chains:
+            model = self._model
+            path = sorted({above for joint in joints for above in list(model.supports[joint])} - {0})
             plain = bool(path) and all(_is_plain(model.joints[joint]) for joint in path)
-            self._chains[path] = PlainChain(model, self._limits, path) if plain else None
-        return self._chains[path]
+            self._chains[joints] = PlainChain(model, self._limits, tuple(path)) if plain else None
+        return self._chains[joints]
 
 
 def goal_entries(problem: Problem) -> list[Entry] | None:
@@ -177,41 +192,45 @@ def _from_seeds(
     control: Control,
 ) -> Met | None:  # fmt: skip
     at = problem.scene.figure.clamp(problem.start)
-    start, rng = chain.angles(at), np.random.default_rng(budget.seed)
+    start = chain.angles(at)
     distance = _distance(problem, chain, at) if budget.measures else None
-    nearest = np.array([start, np.zeros(len(start))])
+    nearest = np.zeros((2, len(start)))
+    nearest[0] = start
     if distance is not None:
-        nearest = np.array([chain.angles(distance.reference), distance.weights[chain.idx_v]])
+        nearest[0], nearest[1] = chain.angles(distance.reference), distance.weights[chain.idx_v]
     more = 1 + budget.restarts_for_measure
-    together = SEEDS.together * more
     enough = 1 if distance is None else SEEDS.compared * more
     asked = np.array([budget.tolerance, SEEDS.damping**2, min(budget.iterations, SEEDS.steps), enough])
-    goals, room = chain.goals(entries), chain.room(sum(entry.rows for entry in entries))
-    found, trace, begun, least, blocked = np.empty((together, 4)), [], 0, np.inf, None
-    seeds = np.concatenate([[start], chain.seeds(start, rng, together - 1)]) if budget.restarts else start[None].copy()
-    while begun < (SEEDS.most * more if budget.restarts else 1) and not control.over:
-        taken = compiled_kernel().reach(chain.chain, goals, room, seeds, nearest, asked, found)
-        begun += taken
-        for left, _, _, steps in found[:taken].tolist():
-            if steps and not control.over:
-                trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
-                control.tell(trace[-1])
-        for k in np.argsort(found[:taken, 1])[: np.isfinite(found[:taken, 1]).sum()].tolist():
-            q, effort = chain.posture(seeds[k], at), float(found[k, 1])
-            if _is_free(problem, workspace, q):
-                known = bool(found[k, 2]) and (distance is not None or not budget.measures)
-                # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks them.
-                free = len(start) > len(room.value) and least < SEEDS.worth * effort
-                return Met(q, tuple(trace), known, blocked if free else None)
-            least, blocked = (effort, q) if effort < least else (least, blocked)
-        seeds = seeds[taken:] if taken < len(seeds) else chain.seeds(start, rng, together)
+    goals, room, reach = chain.goals(entries), chain.room(sum(entry.rows for entry in entries)), compiled_kernel().reach
+    trace, least, blocked = list[TraceEntry](), np.inf, None
+    alone = [start[None].copy()]
+    for seeds in chain.seeds(start, budget.seed, SEEDS.together * more) if budget.restarts else alone:
+        while len(seeds):
+            if control.over:
+                return None
+            found = np.empty((len(seeds), 4))
+            taken = reach(chain.chain, goals, room, seeds, nearest, asked, found)
+            ends = found[:taken].tolist()
+            for left, _, _, steps in ends:
+                if steps and not control.over:
+                    trace.append(TraceEntry(left, 0.0, 0.0, 0.0, "seed"))
+                    control.tell(trace[-1])
+            for effort, k in sorted((end[1], k) for k, end in enumerate(ends) if end[1] < np.inf):
+                q = chain.posture(seeds[k], at)
+                if _is_free(problem, workspace, q):
+                    known = bool(ends[k][2]) and (distance is not None or not budget.measures)
+                    # Ends of a chain with as many joints as rows are isolated: no descent leads out of what blocks it.
+                    free = len(start) > len(room.value) and least < SEEDS.worth * effort
+                    return Met(q, tuple(trace), known, blocked if free else None)
+                least, blocked = (effort, q) if effort < least else (least, blocked)
+            seeds = seeds[taken:]
     return None
 
 
 def _is_free(problem: Problem, workspace: Workspace, q: Array) -> bool:
     """Whether every pair keeps its clearance at a posture (nq,)."""
-    near = workspace.near(q, float(problem.clearances.max(initial=0.0)))
-    return not (near.distance < problem.clearances[near.number]).any()
+    near = workspace.near_views(q, float(np.maximum.reduce(problem.clearances, initial=0.0)))
+    return not len(near.number) or not (near.distance < problem.clearances[near.number]).any()
 
 
 def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance | None:
@@ -224,6 +243,12 @@ def _distance(problem: Problem, chain: PlainChain, at: Array) -> SquaredDistance
     weights[chain.idx_v] = 0.0
     rest = weights * pin.difference(problem.scene.model, distance.reference, at)
     return distance if (distance.weights[chain.idx_v] > 0.0).all() and not rest.any() else None
+
+
+@lru_cache(maxsize=64)
+def _directions(seed: int, batch: int, count: int, size: int) -> Array:
+    """(count, size) numbers between -1 and 1."""
+    return np.random.default_rng([seed, batch]).uniform(-1.0, 1.0, (count, size))
 
 
 def _support(parents: list[int]) -> NDArray[np.int8]:

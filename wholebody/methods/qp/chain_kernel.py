@@ -191,16 +191,16 @@ def _least_effort(
     """
     size, rows = len(q), len(room.value)
     right, system, dq, shift = np.empty(rows), np.empty((rows, rows)), np.empty(size), np.empty(size)
-    moved, before, share = np.zeros(size), np.zeros(size), 1.0
+    moved, before, share, wrong = np.zeros(size), np.zeros(size), 1.0, -1
+    released = np.empty(size, dtype=np.bool_)
     found[2] = 0.0
     for count in range(40):
         evaluate(chain, goals, room, q)
         rows_of(chain, goals, room)
         for i in range(size):
-            room.free[i], shift[i] = True, nearest[0, i] - q[i]
-            dq[i] = 0.0
-        held = True
-        while held:
+            room.free[i], released[i], shift[i] = True, False, nearest[0, i] - q[i]
+        changed = True
+        while changed:  # every round holds a joint or releases one for the first time
             for r in range(rows):
                 right[r] = room.value[r]
                 for i in range(size):
@@ -219,21 +219,18 @@ def _least_effort(
                     dq[i] = shift[i]
                     for r in range(rows):
                         dq[i] -= room.jacobian[r, i] * right[r] / nearest[1, i]
-            held = _hold(chain, room.free, q, dq)
+            changed = _hold_first(chain, room.free, q, dq)
+            if not changed:
+                wrong = _held_wrongly(chain, room, q, dq, nearest, right)
+                changed = wrong >= 0 and not released[wrong]
+                if changed:
+                    room.free[wrong] = released[wrong] = True
         longest = 0.0
         for i in range(size):
             longest = max(longest, abs(dq[i]))
         left = _norm(room.value)
         if longest < 1e-5 and left <= tolerance:
-            found[0] = left
-            for i in range(size):  # a joint that is held must be pushed against its limit
-                if not room.free[i]:
-                    slope = nearest[1, i] * (q[i] - nearest[0, i])
-                    for r in range(rows):
-                        slope += room.jacobian[r, i] * right[r]
-                    if (slope < -1e-6 and q[i] < chain.upper[i]) or (slope > 1e-6 and q[i] > chain.lower[i]):
-                        return count
-            found[2] = 1.0
+            found[0], found[2] = left, 1.0 if wrong < 0 else 0.0
             return count
         if count:
             square, bent = 0.0, 0.0
@@ -257,6 +254,37 @@ def _hold(chain: Chain, free: Mask, q: Array, dq: Array) -> bool:
             dq[i] = min(max(dq[i], chain.lower[i] - q[i]), chain.upper[i] - q[i])
             free[i], held = False, True
     return held
+
+
+@compiled(inner=True, error_model="numpy")
+def _hold_first(chain: Chain, free: Mask, q: Array, dq: Array) -> bool:
+    """Stop the joint that reaches its limit first on a step; whether there is one that would leave them."""
+    first, share = -1, 1.0
+    for i in range(len(q)):
+        if free[i] and not chain.lower[i] <= q[i] + dq[i] <= chain.upper[i]:
+            part = ((chain.upper[i] if dq[i] > 0.0 else chain.lower[i]) - q[i]) / dq[i]
+            if first < 0 or part < share:
+                first, share = i, part
+    if first < 0:
+        return False
+    free[first] = False
+    dq[first] = (chain.upper[first] if dq[first] > 0.0 else chain.lower[first]) - q[first]
+    return True
+
+
+@compiled(inner=True)
+def _held_wrongly(chain: Chain, room: Room, q: Array, dq: Array, nearest: Array, multipliers: Array) -> int:
+    """The held joint that the effort pulls most away from its limit; -1 where there is none."""
+    worst, most = -1, 1e-6
+    for i in range(len(q)):
+        if not room.free[i]:
+            slope = nearest[1, i] * (q[i] + dq[i] - nearest[0, i])
+            for r in range(len(multipliers)):
+                slope += room.jacobian[r, i] * multipliers[r]
+            pull = slope if q[i] + dq[i] > 0.5 * (chain.lower[i] + chain.upper[i]) else -slope
+            if pull > most:
+                worst, most = i, pull
+    return worst
 
 
 @compiled(inner=True)
@@ -284,39 +312,37 @@ def _norm(value: Array) -> float:
     return float(np.sqrt(square))
 
 
-@compiled(error_model="numpy")
+@compiled(error_model="numpy", fastmath={"contract", "reassoc"})
 def evaluate(chain: Chain, goals: Goals, room: Room, q: Array) -> None:
     """Placements of the joints, columns of their Jacobian in the world, and the errors of the goals with wrenches."""
-    joints, columns, axis = room.joints, room.columns, np.empty(3)
-    for k in range(len(chain.parents)):
-        base, place, joint, column = joints[chain.parents[k]], chain.places[k], joints[k + 1], columns[k]
-        turn, slide = chain.turns[k], chain.slides[k]
+    joints, columns, places, turns, slides = room.joints, room.columns, chain.places, chain.turns, chain.slides
+    for k in range(len(q)):
+        b, c = chain.parents[k], k + 1
         for i in range(3):
-            joint[3, i] = base[3, i]
-            for m in range(3):
-                joint[3, i] += base[m, i] * place[3, m]
-        for j in range(3):
+            d, e, f = joints[b, 0, i], joints[b, 1, i], joints[b, 2, i]
+            for j in range(4):
+                joints[c, j, i] = d * places[k, j, 0] + e * places[k, j, 1] + f * places[k, j, 2]
+            joints[c, 3, i] += joints[b, 3, i]
+        x, y, z = turns[k, 0], turns[k, 1], turns[k, 2]
+        if x == 0.0 and y == 0.0 and z == 0.0:
             for i in range(3):
-                joint[j, i] = base[0, i] * place[j, 0] + base[1, i] * place[j, 1] + base[2, i] * place[j, 2]
-        for i in range(3):
-            column[i] = joint[0, i] * slide[0] + joint[1, i] * slide[1] + joint[2, i] * slide[2]
-            axis[i] = joint[0, i] * turn[0] + joint[1, i] * turn[1] + joint[2, i] * turn[2]
-        for i in range(3):
-            joint[3, i] += q[k] * column[i]
-        x, y, z = axis[0], axis[1], axis[2]
-        column[3], column[4], column[5] = x, y, z
-        if x != 0.0 or y != 0.0 or z != 0.0:
-            column[0] += joint[3, 1] * z - joint[3, 2] * y
-            column[1] += joint[3, 2] * x - joint[3, 0] * z
-            column[2] += joint[3, 0] * y - joint[3, 1] * x
-            cosine, sine = np.cos(q[k]), np.sin(q[k])
-            for j in range(3):  # Rodrigues
-                a, b, c = joint[j, 0], joint[j, 1], joint[j, 2]
-                along = (1.0 - cosine) * (x * a + y * b + z * c)
-                joint[j, 0] = cosine * a + sine * (y * c - z * b) + along * x
-                joint[j, 1] = cosine * b + sine * (z * a - x * c) + along * y
-                joint[j, 2] = cosine * c + sine * (x * b - y * a) + along * z
-    room.wrench[:] = 0.0
+                slide = joints[c, 0, i] * slides[k, 0] + joints[c, 1, i] * slides[k, 1] + joints[c, 2, i] * slides[k, 2]
+                columns[k, i], columns[k, 3 + i] = slide, 0.0
+                joints[c, 3, i] += q[k] * slide
+            continue
+        cosine, sine = np.cos(q[k]), np.sin(q[k])
+        for i in range(3):  # Rodrigues, in the joint's frame: the rows of R (c 1 + (1 - c) u u' + s [u])
+            d, e, f = joints[c, 0, i], joints[c, 1, i], joints[c, 2, i]
+            axis = d * x + e * y + f * z
+            along = (1.0 - cosine) * axis
+            joints[c, 0, i] = cosine * d + sine * (e * z - f * y) + along * x
+            joints[c, 1, i] = cosine * e + sine * (f * x - d * z) + along * y
+            joints[c, 2, i] = cosine * f + sine * (d * y - e * x) + along * z
+            columns[k, 3 + i] = axis
+        x, y, z = columns[k, 3], columns[k, 4], columns[k, 5]
+        columns[k, 0] = joints[c, 3, 1] * z - joints[c, 3, 2] * y
+        columns[k, 1] = joints[c, 3, 2] * x - joints[c, 3, 0] * z
+        columns[k, 2] = joints[c, 3, 0] * y - joints[c, 3, 1] * x
     residuals(goals.tables, goals.entries, joints, room.wrench, room.value)
 
 

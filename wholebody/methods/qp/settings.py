@@ -134,17 +134,17 @@ class SeedNumbers(NamedTuple):
         damping: m, rad: of the steps at the goals, as in `DampedLeastSquares`. Less: errors vanish in fewer steps,
             steps near singular postures are wild.
         steps: most of a descent; those that reach their goals take 5 to 20.
-        together: seeds at a time.
-        most: seeds in all. More: fewer problems are left to the slower search, which then begins later.
+        together: seeds of a batch.
+        batches: most. More: fewer problems are left to the slower search, which then begins later.
         compared: ends of which the one of least effort is taken. More: less effort, more time.
         worth: share of the effort of an answer below which a rejected end is descended from too.
     """
 
     damping: float = 1e-3
     steps: int = 60
-    together: int = 16
-    most: int = 256
-    compared: int = 8
+    together: int = 10
+    batches: int = 25
+    compared: int = 5
     worth: float = 0.9
 
 
@@ -228,7 +228,6 @@ class SearchNumbers(NamedTuple):
         coming_near: most programs from there to the nearest posture among things.
         inside_probes: seeded starts for goals inside of things, which only look for the nearest posture.
         staying: most programs that improve the measures at the nearest posture to goals that are not met.
-        for_ways: share of the time limit that descents after the first may take. More: fewer answers that come to rest.
         screened: feasible postures that are looked for, for each that is descended from; more = lower measures, slower.
     """
 
@@ -250,7 +249,6 @@ class SearchNumbers(NamedTuple):
     coming_near: int = 40
     inside_probes: int = 5
     staying: int = 40
-    for_ways: float = 0.5
     screened: int = 4
 
 

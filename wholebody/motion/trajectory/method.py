@@ -101,7 +101,7 @@ class Trajectory:
             for window in run.windows(changed, self.margin):
                 if beyond[window.first : window.end].any():
                     told = run.watch.teller(1.0, 0.0, f"loads of frames {window.first} to {window.end - 1}")
-                    freed = windows.window(window, faults, told, q[window.first : window.end])
+                    freed = windows.window(window, faults, told, q)
                     other[window.first : window.end] = freed.q
             again = loads.corrected(other)
             now = again.of(other).worst()
@@ -114,10 +114,7 @@ class Trajectory:
     def _freed(
         self, run: Run, reference: Array, loads: ClipLoads | None, rate: float, beyond: Mask | None = None
     ) -> tuple[Array, list[str]]:
-        """Postures (n, nq) that are free, as near as can be to reference postures (n, nq), and what is missed.
-
-        Frames (n,) that are beyond something else are changed too.
-        """
+        """Postures (n, nq) that are free, near reference postures (n, nq), and what is missed; `beyond` change too."""
         windows = ClipRun(run, reference, self.time, rate, loads)
         q: Array = np.array(reference)
         run.watch.tell(0.0, "looking for collisions")

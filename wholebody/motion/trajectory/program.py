@@ -39,16 +39,12 @@ class Limits(NamedTuple):
 
     @classmethod
     def of(
-        cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None
-    ) -> Limits:
-        """Those of the frames of a clip; at a seam nothing moves.
+        cls, terms: FrameTerms, chart: Chart, first: int, seams: tuple[bool, bool], rate: float | None = None,
+        begun: Array | None = None,
+    ) -> Limits:  # fmt: skip
+        """Those of a chart of a clip's frames from `first` on; at a seam nothing moves from what is begun with (n, nv).
 
-        Args:
-            terms: of the clip.
-            chart: of the frames from `first` on.
-            first: number of its first frame.
-            seams: whether the clip goes on before and after them.
-            rate: factor of the speed limits; None for no bounds on speed.
+        `seams` say whether the clip goes on before and after them, `rate` is the factor of speed limits, None for none.
         """
         count, nv = len(chart), chart.model.nv
         lower, upper = chart.bounds(terms.scene.figure.limits)
@@ -67,7 +63,7 @@ class Limits(NamedTuple):
                 fastest[place] = np.maximum(rate * fast, chart.steps[place]) - chart.steps[place]
         for seam, place in zip(seams, (0, -1), strict=True):
             if seam:
-                lower[place] = upper[place] = 0.0
+                lower[place] = upper[place] = 0.0 if begun is None else begun[place]
         return cls(lower, upper, slowest, fastest)
 
     def passed(self, x: Array) -> Array:
@@ -79,13 +75,7 @@ class Limits(NamedTuple):
 
 
 class Layout(NamedTuple):
-    """A program, and where its unknowns are.
-
-    Attributes:
-        program: the program.
-        place: (n, a) index of the deviation of each frame and degree of freedom that counts.
-        dofs: (a,) these degrees of freedom.
-    """
+    """A program, the index in it of each frame's deviations (n, a), and their degrees of freedom (a,)."""
 
     program: BandedQP
     place: Indices
@@ -214,6 +204,7 @@ def _cost(objective: Objective, step: Step, place: Indices, prices: Array) -> tu
     x, dofs, count = step.x, step.dofs, len(step.dofs)
     stiffness = 1e6  # 1/m^2 and 1/rad^2, of equalities; their multipliers do the rest
     c = prices.copy()
+    c[place] += objective.slope[:, dofs] * objective.weights[dofs]
     first, second = np.nonzero(objective.bands)
     values = [np.outer(objective.bands[first, second], objective.weights[dofs]).ravel()]
     at, to = [place[first].ravel()], [place[second].ravel()]
@@ -277,15 +268,10 @@ def _speed_part(step: Step, place: Indices, limits: Limits, size: int) -> tuple[
 
 
 def _brought_back(x: Array, past: Array, radius: float) -> Array:
-    """(a,) share of what changes pass their bounds by that a step within the trust region can take back.
+    """(a,) share of what changes (n - 1, a) pass their bounds by that a step within the trust region can take back.
 
     It can shift all later frames by what is passed in all, or take a share of every deviation away, for the original
     keeps to the bounds.
-
-    Args:
-        x: (n, a) deviations.
-        past: (n - 1, a) by how much their changes pass the bounds.
-        radius: of the trust region.
     """
     shifted = radius / np.maximum(np.abs(past).sum(axis=0), radius)
     shrunk = min(0.5, radius / max(float(np.abs(x).max(initial=0.0)), 1e-9))
