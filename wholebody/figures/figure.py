@@ -333,7 +333,8 @@ class Figure(checks.FixedAttributes):
             InputError: q has the wrong shape or is not finite.
         """
         q = self._checked(q).copy()
-        q[self.limits.idx_q] = np.clip(q[self.limits.idx_q], self.limits.lower, self.limits.upper)
+        idx_q, _, lower, upper = self.limits
+        q[idx_q] = np.minimum(np.maximum(q[idx_q], lower), upper)
         return q
 
     def grounded(self, q: Array, scene: SceneLike) -> Array:
