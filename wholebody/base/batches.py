@@ -15,6 +15,7 @@ from multiprocessing.connection import wait
 from typing import Any, TypeVar
 
 from wholebody.base.errors import MissingPackageError, WholebodyError
+from wholebody.base.records import with_values
 from wholebody.base.runner import ONE_THREAD, Child, EndedError, Job, Outcome, end_with, interrupt_ignored, run_jobs
 
 T = TypeVar("T")
@@ -82,7 +83,7 @@ def shared(
         for child in others:
             child.close_if_full()
             if child.process is None:
-                child.begin(there([left[0]], True)._replace(name=_ready))
+                child.begin(with_values(there([left[0]], True), name=_ready))
         while left or alone or any(map(_works, others)):
             for child in others:
                 if child.job is None and (alone or left):
